@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import check, silenced, with_replaced
 from tfcompose.findings import Allow, Finding, RejectedError, without_duplicates
-from tfcompose.language import Given, composed, level_of, profiles_in, validate, with_includes
+from tfcompose.language import Given, composed, levels_of, profiles_in, validate, with_includes
 from tfcompose.load import Source, load
 from tfcompose.resolve import Disk, Library, resolve
 
@@ -82,7 +82,9 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     resolved = resolve(validated, library, read, disk)
     source, parts = validated.source, resolved.collected
     found = without_duplicates([*validated.found, *resolved.found, *check(resolved.robot)])
-    rules = {word: (level_of(rule), source.at_key(("rules", word))) for word, rule in validated.spec.rules.items()}
+    rules = {
+        word: (level, source.at_key(("rules", word))) for word, level in levels_of(validated, resolved.robot.limits)
+    }
     sources = (source, *parts.sources)
     kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)

@@ -34,9 +34,37 @@ MISTAKES = [
     (PROCESS % "depends_on: [a]", "6:26 TF101", "after:"),
     (PROCESS % "environment: [A=1]", "6:26 TF101", "env:"),
     (PROCESS % "respawn: true", "6:26 TF101", "restart"),
-    (PROCESS % "after: [a]", "6:33 TF103", "after: {base_drive: ready}"),
-    (PROCESS % "env: [A=1]", "6:31 TF103", "env: {RCUTILS_COLORIZED_OUTPUT: '1'}"),
-    (PROCESS % "remap: ['/a:=/b']", "6:33 TF103", "remap: {scan: front/scan}"),
+    (PROCESS % "after: [a]", "6:33 TF103", "after: {a: ready}"),
+    (PROCESS % "after: a", "6:33 TF103", "after: {a: ready}"),
+    (PROCESS % "env: [A=1]", "6:31 TF103", "env: {A: '1'}"),
+    (PROCESS % "remap: ['/a:=/b']", "6:33 TF103", "remap: {/a: /b}"),
+    (PROCESS % "remap: [[a, b]]", "6:33 TF103", "remap: {a: b}"),
+    (PROCESS % "params: nav2.yaml", "6:34 TF103", "params: {file: nav2.yaml}"),
+    (PROCESS % "cmd: [a]", "6:26 TF101", "run:"),
+    (BASE + "processes:\n  a: {external: yes}\n", "5:17 TF106", "true"),
+    (CAM % "driver: {serial: 1}", "5:62 TF101", "options: {serial:"),
+    (CAM % "serial: 1", "5:53 TF101", "options: {serial:"),
+    (CAM % "mount: base_link", "5:53 TF101", "parent"),
+    (CAM % "place: nopes", "5:60 TF203", "cam_link"),
+    (BASE + "frames:\n  - mast: {}\n", "5:3 TF103", "frames: {mast: {…}}"),
+    (BASE + "frames:\n  - name: mast\n", "5:3 TF103", "frames: {mast: {…}}"),
+    (FRAME % "quat_wxyz: [1, 0, 0, 0]", "5:29 TF101", "quat_xyzw: w last"),
+    (FRAME % "rpy_deg: [0, 90, 0]", "5:29 TF101", "90 deg"),
+    (SHAPE.replace("visual: {box: [1, 1, 1], %s}", "box: [1, 1, 1]"), "3:21 TF101", "visual:"),
+    (SHAPE.replace("visual: {box: [1, 1, 1], %s}", "inertial: {mass: 1, ixx: 1}"), "3:41 TF101", "inertia:"),
+    # owners
+    (BASE + "frames:\n  odom: {owner: drive}\n", "5:10 TF102", "owner: drive child"),
+    (
+        BASE + "frames:\n  mast: {parent: base_link, owner: node}\nprocesses:\n  a: {external: true, node: node}\n",
+        "5:36 TF302",
+        "did you mean a",
+    ),
+    (
+        BASE.replace("{}}", "{}, lift: {}}")
+        + "joints:\n  j: {type: continuous, parent: base_link, child: lift, mimic: {joint: k}}\n",
+        "5:72 TF701",
+        "",
+    ),
     (PROCESS % "ready: {topic: '/sc an'}", "6:41 TF106", ""),
     # conditions
     (ARG + MAST + "  tip: {parent: mast}\n", "7:17 TF203", "when: ${args.on};"),
@@ -51,7 +79,10 @@ MISTAKES = [
     (BASE + "frames:\n\n  laser  # on top\n    parent: base_link\n", "6:3 TF002", "laser:"),
     (BASE + "frames:\n  laser: {parent:base_link}\n", "5:11 TF006", "parent: base_link"),
     (BASE + "frames:\n  tag36h11:7:\n", "5:3 TF006", "{}"),
-    (BASE + "frames:\n  sensors:\n    cam: {preset: x}\n", "6:5 TF101", "section"),
+    (BASE + "frames:\n  sensors:\n    cam: {preset: x}\n", "5:3 TF101", "indent"),
+    (BASE + "frames:\nmast: {parent: base_link}\n", "5:1 TF101", "indent frames"),
+    (BASE + "frames:\n  mast:\n  parent: base_link\n", "6:11 TF103", "indent"),
+    (BASE + "frames:\n\u00a0 mast: {}\n", "5:1 TF002", "space"),
     # colours
     (SHAPE % "material: {color: [0, 0, 1]}", "3:57 TF101", "rgba"),
     (SHAPE % "color: bleu", "3:53 TF106", "blue"),
@@ -64,6 +95,14 @@ MISTAKES = [
     (FRAME % "xyz: {x: 0.2, z: 0.1}", "5:34 TF103", "[0.2, 0, 0.1]"),
     (FRAME % "xyz: [30 cmm, 0, 0]", "5:35 TF104", "cm mm"),
     (FRAME % "rate: 1,5 Hz", "5:37 TF006", "point"),
+    (FRAME % "xyz: [20 cm 0 10 cm]", "5:34 TF103", "[20 cm, 0, 10 cm]"),
+    (FRAME % "xyz: [0.2, 0, 0.1, 0, 0, 1.57]", "5:34 TF103", "xyz: [0.2, 0, 0.1] rpy: [0, 0, 1.57]"),
+    (FRAME % "rpy: {yaw: 90 deg}", "5:34 TF103", "[0, 0, 90 deg]"),
+    (FRAME % "xyz: [0, 0, $mast]", "5:41 TF103", '"${mast}"'),
+    (FRAME % "xyz: [0, 0, mast]", "5:41 TF103", '"${mast}"'),
+    (FRAME % "rpy: [0, 0, pi/2]", "5:41 TF103", '"${pi/2}"'),
+    (FRAME % "xyz: [0, 0, '$(var mast)']", "5:41 TF103", '"${mast}"'),
+    (FRAME % "rpy: [0, 0, '${math.pi/2}']", "5:41 TF105", "pi"),
     # YAML
     (BASE + "frames:\n  mast: {parent: base_link}\n  cam {parent: mast}\n", "6:3 TF002", "cam:"),
     (BASE + "frames:\n  mast:{parent: base_link}\n", "5:3 TF002", "mast:"),
@@ -72,6 +111,15 @@ MISTAKES = [
     (BASE + "  frames:\n    mast: {parent: base_link}\n", "4:3 TF002", "column 1"),
     (FRAME % "xyz: [0, 0, ${mast}]", "5:42 TF002", '"${mast}"'),
     (FRAME % "xyz: {${mast}}", "5:36 TF002", '"${mast}"'),
+    (BASE + "frames:\n  mast:\n    parent base_link\n    xyz: [0, 0, 1]\n", "6:5 TF002", "parent: base_link"),
+    (BASE + "frames:\n  mast:\n    parent:base_link\n    xyz: [0, 0, 1]\n", "6:5 TF002", "parent: base_link"),
+    (BASE + "frames:\n  mast:\n    parent: base_link\n      xyz: [0, 0, 1]\n", "7:7 TF002", "column 5"),
+    ("tfcompose:1\nrobot: r\n", "1:1 TF002", "tfcompose: 1"),
+    ("tfcompose: 1\nrobot r\nlinks: {}\n", "2:1 TF002", "robot: r"),
+    (BASE + "frames: mast: {parent: base_link}\n", "4:9 TF002", "next line"),
+    (BASE + "frames: {mast: {parent: base_link}} // mast\n", "4:37 TF002", "# mast"),
+    (BASE + "frames: {mast: {xyz: [0, 0, 1}}\n", "4:30 TF002", "]"),
+    (BASE + "frames: {mast: {parent: 'base_link}}\n", "4:25 TF002", "'"),
     # names in profiles
     (
         CAM % "rate: 5" + "profiles:\n  demo:\n    sensors: {camm: {driver: none}}\n",
@@ -126,3 +174,36 @@ def test_a_second_sensor_of_a_profile_is_not_taken_for_a_slip(tmp_path: Path) ->
     profile = "profiles: {demo: {frames: {mast2: {parent: base_link}}}}\n"
     (tmp_path / "robot.yaml").write_text(FRAME % "xyz: [0, 0, 1]" + profile, "utf-8")
     assert tfcompose_in(tmp_path, "lint").returncode == 0
+
+
+def test_where_a_limit_is_refused_the_default_one_judges_nothing(tmp_path: Path) -> None:
+    sensor = "sensors: {cam: {preset: realsense/d435i, parent: base_link, xyz: [0.1, 0, 0]}}\n"
+    for rules, code in (("", "TF640"), ("rules: {TF640: {limit: 5 kg}}\n", "TF104"), ("rules: {TF640: no}\n", "TF106")):
+        (tmp_path / "robot.yaml").write_text(SHAPE % "color: red" + sensor + rules, "utf-8")
+        printed = tfcompose_in(tmp_path, "lint").stdout
+        assert {one.partition("]")[0] for one in printed.split("[")[1:] if one.startswith("TF")} == {code}, printed
+
+
+def test_an_unknown_place_is_found_with_a_part_that_cannot_be_read(tmp_path: Path) -> None:
+    part = "parts: {arm: {xacro: gone.xacro, parent: base_link}}\n"
+    (tmp_path / "robot.yaml").write_text(CAM % "place: nopes" + part, "utf-8")
+    printed = tfcompose_in(tmp_path, "lint").stdout
+    assert "robot.yaml:5:60: error[TF203]" in printed
+    assert "gone.xacro:1:1: error[TF001]" in printed
+
+
+def test_an_entry_that_a_profile_misspells_is_one_finding_that_names_it(tmp_path: Path) -> None:
+    profile = "profiles: {demo: {sensors: {cmm: {driver: none}}}}\n"
+    (tmp_path / "robot.yaml").write_text(CAM % "tf: tfcompose" + profile, "utf-8")
+    printed = tfcompose_in(tmp_path, "lint").stdout
+    assert printed.count("error[") == 1
+    assert "did you mean cam?" in printed
+
+
+def test_a_process_that_was_refused_is_no_unknown_owner(tmp_path: Path) -> None:
+    for way in ("external: yes", "run: {package: a}", "cmd: [a]"):
+        text = BASE + f"frames: {{mast: {{parent: base_link, owner: a}}}}\nprocesses:\n  a: {{{way}}}\n"
+        (tmp_path / "robot.yaml").write_text(text, "utf-8")
+        printed = tfcompose_in(tmp_path, "lint").stdout
+        assert printed.count("error[") == 1, printed
+        assert "TF302" not in printed

@@ -170,7 +170,7 @@ def test_what_yaml_allows_and_a_robot_does_not_is_one_finding(text: str, code: s
         ("a: [1\nb: 2\n", "TF002", 1, 4),
         ("a:\n  b: {c: [1, '}'], # }\nd: {}\n", "TF002", 2, 6),
         ("a: {\n  b: 1\n  c: 2\n}\n", "TF002", 3, 4),
-        ("a: 'b\n", "TF002", 2, 1),
+        ("a: 'b\n", "TF002", 1, 4),
         ("\ta: 1\n", "TF002", 1, 1),
         ("a:\n  b: 1\n c: 2\n", "TF002", 3, 2),
         ("a: *b\n", "TF002", 1, 4),

@@ -34,7 +34,7 @@ def mimic_without_master(robot: Robot) -> Iterator[Finding]:
                 message = f"{joint.name} mimics {joint.mimic}, which is fixed"
             else:
                 advice = did_you_mean(joint.mimic, sorted(names - {joint.name}), advice)
-            yield finding("TF701", message, joint.at, help=advice)
+            yield finding("TF701", message, joint.mimic_at or joint.at, help=advice)
 
 
 @rule("TF702", of_urdf=True)

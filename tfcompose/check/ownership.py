@@ -48,6 +48,8 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
     for (owner, at), edges in lost.items():
         declare = f"declare it: processes: {{{owner}: {{external: true}}}}, if it is started elsewhere"
         message = f"unknown owner {owner} of {with_more(edges[0].name, len(edges) - 1)}"
+        runs = next((p.name for p in robot.processes if owner in {node.rpartition("/")[2] for node in p.nodes}), "")
+        declare = f"did you mean {runs}, the process that runs this node?" if runs else declare
         advice = left_out_by(robot.conditions, owner) or did_you_mean(owner, names, declare)
         yield finding("TF302", message, at, help=advice)
 
@@ -88,7 +90,8 @@ def static_edge_with_rate(robot: Robot) -> Iterator[Finding]:
     ``odom: {parent: map, owner: slam, rate: 10 Hz}``.
     """
     for edge in robot.edges:
-        if edge.kind == "static" and edge.rate is not None and not robot.excuses(edge.owner):
+        refused = robot.excuses(edge.owner) or robot.excuses(edge.child)  # its owner may have been
+        if edge.kind == "static" and edge.rate is not None and not refused:
             message = f"{edge.name} is fixed, and sent once: the rate of {edge.rate:g} Hz has no meaning"
             advice = "remove rate" if edge.owner_at else "remove rate, or add the owner that publishes the edge"
             yield finding("TF305", message, edge.rate_at or edge.at, help=advice)

@@ -7,8 +7,7 @@ The models are the one description of validation, JSON Schema and reference. ``o
 from tfcompose.language.args import ArgSpec, Given, GivenArg
 from tfcompose.language.overlay import as_part, composed, lay_over, profiles_in, set_value, with_includes
 from tfcompose.language.pose import DIRECTIONS
-from tfcompose.language.rules import level_of
-from tfcompose.language.validate import Validated, validate, validate_node_preset, validate_preset
+from tfcompose.language.validate import Validated, levels_of, validate, validate_node_preset, validate_preset
 from tfcompose.language.variables import alternatives_of
 
 __all__ = [
@@ -21,7 +20,7 @@ __all__ = [
     "as_part",
     "composed",
     "lay_over",
-    "level_of",
+    "levels_of",
     "profiles_in",
     "set_value",
     "validate",

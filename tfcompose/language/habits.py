@@ -12,6 +12,8 @@ _ROTATION = "the rotation is rpy: [0, 0, 90 deg], or quat_xyzw: [0, 0, 0, 1], or
 _POSE = "the pose is xyz: [0.2, 0, 30 cm] and rpy: [0, 0, 90 deg]"
 _PARENT = "the frame that it is mounted on is parent"
 _OWNER = "the process that publishes the edge is owner"
+_TOPIC = "topics are set in the driver: driver: {remap: {scan: front/scan}}, or params"
+_OPTION = "it is an option of the sensor: options: {WORD: …}; tfcompose presets PRESET lists them"
 _MASS = "it belongs under inertial: {mass: 2 kg}"
 
 #: By the word: the key that has its meaning, where that is known, and what to write.
@@ -22,7 +24,12 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
         ("position translation trans location offset x y z", (("xyz", _POSITION),)),
         ("rotation orientation rot euler roll pitch yaw", (("rpy", _ROTATION),)),
         ("quaternion quat q qx qy qz qw", (("quat_xyzw", "a quaternion is quat_xyzw: [0, 0, 0, 1], w last"),)),
-        ("parent_frame parent_link parent_frame_id base frame header", (("parent", _PARENT),)),
+        (
+            "quat_wxyz quaternion_wxyz wxyz",
+            (("quat_xyzw", "a quaternion is quat_xyzw: [0, 0, 0, 1]: move w from the first place to the last"),),
+        ),
+        ("rpy_deg rpy_degrees euler_deg", (("rpy", "degrees are rpy: [0, 0, 90 deg], each value with its unit"),)),
+        ("parent_frame parent_link parent_frame_id base frame header mount mounted_on", (("parent", _PARENT),)),
         (
             "frame_id child_frame child_frame_id",
             (("parent", "the key before the colon names the frame; parent is the frame that it is mounted on"),),
@@ -37,8 +44,10 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
                 ("visual", "a colour belongs to a shape: visual: {box: [0.5, 0.4, 0.15], color: blue}"),
             ),
         ),
-        ("geometry", (("box", "shapes are written at once: box: [0.5, 0.4, 0.15]"),)),
+        ("geometry", (("box", "write the shape without it: box: [0.5, 0.4, 0.15]"),)),
+        ("box cylinder sphere mesh shape", (("visual", "a shape belongs under visual: {box: [0.5, 0.4, 0.15]}"),)),
         ("mass inertia density", (("inertial", _MASS),)),
+        ("ixx iyy izz ixy ixz iyz", (("inertia", "it belongs under inertia: {ixx: 0.1, iyy: 0.1, izz: 0.1}"),)),
         ("filename file", (("uri", "the file is uri"), ("mesh", "a file is mesh: meshes/base.stl"))),
         ("depends_on requires wait_for needs", (("after", "what it waits for is after: {NAME: ready}"),)),
         ("respawn", (("restart", "restart: on-failure, or always, starts it again"),)),
@@ -54,13 +63,19 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
         ("remappings remaps", (("remap", "other names are remap: {scan: front/scan}"),)),
         ("parameters ros__parameters", (("params", "parameters are params: {use_sim_time: false}"),)),
         ("command cmd exec entrypoint", (("run", "the command is run: [program, argument]"),)),
+        ("topic topics", (("remap", "other names are remap: {scan: front/scan}"), ("driver", _TOPIC))),
+        (
+            "name",
+            (("frames", "the key before the colon is the name; frames: {camera_link: {name: lens}} renames a frame"),),
+        ),
+        ("serial serial_number serial_no ip port device hostname", (("process", _OPTION), ("options", _OPTION))),
         (
             "package pkg executable",
             (("run", "a ROS node is run: {package: slam_toolbox, executable: async_slam_toolbox_node}"),),
         ),
         ("launch launch_file", (("run", "a launch file is run: {launch: slam_toolbox/online_async_launch.py}"),)),
         ("preset", (("node", "the preset of a node is node: {preset: slam_toolbox}"),)),
-        ("type model", (("preset", "which sensor it is says preset: realsense/d435i; tfcompose presets lists them"),)),
+        ("type model", (("preset", "the model is preset: realsense/d435i; tfcompose presets lists them"),)),
     )
     for word in words.split()
 }
@@ -68,4 +83,5 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
 
 def habit(word: str, known: Collection[str]) -> str:
     """Return what to write instead of a key that another format has, where ``known`` are the keys; else nothing."""
-    return next((advice for key, advice in _HABITS.get(word, ()) if key in known), "")
+    advice = next((advice for key, advice in _HABITS.get(word, ()) if key in known), "")
+    return advice.replace("WORD", word)

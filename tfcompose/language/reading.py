@@ -7,6 +7,7 @@ two turns, and none takes more than it has levels.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
@@ -53,10 +54,10 @@ class Refusal:
         span = source.at_key(self.path) if self.on_key else source.at(self.path)
         notes = [Note("the other one", source.at_key(self.other))] if self.other else []
         edits = [Edit(span, self.instead)] if self.instead is not None else []
-        advice = self.help
-        if self.code == "TF102" and source.is_variant:
-            advice = _laid_over_nothing(source, self.path) or advice
-        return finding(self.code, self.message, span, help=advice, notes=notes, edits=edits)
+        meant = _laid_over_nothing(source, self.path) if self.code == "TF102" and source.is_variant else ""
+        if meant:  # one finding, whatever it lacks
+            return finding("TF102", f"{self.path[-1]} is new here, and not complete", span, help=meant, notes=notes)
+        return finding(self.code, self.message, span, help=self.help, notes=notes, edits=edits)
 
 
 def _laid_over_nothing(source: Source, path: Path) -> str:
@@ -185,8 +186,12 @@ def _unknown_key(model: type[Spec], path: Path, data: Any, meant: Counter[tuple[
     around = data
     for step in path[:-1]:
         around = around[step]
-    is_safe = slip not in around and meant[path[:-1], slip] == 1
-    advice = f"did you mean {slip}?" if slip else _section(model, path) or habit(name, known)
+    usual = habit(name, known)
+    if not slip and not usual and _is_a_section(model, path):
+        message = f"{path[1]} is a section of its own, not one of {path[0]}"
+        return Refusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
+    is_safe = slip not in around and meant[path[:-1], slip] == 1 and not usual
+    advice = usual or (f"did you mean {slip}?" if slip else "") or _indented_too_little(path, around, known)
     if not advice:
         listing = f"known here: {', '.join(known)}"
         option = f"an option of its preset goes under options: {{{name}: …}}; " if "options" in known else ""
@@ -194,11 +199,16 @@ def _unknown_key(model: type[Spec], path: Path, data: Any, meant: Counter[tuple[
     return Refusal("TF101", path, f"unknown key {name}", advice, on_key=True, instead=slip if is_safe else None)
 
 
-def _section(model: type[Spec], path: Path) -> str:
-    """Return the help where an entry of a section has the name of a section: it is indented too far."""
-    if len(path) != 3 or path[1] not in fields_of(model) or path[0] == "profiles":  # noqa: PLR2004 (section, entry, key)
-        return ""
-    return f"{path[1]} is a section of its own, not one of {path[0]}: indent it as {path[0]} is"
+def _is_a_section(model: type[Spec], path: Path) -> bool:
+    """Return whether an entry of a section has the name of a section: it is indented too far."""
+    return len(path) == 3 and path[1] in fields_of(model) and path[0] != "profiles"  # noqa: PLR2004 (section, entry, key)
+
+
+def _indented_too_little(path: Path, around: dict[str, Any], known: list[str]) -> str:
+    """Return the help for a key that follows a known one without a value: it probably belongs to that."""
+    before = list(around)[: [*around].index(str(path[-1]))]
+    owner = next((name for name in reversed(before) if name in known), "")
+    return f"indent it, if it belongs to {owner}" if owner and around[owner] is None else ""
 
 
 def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
@@ -220,27 +230,76 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
         advice = did_you_mean(value, allowed, advice) if isinstance(value, str) else advice
         return Refusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
     code, message, advice = WORDS.get(kind, UNFORESEEN)
-    if kind == "string_type" and isinstance(value, (int, float)):
-        advice = "put it in quotes"
+    if kind == "string_type":
+        advice = _as_string(value)
+    elif kind == "bool_type" and str(value).lower() in _SWITCHES:
+        advice = f"write {_SWITCHES[str(value).lower()]}"
     elif kind in {"model_type", "dataclass_type"}:
-        advice = f"its keys can be: {', '.join(fields_of(mapping_at(model, path)))}"
+        keys = fields_of(mapping_at(model, path))
+        advice = f"its keys can be: {', '.join(keys)}"
+        if path and path[-1] in keys:
+            advice = f"{path[-1]} belongs to the entry above: indent it more than the name of that"
     elif kind == "dict_type":
-        advice = f"for example {_example_of(model, path)}"
+        advice = _as_mapping(model, path, value)
     return Refusal(code, path, message.format(value=shown(value), **context), advice, on_key)
 
 
-def _example_of(model: type[Spec], path: Path) -> str:
-    """Return an example of a mapping with keys of the user's own, as YAML in one line."""
+#: Words that YAML 1.1 reads as true and false, and YAML 1.2 as strings.
+_SWITCHES = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+
+
+def _as_string(value: Any) -> str:
+    """Return the help for what stands where a string belongs."""
+    if isinstance(value, (int, float)):
+        return "put it in quotes"
+    inside = list(value.values()) if isinstance(value, dict) else value
+    strings = [one for one in inside if isinstance(one, str)] if isinstance(inside, list) else []
+    if not strings or len(strings) != len(inside):
+        return ""
+    return f"write {_in_yaml(strings[0])}" if len(strings) == 1 else f"write one of {', '.join(strings)}"
+
+
+def _as_mapping(model: type[Spec], path: Path, value: Any) -> str:
+    """Return the help for what stands where a mapping with the user's own keys belongs: its items, or an example."""
     around = mapping_at(model, path[:-1])
     field = fields_of(around).get(str(path[-1])) if around else None
     example = next((one for one in (field.examples or []) if isinstance(one, dict)), None) if field else None
-    inside = ", ".join(f"{key}: {_in_yaml(value)}" for key, value in example.items()) if example else "NAME: {…}"
-    return f"{path[-1]}: {{{inside}}}" if path else inside
+    usual = next(iter(example.values())) if example else {}
+    items = [_pair(item, usual) for item in (value if isinstance(value, list) else [value])]
+    if items and None not in items:
+        inside = ", ".join(f"{key}: {_in_yaml(one)}" for key, one in filter(None, items))
+        return f"write {path[-1]}: {{{inside}}}" if path else f"write {inside}"
+    inside = ", ".join(f"{key}: {_in_yaml(one)}" for key, one in example.items()) if example else "NAME: {…}"
+    return f"for example {path[-1]}: {{{inside}}}" if path else f"for example {inside}"
+
+
+#: A variable or a parameter, and a name in ROS's own notation, with its value.
+_ASSIGNED = re.compile(r"([^\s=:]+)(?::=|=)(.*)")
+
+
+def _pair(item: Any, usual: Any) -> tuple[str, Any] | None:
+    """Return key and value of an item of a list that should be a mapping, whose values are such as ``usual``."""
+    if isinstance(item, str) and (assigned := _ASSIGNED.fullmatch(item)):
+        return assigned[1], assigned[2]
+    if isinstance(item, str) and item.endswith((".yaml", ".yml")):
+        return "file", item
+    if isinstance(item, str) and item.isidentifier() and isinstance(usual, (str, dict)):
+        return item, usual
+    if isinstance(item, list) and len(item) == 2 and all(isinstance(one, str) for one in item):  # noqa: PLR2004 (a pair)
+        return item[0], item[1]
+    if isinstance(item, dict) and isinstance(item.get("name"), str):
+        return item["name"], {}
+    if isinstance(item, dict) and len(item) == 1:
+        name, value = next(iter(item.items()))
+        return name, value
+    return None
 
 
 def _in_yaml(value: Any) -> str:
-    """Return a value as it is written in YAML, a plain word without quotes."""
-    return value if isinstance(value, str) and value.replace("/", "").isidentifier() else shown(value)
+    """Return a value as it is written in YAML, a plain word without quotes; what is in a mapping is left out."""
+    if isinstance(value, dict):
+        return "{…}"
+    return value if isinstance(value, str) and re.fullmatch(r"[A-Za-z_/][\w/.]*", value) else shown(value)
 
 
 #: pydantic's kinds of errors that the models can raise: code, message and help.

@@ -55,6 +55,14 @@ from tfcompose.units import (
 class FrameSpec(MountKeys):
     """A bare frame. Without a parent it is a root."""
 
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield what is wrong with the data together, with paths below them."""
+        yield from super().check(data)
+        if "owner" in data and "parent" not in data:
+            advice = f"write owner: {data['owner']} on the child of the edge that it publishes, or add parent"
+            yield ("owner",), refused("TF102", "owner without a parent: a root has no edge", advice, on_key=True)
+
 
 # Joints and their hardware
 

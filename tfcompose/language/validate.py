@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.catalogue import can_be_allowed, code_of
 from tfcompose.findings import Finding, RejectedError, without_duplicates
 from tfcompose.language.args import Given
 from tfcompose.language.conditions import unfolded
@@ -14,11 +15,12 @@ from tfcompose.language.overlay import is_for_later
 from tfcompose.language.preset import PresetSpec, wrong_names
 from tfcompose.language.reading import Refusal, read
 from tfcompose.language.robot import RobotSpec
+from tfcompose.language.rules import RuleSpec, level_of
 from tfcompose.language.values import plain
 from tfcompose.language.variables import Variables, unused
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from tfcompose.load import Path, Source
     from tfcompose.plan import ParameterValue
@@ -125,6 +127,20 @@ def validate_node_preset(source: Source) -> NodePresetSpec:
     return preset
 
 
+def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[str, str]]:
+    """Yield each entry of ``rules`` with its severity, empty for that of the code.
+
+    Off is that of a code whose entry was refused, or whose limit is not among ``limits``, by code: the default would
+    not be what is meant.
+    """
+    for section, word in sorted(validated.broken):
+        if section == "rules" and (code := code_of(word)) and can_be_allowed(code):
+            yield word, "off"
+    for word, setting in validated.spec.rules.items():
+        is_limited = isinstance(setting, RuleSpec) and setting.limit is not None
+        yield word, "off" if is_limited and code_of(word) not in (*limits, None) else level_of(setting)
+
+
 def _nulls(source: Source) -> list[Refusal]:
     """Return a refusal of each key and item without a value; null only removes what it is merged over."""
     found: list[Refusal] = []
@@ -138,7 +154,8 @@ def _nulls(source: Source) -> list[Refusal]:
                 message = "an item of the list has no value"
                 found.append(Refusal("TF006", at, message, "give a value, or remove the item"))
             elif item is None and not is_for_later(path):
-                message, advice = f"{step} has no value", f"write {step}: {{}}, or remove it"
+                message = f"{step} has no value"
+                advice = f"write {step}: {{}}, remove it, or indent what belongs to it"
                 if _AFTER_A_COMMA.fullmatch(str(step)):
                     advice = "decimals take a point, such as 1.5 kg; or a mapping is not closed"
                 elif glued := _WITHOUT_SPACE.fullmatch(str(step)):

@@ -62,6 +62,9 @@ COMPUTED = {"type": "string", "pattern": f"^{EXPRESSION}"}
 
 
 _AXES = ("x", "y", "z")
+_ANGLES = ("roll", "pitch", "yaw")
+_ITEM = re.compile(r"[^\s,]*\d[^\s,]*(?:\s+[^\s\d,.+-]+)?")  # a number with its unit, which may be apart
+_OF_A_POSE = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +86,17 @@ class InARow:
 
     def _advice(self, value: Any) -> str:
         """Return what to write instead: what may be meant by a string, a mapping, or numbers with decimal commas."""
-        items = value.replace(",", " ").split() if isinstance(value, str) else None
-        if isinstance(value, dict) and self.count == len(_AXES) and value.keys() <= set(_AXES):
-            items = [shown(value.get(axis, 0)) for axis in _AXES]
+        text = value[0] if isinstance(value, list) and len(value) == 1 else value
+        items = _ITEM.findall(text) if isinstance(text, str) else None
+        for names in (_AXES, _ANGLES):
+            if value and isinstance(value, dict) and self.count == len(names) and value.keys() <= set(names):
+                items = [str(value.get(name, 0)) for name in names]
         if items and len(items) == self.count:
             return f"write [{', '.join(items)}]"
         if isinstance(value, list) and self.count < len(value) <= 2 * self.count:
+            if len(value) == _OF_A_POSE and any(isinstance(one, float) for one in value):
+                first, last = (", ".join(map(str, part)) for part in (value[:3], value[3:]))
+                return f"position and rotation are two keys: xyz: [{first}] and rpy: [{last}]"
             return f"decimals take a point: {self.sample}"
         return f"for example {self.sample}"
 
@@ -127,7 +135,8 @@ def _truth(value: Any) -> Any:
 def _is_true(value: Any) -> bool:
     if _truth(value) is True:
         return True
-    raise refused("TF106", f"{shown(value)} is not true", "remove the key")
+    is_meant = isinstance(value, str) and value.lower() in {"yes", "on"}
+    raise refused("TF106", f"{shown(value)} is not true", "write true" if is_meant else "write true, or remove the key")
 
 
 def _names_a_variable(name: str) -> str:

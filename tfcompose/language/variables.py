@@ -290,6 +290,8 @@ class Variables:
             raise ExpressionError(f"the variable {self.open[-1]} depends on itself: {circle}")
         if name in RESERVED:
             raise ExpressionError(f"{name} is {RESERVED[name]}", A_FILE)
+        if name == "math.pi":
+            raise ExpressionError(f"unknown variable {name}", "write pi")
         there = f"vars has {', '.join(self.given)}" if self.given else "the file has no vars"
         raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.given, there))
 

@@ -24,6 +24,7 @@ from yaml.events import (
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
+from tfcompose.load.syntax import no_character, no_syntax
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -34,6 +35,9 @@ MOST_VALUES = 400_000  # with those that aliases stand for
 
 #: NUL, which no file name, argument or variable can hold, and halves of characters, which no file can.
 _FORBIDDEN = re.compile("[\0\ud800-\udfff]")
+
+#: A key that swallowed the beginning of its value: ``mast {parent``, ``mast:{parent``.
+_GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
 
 LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
@@ -241,9 +245,13 @@ class Reader:
             message = f"a key must be a string; this one is {what}"
             self.found.append(finding("TF004", message, place.span, help="put it in quotes"))
             top.keeps = False
+        elif not key.isascii() and key.strip() != key:
+            message = "a key begins or ends with a space that YAML does not take for one, such as a no-break space"
+            self.found.append(finding("TF002", message, place.span, help="replace it with an ordinary space"))
+            top.keeps = False
         elif ("{" in key or "[" in key) and (glued := _GLUED.match(key)):
             message = f"a space after the colon of {glued[1]} is missing" if glued[2] else f"{glued[1]} has no colon"
-            advice = f"write {glued[1]}: {glued[3]}"
+            advice = f"write {glued[1]}: {glued[3] if glued[3][-1] in '}]' else glued[3][0] + '…'}"
             self.found.append(finding("TF002", message, place.span, help=advice))
             top.keeps = False
         elif key in top.keys:
@@ -357,95 +365,3 @@ class Place:
         yield path, self
         for step, place in self.inside.items():
             yield from place.walk((*path, step))
-
-
-def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Finding:
-    """Return the finding for a character that must not stand in YAML."""
-    hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
-    position = hit.start() if hit else error.position
-    line, column = text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
-    return finding("TF002", "a character that YAML does not allow", Span(file, line, column, line, column + 1))
-
-
-def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
-    """Return the finding for text that the parser refuses, with where it began."""
-    mark, began = error.problem_mark or error.context_mark, error.context_mark
-    message, advice = ", ".join(filter(None, (error.context, error.problem))), ""
-    lines = text.splitlines()
-    source_line = lines[mark.line] if mark and mark.line < len(lines) else ""
-    indent = source_line[: len(source_line) - len(source_line.lstrip())]
-    if "\t" in indent:
-        message, advice = "a tab in the indentation", "indent with spaces; YAML does not allow tabs there"
-    elif began and "expected ':'" in message and began.line < len(lines):
-        mark, message = began, f"{lines[began.line].strip()} has no colon"
-        advice = f"write {lines[began.line].strip()}:"
-    elif (
-        mark
-        and ("mapping values are not allowed" in message or "parsing a block" in message)
-        and (bare := _line_without_colon(lines, mark.line))
-    ):
-        mark, message, advice = bare
-        began = None
-    elif began and mark and "parsing a block" in message and len(indent) == mark.column != began.column:
-        message = f"indented by {mark.column} spaces, and what it belongs to by {began.column}"
-        advice = f"begin it in column {began.column + 1}, as line {began.line + 1} does"
-    elif mark and "parsing a flow" in message and "${" in source_line[max(0, mark.column - 2) : mark.column + 2]:
-        expression = _EXPRESSION.search(source_line)
-        example = expression[0] if expression else "${x}"
-        message = f"{example} is not in quotes, and stands in a list or mapping in brackets"
-        advice = f'write "{example}"'
-    elif began and "parsing a flow" in message and _is_left_open(lines[began.line :], began.column):
-        mark, bracket = began, lines[began.line][began.column]
-        message, advice = f"{bracket} is not closed", f"close it with {_CLOSING[bracket]}"
-    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-    notes = []
-    if began and mark and began.line != mark.line:
-        notes = [Note("it began here", Span(file, began.line + 1, began.column + 1, began.line + 1, began.column + 2))]
-    return finding("TF002", message, Span(file, line, column, line, column + 1), help=advice, notes=notes)
-
-
-def _line_without_colon(lines: list[str], number: int) -> tuple[yaml.Mark, str, str] | None:
-    """Return the place, message and help for a lone word above a line that is indented more; None for other lines."""
-    if number >= len(lines):
-        return None
-    above = number - 1
-    while above >= 0 and not lines[above].strip():
-        above -= 1
-    found = _LONE_WORD.fullmatch(lines[above]) if above >= 0 else None
-    if not found or len(found[1]) >= len(lines[number]) - len(lines[number].lstrip()):
-        return None
-    place = yaml.Mark("", 0, above, len(found[1]), None, 0)
-    return place, f"{found[2]} has no colon", f"write {found[2]}:"
-
-
-_LONE_WORD = re.compile(r"( *)([\w/.-]+)\s*(?:#.*)?")
-
-#: A key that swallowed the beginning of its value: ``mast {parent``, ``mast:{parent``.
-_GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
-
-_EXPRESSION = re.compile(r"\$\{[^{}\"']*\}")
-
-
-_CLOSING = {"{": "}", "[": "]"}
-#: Texts in quotes, comments and expressions, in which brackets are none; and brackets.
-_TOKEN = re.compile(r"""\"(?:[^"\\]|\\.)*\"|'[^']*'|(?<![^\s])#[^\n]*|\$\{[^{}\n]*\}|[][{}]""")
-
-
-def _is_left_open(lines: list[str], column: int) -> bool:
-    """Return whether there is a bracket at a column of the first line that is closed nowhere."""
-    if not lines or lines[0][column : column + 1] not in _CLOSING:
-        return False
-    depth = 0
-    for token in _TOKEN.finditer("\n".join([lines[0][column:], *lines[1:]])):
-        depth += (token[0] in _CLOSING) - (token[0] in _CLOSING.values())
-        if not depth:
-            return False
-    return True
-
-
-def no_yaml(text: str, file: str) -> Finding:
-    """Return the finding for XML where YAML is expected: most often a URDF as a robot file."""
-    is_xacro = "ros.org/wiki/xacro" in text
-    key = "xacro" if is_xacro else "urdf"
-    advice = f"tfcompose import {file} -o robot.yaml; or take it as a part: parts: {{NAME: {{{key}: {file}}}}}"
-    return finding("TF002", "this is XML, and YAML is expected", Span(file), help=advice if "<robot" in text else "")

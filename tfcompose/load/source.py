@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Allow, Finding, RejectedError, Span, finding
-from tfcompose.load.nodes import MOST_VALUES, Path, Place, Reader, no_yaml
+from tfcompose.load.nodes import MOST_VALUES, Path, Place, Reader
+from tfcompose.load.syntax import no_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

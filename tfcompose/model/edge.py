@@ -74,10 +74,11 @@ class ReferencePositions:
 class Joint(PlanJoint):
     """A joint of the plan, with what only the compiler knows of it; the axis of a planar one is the plane's normal.
 
-    ``axis_length`` is that of the axis as it was written.
+    ``axis_length`` is that of the axis as it was written, ``mimic_at`` the place of the joint that it follows.
     """
 
     at: Span = field(kw_only=True)
+    mimic_at: Span | None = field(default=None, kw_only=True)
     limit: Limit | None = field(default=None, kw_only=True)
     axis_length: float = field(default=1.0, kw_only=True)
     dynamics: Dynamics | None = field(default=None, kw_only=True)

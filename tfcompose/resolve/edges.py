@@ -86,7 +86,7 @@ class Drafts:
     def add_joints(self) -> None:
         """Take the edges between bodies."""
         for name, joint in self.spec.joints.items():
-            moving = joint_of(name, joint, self.source.at_key(("joints", name)))
+            moving = joint_of(name, joint, self.source)
             self.found += idle_joint_keys(name, joint, self.source)
             self.add(("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name)
 
@@ -214,7 +214,7 @@ _IDLE = {
 }
 
 
-def joint_of(name: str, spec: JointSpec, at: Span) -> Joint | None:
+def joint_of(name: str, spec: JointSpec, source: Source) -> Joint | None:
     """Return the joint with a unit axis, or None where it is fixed."""
     kind: Any = spec.type
     if kind == "fixed":
@@ -225,7 +225,8 @@ def joint_of(name: str, spec: JointSpec, at: Span) -> Joint | None:
     return Joint(
         name=name,
         type=kind,
-        at=at,
+        at=source.at_key(("joints", name)),
+        mimic_at=source.exactly_at(("joints", name, "mimic", "joint")),
         axis=(x / length, y / length, z / length),
         limit=spec.limit,
         mimic=mimic.joint if mimic else None,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 from tfcompose.model import STATIC, is_optical, left_out_by
+from tfcompose.text import listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -152,7 +153,8 @@ class Solver:
             pose = self._between(draft.edge.parent, self._known(draft.relative_to, at), at) @ pose
         if draft.place:
             at = draft.place_at or draft.edge.at
-            pose = pose @ self._below(draft, self._known(draft.place, at), at).inverse()
+            inside = self._inside(draft) if draft.edge.sensor and draft.at not in self.broken else None
+            pose = pose @ self._below(draft, self._known(draft.place, at, inside), at).inverse()
         return pose
 
     def _measured(self, draft: Draft, measured: Calibration) -> Edge:
@@ -168,12 +170,18 @@ class Solver:
             measured = replace(measured, nominal=above.inverse() @ self._declared_pose(draft) @ below)
         return replace(edge, pose=above @ measured.pose @ below.inverse(), calibration=measured)
 
-    def _known(self, frame: str, at: Span) -> str:
+    def _inside(self, draft: Draft) -> list[str]:
+        """Return the frames that the entry of the draft brings, its own first."""
+        return [one.edge.child for one in self.drafts if one.group == draft.group]
+
+    def _known(self, frame: str, at: Span, inside: list[str] | None = None) -> str:
+        """Return the frame; ``inside`` are those that it has to be one of, and nobody else brings."""
         if frame in self.frames:
             return frame
-        if self.excuses(frame):
+        if self.excuses(frame) and not inside:
             raise _UnsolvableError(None)
-        advice = left_out_by(self.conditions, frame) or did_you_mean(frame, self.frames)
+        otherwise = f"one of: {listed(inside)}" if inside else ""
+        advice = left_out_by(self.conditions, frame) or did_you_mean(frame, inside or self.frames, otherwise)
         raise _UnsolvableError(finding("TF203", f"no frame {frame}", at, help=advice))
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
@@ -229,8 +237,9 @@ class Solver:
             raise _UnsolvableError(None)
         if mount not in names:
             message = f"{place} is not a frame of this sensor" if draft.edge.sensor else f"{place} is not below {mount}"
-            inside = [d.edge.child for d in self.drafts if d.group == draft.group]
-            raise _UnsolvableError(finding("TF404", message, at, help=did_you_mean(place, inside)))
+            inside = self._inside(draft)
+            advice = did_you_mean(place, inside, f"one of: {listed(inside)}")
+            raise _UnsolvableError(finding("TF404", message, at, help=advice))
         pose = self._down(chain, mount, at)
         inner = [self.drafts[index].edge for _, index in chain[: names.index(mount)]]
         nominal = [edge for edge in inner if edge.nominal and edge.owner != STATIC]

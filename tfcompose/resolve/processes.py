@@ -10,6 +10,7 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
+from tfcompose.language.habits import habit
 from tfcompose.language.process import RUNNING, SIMULATIONS, SWEEP, keys_of
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, MOVING, ROS2_LAUNCH, SHELL, STATIC, Node, Process
 from tfcompose.plan import Ready, Schedule, Simulation, StopRule, Sweep
@@ -51,7 +52,7 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> tupl
     if declared.run and declared.run.is_startable:
         process = Process(name, "run", at=place, ros_nodes=nodes)
         return replace(process, **how(declared, namespace), **program(declared.run, shell=bool(declared.shell))), found
-    if _is_run_refused(name, validated) or {(*at, "component"), (*at, "container")} & validated.refused:
+    if _is_way_refused(name, validated):
         return None, found
     if declared.run:
         advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
@@ -78,10 +79,14 @@ def _simulated(process: Process, simulate: Simulate, validated: Validated) -> tu
     return replace(process, simulate=simulation), []
 
 
-def _is_run_refused(name: str, validated: Validated) -> bool:
-    """Whether what says what to start was refused, and is missing only therefore."""
-    refused = [path[3:] for path in validated.refused if path[:3] == ("processes", name, "run")]
-    return any(not rest or isinstance(rest[0], int) or rest[0] != "args" for rest in refused)
+def _is_way_refused(name: str, validated: Validated) -> bool:
+    """Return whether what says how it runs was refused, and is missing only therefore."""
+    refused = [path[2:] for path in validated.refused if path[:2] == ("processes", name) and len(path) > 2]  # noqa: PLR2004
+    return any(
+        way in RUNNING | {"container"} or habit(str(way), {"run"})
+        for way, *rest in refused
+        if not rest or way != "run" or isinstance(rest[0], int) or rest[0] != "args"
+    )
 
 
 def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Finding]:

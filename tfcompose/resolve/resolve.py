@@ -96,6 +96,8 @@ class _Work:
         """Return the robot and what was found; each step knows what the ones before it refused."""
         self.broken.update(self.validated.broken)
         own = _processes(self.validated, self.found, is_part=self.holder is not None)
+        started = {process.name for process in own}
+        self.broken |= {("processes", name) for name in self.spec.processes if name not in started}
         packages = self._packages()
         self._join_parts(packages)
         bodies = Bodies(self.source, packages)

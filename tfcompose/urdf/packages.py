@@ -134,7 +134,8 @@ class Packages:
         if self.disk is None:
             return None
         if "\0" in path or not self.disk.is_file(path):
-            return finding("TF723", message, at, help=f"looked for {path}")
+            where = path if path.startswith("/") else f"{path}, from the folder where tfcompose runs"
+            return finding("TF723", message, at, help=f"looked for {where}")
         if self.disk.is_pointer(path):
             return finding("TF723", f"{path} is a Git LFS pointer", at, help=FETCH, severity="warning")
         return None

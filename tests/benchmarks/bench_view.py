@@ -1,12 +1,16 @@
-"""What the live view costs: ``python -m tests.benchmarks.bench_view``, or name the file to pytest.
+"""What the view costs: ``python -m tests.benchmarks.bench_view``, or name the file to pytest.
 
-One owner sends 1,000 frames at 20 Hz, which all move, in messages of 100; they hang in chains of ten. One browser is
-connected, or rather a program that reads what one would. What is measured is the processor time of the view's own
+For a robot file: how long after the command a browser has been sent the whole scene, how long a save takes that
+changes one mount, with lint of what is written, and how large the largest page of the gallery is.
+
+Live, one owner sends 1,000 frames at 20 Hz, which all move, in messages of 100; they hang in chains of ten. One browser
+is connected, or rather a program that reads what one would. What is measured is the processor time of the view's own
 process, as a part of one core, in rounds of some seconds, and its memory.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -15,6 +19,7 @@ import threading
 import time
 from pathlib import Path
 from statistics import median
+from typing import TYPE_CHECKING
 
 import psutil
 import pytest
@@ -24,10 +29,19 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from tests.benchmarks.results import record
+from tfcompose.cli.compiling import library
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.geometry import Pose
+from tfcompose.view.session import Session
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 FRAMES, TOGETHER, HERTZ, DEPTH = 1000, 100, 20.0, 10
 ROUNDS, ROUND_S = 3, 5.0
 LIMIT, LIMIT_BYTES = 0.25, 400e6
+FIRST_S, SAVE_S, PAGE_BYTES = 3.0, 0.15, 3e6
+ROVER = Path(__file__).parents[2] / "robots" / "field_rover.yaml"
 DOMAIN = "101"
 OWNER = f"""
 import math, time
@@ -117,6 +131,74 @@ def measure() -> tuple[float, float, float]:
                 one.wait()
 
 
+def first_scene_s() -> float:
+    """Return the seconds from the command to the last of what a browser is sent at first."""
+    words = [sys.executable, "-m", "tfcompose", "view", str(ROVER), "--port", "0"]
+    begun = time.monotonic()
+    view = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    try:
+        address = view.stdout.readline().partition(";")[0] if view.stdout else ""
+        protocol = Subprotocol(f"viser-v{viser.__version__}")
+        port = int(address.rpartition(":")[2])
+        latest = begun
+        with (
+            connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None) as connection,
+            contextlib.suppress(TimeoutError),
+        ):
+            while True:
+                connection.recv(timeout=1.0)
+                latest = time.monotonic()
+        return latest - begun
+    finally:
+        view.kill()
+        view.wait()
+
+
+def save_s() -> float:
+    """Return the seconds that saving a moved mount takes, its files compiled and written."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, ROVER.name)
+        file.write_bytes(ROVER.read_bytes())
+
+        def compiled(texts: Mapping[str, str]) -> Compiled:
+            return compile_robot(texts[str(file)], str(file), library())
+
+        session = Session({str(file): file.read_text("utf-8")}, compiled, lambda path, _, new: write(path, new))
+        mount = session.mount("front_link")
+        session.move(mount.edge.child, Pose((0.01 + mount.edge.pose.xyz[0], 0, 0)))
+        begun = time.monotonic()
+        saved = session.save()
+        took = time.monotonic() - begun
+        if not saved.diff:
+            raise RuntimeError("nothing was saved")
+        return took
+
+
+def write(path: str, text: str) -> None:
+    """Write a file."""
+    Path(path).write_text(text, encoding="utf-8")
+
+
+def page_bytes() -> int:
+    """Return the size of the largest page of the gallery's robots."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder, "page.html")
+        sizes = []
+        for file in ROVER.parent.glob("*.yaml"):
+            subprocess.run(
+                [sys.executable, "-m", "tfcompose", "view", str(file), "--html", str(page)],
+                check=True, capture_output=True,
+            )  # fmt: skip
+            sizes.append(page.stat().st_size)
+        return max(sizes)
+
+
+def test_a_robot_is_there_in_3_s_saved_in_150_ms_and_a_page_of_3_mb() -> None:
+    assert min(first_scene_s() for _ in range(ROUNDS)) < FIRST_S
+    assert min(save_s() for _ in range(ROUNDS)) < SAVE_S
+    assert page_bytes() < PAGE_BYTES
+
+
 @pytest.mark.ros
 def test_1000_frames_at_20_hz_take_a_quarter_of_a_core_and_400_mb(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", DOMAIN)
@@ -132,4 +214,15 @@ if __name__ == "__main__":
     before = os.getloadavg()[0]
     part, used, updates = measure()
     cells = [f"{part:.0%} of a core, {used / 1e6:.0f} MB, {updates:.0f} updates a second", ""]
-    record("view", {"`view --live`: 1,000 frames at 20 Hz, a browser connected": cells}, before)
+    first, saving = (min(one() for _ in range(ROUNDS)) for one in (first_scene_s, save_s))
+    page = page_bytes()
+    record(
+        "view",
+        {
+            "`view`: until a browser has the scene of `field_rover`": [f"{first:.1f} s", ""],
+            "`view --edit`: a save": [f"{1e3 * saving:.0f} ms", ""],
+            "`view --html`: the largest page of `robots/`": [f"{page / 1e6:.1f} MB", ""],
+            "`view --live`: 1,000 frames at 20 Hz, a browser connected": cells,
+        },
+        before,
+    )

@@ -26,9 +26,9 @@ args:
 links: {base_link: {}}
 containers:
   box: {isolation: isolated, executor: multi, namespace: front, args: ["--x"], remap: {a: "${args.mode}"},
-        params: {k: 1}, restart: always, output: log, emulate_tty: true}
+        params: {k: 1}, restart: always, max_restarts: 4, output: log, emulate_tty: true}
   plain: {executor: multi, node: plain_box, when: "${args.cameras > 1}", stop: {timeout: 3 s, kill_timeout: 9 s}}
-  mine: {package: my_package, executable: my_container}
+  mine: {package: my_package, executable: my_container, output: screen}
   elsewhere: {external: true, namespace: /somewhere}
 frames:
   mast: {parent: base_link, xyz: [0, 0, "${args.height}"]}

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from tests.importing.test_exported import ARGUED, COMBINATIONS
-from tests.importing.test_launch import COMPOSED, COMPOSED_XML, MORE, WITH_ARGUMENTS, XML, YAML
+from tests.importing.test_launch import BOXES_IN, COMPOSED, COMPOSED_XML, MORE, WITH_ARGUMENTS, XML, YAML
 from tests.support.bringups import compiled, exported, flat, import_of, started_with
 from tests.support.composition import can_build, composition_interfaces
 from tfcompose.model import Robot
@@ -51,7 +51,7 @@ def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str
     rest = words[words.index(program) + 1 :]
     at = rest.index("--ros-args") if "--ros-args" in rest else len(rest)
     rules = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-r"]
-    remap = dict(rule.split(":=", 1) for rule in rules)
+    remap = dict(reversed([rule.split(":=", 1) for rule in rules]))  # the first one counts
     name, namespace = remap.pop("__node", ""), remap.pop("__ns", "/")
     given = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-p"]
     params: dict[str, Any] = {name: yaml.safe_load(value) for name, value in (one.split(":=", 1) for one in given)}
@@ -103,6 +103,7 @@ def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
         ("a.launch.py", WITH_ARGUMENTS, ("loud:=false", "mode:=fixed")),
         ("composed.launch.py", NAMED, ("rectify:=true",)),
         ("composed.launch.xml", COMPOSED_XML, ("rectify:=false",)),
+        *((name, text, ()) for name, text in BOXES_IN.items()),
     ],
 )
 def test_each_process_is_started_as_launch_would(

@@ -41,7 +41,7 @@ def record_loaded(action: Any, requests: list[Any], _context: Any) -> None:
         STARTED.append({
             "component": f"{one.package_name}/{one.plugin_name}", "container": f"/{container.strip('/')}",
             "node": f"{one.node_namespace.rstrip('/')}/{one.node_name}", "extra_arguments": extra,
-            "remap": dict(rule.split(":=", 1) for rule in one.remap_rules),
+            "remap": dict(reversed([rule.split(":=", 1) for rule in one.remap_rules])),  # the first one counts
             "params": {name: list(value) if isinstance(value, array) else value for name, value in values.items()},
         })  # fmt: skip
 

@@ -282,7 +282,8 @@ class _Export:
         if _is_launch(process):
             return self._included(process)
         delay = 1.0 if process.restart_delay is None else process.restart_delay
-        again = () if process.restart == "no" else ("respawn=True", f"respawn_delay={delay}")
+        again = [] if process.restart == "no" else ["respawn=True", f"respawn_delay={delay}"]
+        again += [f"respawn_max_retries={process.max_restarts}"] if again and process.max_restarts is not None else []
         ends = ("on_exit=Shutdown()",) if process.required else ()
         more = [*again, *ends, *self._condition(process)]
         if _is_node(process):
@@ -318,12 +319,14 @@ class _Export:
             yield _mapping(env, "additional_env")
         if process.prefix:
             yield f"prefix={shlex.join(process.prefix)!r}"
-        for word, value in (("sigterm", process.stop.timeout_s), ("sigkill", process.stop.kill_timeout_s)):
+        stop = process.stop
+        kill_timeout_s = stop.timeout_s if stop.kill_timeout_s is None else stop.kill_timeout_s
+        for word, value in (("sigterm", stop.timeout_s), ("sigkill", kill_timeout_s)):
             if value is not None:
                 yield f"{word}_timeout={number(value)!r}"
         if process.emulate_tty:
             yield "emulate_tty=True"
-        yield f"output={process.output!r}"
+        yield f"output={_OUTPUTS[process.output]}"
 
     def _node(self, process: PlanProcess, more: list[Code | str]) -> Code:
         package = _EXECUTABLE.fullmatch(process.argv[0])
@@ -406,6 +409,10 @@ def _named(process: PlanProcess) -> Iterator[str]:
     yield f"namespace={namespace or '/'!r}"
 
 
+#: Where a process's output goes, as launch says it: its words for screen and log are others.
+_OUTPUTS = {"both": "'both'", "screen": "{'both': 'screen'}", "log": "{'both': 'log'}"}
+
+
 def _variable_name(name: str, taken: Collection[str]) -> str:
     plain = re.sub(r"\W", "_", name)
     plain = plain if plain.isidentifier() and not iskeyword(plain) else f"process_{plain}"
@@ -449,7 +456,9 @@ def _unlike(process: PlanProcess) -> Iterator[str]:
         return
     if process.kind == "run" and process.restart != "no":
         whatever = "whatever its exit code, and " if process.restart == "on-failure" else ""
-        yield f"{process.name} is started again {whatever}without a limit"
+        count = process.max_restarts
+        limit = "without a limit" if count is None else f"with a limit of {count} in all, and not in a row"
+        yield f"{process.name} is started again {whatever}{limit}"
     if process.stop.signal != "SIGINT":
         yield f"{process.name} is ended by SIGINT, and not by {process.stop.signal}"
 

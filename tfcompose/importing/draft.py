@@ -80,15 +80,19 @@ class Draft:
         return True
 
     def process(self, wanted: str, keys: Mapping[str, Any], *notes: str, section: str = "processes") -> str:
-        """Add a process, or another entry whose names are those of processes, under a free name, and return that."""
+        """Add a process, or a container, under a name that is free, and return that."""
         name = self.free_name(wanted)
         self.sections[section][name] = dict(keys)
         self.note((section, name), *notes)
         return name
 
-    def at(self, name: str) -> Entry:
-        """Return where the process or container of that name is, which is there."""
-        return ("containers" if name in self.sections["containers"] else "processes"), name
+    def entry_of(self, process: str) -> Entry:
+        """Return the section of a process that is there, or of a container, with its name."""
+        return ("containers" if process in self.sections["containers"] else "processes", process)
+
+    def started(self) -> dict[str, dict[str, Any]]:
+        """Return the containers and processes by their names."""
+        return {**self.sections["containers"], **self.sections["processes"]}
 
     def free_name(self, wanted: str) -> str:
         """Return a name for a process or sensor, made of letters, digits and _; a number makes it one of its own."""

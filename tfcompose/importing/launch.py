@@ -19,18 +19,18 @@ from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.importing.confinement import MOST_CPU_S
 from tfcompose.importing.launch_substitutions import marks, scalar_of
 from tfcompose.importing.programs import (
+    CONTAINERS,
     JOINT_PUBLISHERS,
     PACKAGE,
     STATE_PUBLISHER,
     Description,
-    LoadedNode,
     Program,
-    add_component,
     add_program,
     one_clock,
     where,
 )
-from tfcompose.importing.static_transforms import PROGRAM
+from tfcompose.importing.static_transforms import PLUGIN as STATIC_PLUGIN
+from tfcompose.importing.static_transforms import PROGRAM, static_words
 from tfcompose.importing.yaml_text import Bare, Expression, arguments_in, with_values
 from tfcompose.numbers import number
 
@@ -41,11 +41,15 @@ if TYPE_CHECKING:
     from tfcompose.importing.draft import Draft
 
 _MOST_WALL_S = 60.0
+#: How long launch waits for the end of a process after each signal, unless it is told.
+_LAUNCH_STOP_S = 5.0
 #: The delay that exports write for a process without ``restart_delay``, whose first delay it is.
 _FIRST_DELAY_S = 1.0
 #: Programs whose arguments are read: they have their values.
 _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
+#: The programs that are components, too, by their classes.
+_PUBLISHERS = {STATIC_PLUGIN: PROGRAM, "robot_state_publisher::RobotStatePublisher": STATE_PUBLISHER}
 #: What of the environment is a setting of all processes.
 _SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
 
@@ -78,7 +82,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
         RejectedError: if it is no launch file, or takes too long or too much memory.
     """
     answer = _answered(launch)
-    work = _Work(draft, launch, target)
+    work = _Work(draft, launch, target, answer["records"])
     for record in answer["records"]:
         work.add(record)
     work.finish(answer["decided"])
@@ -131,14 +135,17 @@ def _ended_by(number: int) -> str:
 class _Work:
     """Turns records into entries."""
 
-    def __init__(self, draft: Draft, launch: Launch, target: Target) -> None:
+    def __init__(self, draft: Draft, launch: Launch, target: Target, records: list[dict[str, Any]]) -> None:
         self.draft, self.launch, self.target = draft, launch, target
         self.descriptions: list[Description] = []
         self._names: dict[str, str] = {}
         self._after: list[tuple[str, dict[str, str]]] = []
         self._delays: list[tuple[str, float]] = []
         self._missing: dict[str, Span] = {}
-        self._components: list[tuple[dict[str, Any], Span]] = []
+        #: What components are loaded into: the ids of actions, or the full names of nodes.
+        self._loading = {record["container"] for record in records if record["kind"] == "component"}
+        self._containers: dict[str, str] = {}
+        self._components: list[tuple[str, str, Span]] = []
         self._only_when = ""
         self._arguments: dict[str, tuple[dict[str, Any], Span]] = {}
 
@@ -167,13 +174,14 @@ class _Work:
 
     def finish(self, decided: list[str]) -> None:
         """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
-        for record, span in self._components:
-            self._load(record, span)
         self._args(decided)
+        self._into_containers()
+        started = self.draft.started()
         for name, after in self._after:
-            known = {self._names[key]: what for key, what in after.items() if key in self._names}
+            own = started[name].get("container")
+            known = {self._names[key]: what for key, what in after.items() if self._names.get(key, own) != own}
             if known:
-                self._entry(name).setdefault("after", {}).update(known)
+                started[name].setdefault("after", {}).update(known)
         self._delay()
         one_clock(self.draft)
         for package, span in self._missing.items():
@@ -227,21 +235,47 @@ class _Work:
             for child in self.draft.sections["frames"].keys() - before:
                 self._conditions(record, ("frames", child))
             return
-        self._names[str(record.get("id"))] = name
-        self._waits(record, name)
+        self._started(record, name)
+        if program.loads:
+            self._containers[str(record["id"])] = self._containers[_full_name(program)] = name
 
-    def _waits(self, record: dict[str, Any], name: str) -> None:
-        """Add when a process is there, and after what."""
-        self._conditions(record, self.draft.at(name))
+    def _started(self, record: dict[str, Any], name: str) -> None:
+        """Keep of what was added when it is started."""
+        self._names[str(record.get("id"))] = name
+        self._conditions(record, self.draft.entry_of(name))
         if record.get("after"):
             self._after.append((name, record["after"]))
         if record.get("period"):
             self._delays.append((name, record["period"]))
 
-    def _entry(self, name: str) -> dict[str, Any]:
-        section, key = self.draft.at(name)
-        entry: dict[str, Any] = self.draft.sections[section][key]
-        return entry
+    def _component(self, record: dict[str, Any], span: Span) -> None:
+        """Add a node that a container loads; that of a stock publisher's class is what its program is."""
+        plugin = record["plugin"]
+        if plugin in _PUBLISHERS:
+            words = static_words(record["params"]) if plugin == STATIC_PLUGIN else []
+            record = {**record, "executable": _PUBLISHERS[plugin], "argv": words}
+            self._node(record | ({"params": []} if words else {}), span)
+            return
+        program = replace(self._program(record, span), plugin=plugin)
+        extra: dict[str, Any] = {}
+        for one in record["extra"]:
+            extra |= one if isinstance(one, dict) else {}
+        keys = {"extra_arguments": extra} if extra else {}
+        name = add_program(self.draft, replace(program, keys=keys), self.target) or ""
+        self._started(record, name)
+        self._components.append((name, record["container"], span))
+
+    def _into_containers(self) -> None:
+        """Let components name their containers; one that the launch file does not start runs already."""
+        for name, wanted, span in self._components:
+            if wanted not in self._containers:
+                namespace, _, node = wanted.strip("/").rpartition("/")
+                free = self.draft.free_name(node)
+                keys: dict[str, Any] = {"external": True} | ({"node": node} if node != free else {})
+                keys |= {"namespace": namespace} if namespace else {}
+                note = where(span, "the source starts no such container: it is started elsewhere")
+                self._containers[wanted] = self.draft.process(free, keys, note, section="containers")
+            self.draft.sections["processes"][name]["container"] = self._containers[wanted]
 
     def _conditions(self, record: dict[str, Any], at: tuple[str, str]) -> None:
         for text in record.get("when", ()):
@@ -258,15 +292,23 @@ class _Work:
         if record.get("executable") in _READ:
             argv = tuple(map(with_values, argv))
         reader = None if record["kind"] == "process" else "ros2"
+        loads = record["kind"] == "container" or self._is_container(record)
         if record.get("ros1"):
             reader = "tf" if record["package"] == "tf" else "tf2_ros"
         return Program(
             span, record.get("package"), record.get("executable"), argv, bool(record.get("shell")),
             record.get("name"), record.get("label"), record.get("namespace"), tuple(params),
             tuple((old, new) for old, new in record.get("remap", ())), self._env(record), keys,
-            record.get("period", 0.0), reader, description, tuple(todo),  # type: ignore[arg-type]
-            record["kind"] == "container",
+            record.get("period", 0.0), reader, description, tuple(todo), loads,  # type: ignore[arg-type]
         )  # fmt: skip
+
+    def _is_container(self, record: dict[str, Any]) -> bool:
+        """Return whether a node loads components: by its program, or because some are loaded into it."""
+        if record["kind"] != "node":
+            return False
+        is_stock = record["package"] == CONTAINERS and record["executable"].startswith("component_container")
+        named = f"{(record['namespace'] or '').rstrip('/')}/{record['name']}"
+        return is_stock or bool({str(record["id"]), named} & self._loading)
 
     def _env(self, record: dict[str, Any]) -> dict[str, str]:
         """Return the process's variables, but for those that are settings of all."""
@@ -298,10 +340,10 @@ class _Work:
                 todo.append(f"the prefix {record['prefix']}")
         if record.get("only_env"):
             todo.append("env replaces the environment: here its variables are added to it")
-        stop = _stop(record, todo)
-        keys |= {"stop": stop} if stop else {}
-        keys |= {"output": "log"} if record.get("output") == "log" else {}
-        keys |= {"emulate_tty": True} if record.get("emulate_tty") else {}
+        keys |= _output(record.get("output"))
+        if record.get("emulate_tty"):
+            keys["emulate_tty"] = True
+        keys |= _stop(record, todo)
         return keys
 
     def _describe(self, program: Program, span: Span) -> None:
@@ -343,53 +385,6 @@ class _Work:
         for one in program.todo:
             self.draft.todo(one, span)
 
-    def _component(self, record: dict[str, Any], span: Span) -> None:
-        """Keep a component until all containers are known: a launch file may load it first."""
-        self._components.append((record, span))
-
-    def _load(self, record: dict[str, Any], span: Span) -> None:
-        todo: list[str] = []
-        params, description = _split_description(record["params"], todo)
-        if description is not None:
-            todo.append("the parameter robot_description")
-        extra: dict[str, Any] = {}
-        for one in record["extra"]:
-            if isinstance(one, str):
-                todo.append(f"extra arguments of {one}")
-            else:
-                extra |= one
-        container = self._container(str(record["container"]), span)
-        node = LoadedNode(
-            span, container, record["package"], record["plugin"], record["name"], record["namespace"], tuple(params),
-            tuple((old, new) for old, new in record["remap"]), extra, tuple(todo),
-        )  # fmt: skip
-        self._waits(record, add_component(self.draft, node, self.target))
-
-    def _container(self, wanted: str, span: Span) -> str:
-        """Return the container that a component names by its node, or by the action that starts it."""
-        full = f"/{wanted.strip('/')}"
-        containers, processes = self.draft.sections["containers"], self.draft.sections["processes"]
-        nodes = ((name, keys) for name, keys in processes.items() if "package" in keys.get("run", ()))
-        for name, keys in [*containers.items(), *nodes]:
-            node = "/".join(["", *filter(None, [keys.get("namespace"), keys.get("node", name)])])
-            if self._names.get(wanted) == name or (wanted not in self._names and node == full):
-                if name in processes:
-                    self._let_load(name)
-                return name
-        namespace, _, node = full.strip("/").rpartition("/")
-        name = self.draft.free_name(node)
-        keys = {"external": True, **({"node": node} if node != name else {})}
-        keys |= {"namespace": namespace} if namespace else {}
-        note = "the source starts no such container: it is started elsewhere"
-        return self.draft.process(name, keys, where(span, note), section="containers")
-
-    def _let_load(self, name: str) -> None:
-        """Make a container of a process: something is loaded into it."""
-        keys = self.draft.sections["processes"].pop(name)
-        run = keys.pop("run", {})
-        self.draft.sections["containers"][name] = (run if isinstance(run, dict) else {}) | keys
-        self.draft.notes[("containers", name)] = self.draft.notes.pop(("processes", name), [])
-
     def _include(self, record: dict[str, Any], span: Span) -> None:
         """Add a launch file of a package that is not found as one process."""
         package, _, file = record["file"].removeprefix(PACKAGE).partition("/")
@@ -402,14 +397,18 @@ class _Work:
         keys |= {"env": env} if env else {}
         name = posixpath.basename(file).partition(".")[0]
         name = self.draft.process(name, keys, where(span, "an included launch file, which runs as one process"))
-        self._waits(record, name)
+        self._conditions(record, ("processes", name))
+        if record.get("after"):
+            self._after.append((name, record["after"]))
+        if record.get("period"):
+            self._delays.append((name, record["period"]))
 
     def _lifecycle(self, record: dict[str, Any], span: Span) -> None:
         name = self._names.get(str(record["node"]))
         if name is None:
             self.draft.todo("a change of a lifecycle node's state", span)
         else:
-            process = self._entry(name)
+            process = self.draft.started()[name]
             if process.get("lifecycle") != "active":
                 process["lifecycle"] = record["state"]
 
@@ -418,11 +417,11 @@ class _Work:
         if name is None:
             self.draft.todo("the end of a process ends all", span)
         else:
-            self._entry(name)["required"] = True
+            self.draft.started()[name]["required"] = True
 
     def _delay(self) -> None:
         """Let what a timer starts wait: for a process that counts as ready after that time."""
-        processes = self.draft.sections["processes"]
+        processes, started = self.draft.sections["processes"], self.draft.started()
         gates: dict[float, str] = {}
         unfit = {name for name, _ in self._delays}
         unfit |= {self._names.get(key, "") for _, after in self._after for key in after}
@@ -430,7 +429,7 @@ class _Work:
             if period_s not in gates:
                 free = [
                     one for one in self._names.values()
-                    if one not in unfit and one not in gates.values() and "run" in processes.get(one, {})
+                    if one not in unfit and one not in gates.values() and "run" in started[one]
                     and not {"ready", "after", "when"} & processes[one].keys()
                 ]  # fmt: skip
                 if free:
@@ -442,7 +441,11 @@ class _Work:
                     gates[period_s] = gate
             gate = gates[period_s]
             what = "done" if processes[gate]["run"] == ["sleep", number(period_s)] else "ready"
-            self._entry(name).setdefault("after", {})[gate] = what
+            started[name].setdefault("after", {})[gate] = what
+
+
+def _full_name(program: Program) -> str:
+    return f"{(program.namespace or '').rstrip('/')}/{program.name}"
 
 
 def _seconds(value: float) -> Bare:
@@ -488,16 +491,31 @@ def _description(value: str) -> Description:
     return Description(found[0]["file"], found[0]["args"]) if found else Description(text=value)
 
 
+def _output(given: str | list[str] | None) -> dict[str, str]:
+    """Return the key for where launch sends a process's output, by its word for it or by the places.
+
+    With the word ``screen`` people want to see it: so they do by default here, and have it in the log beside.
+    """
+    if given is None or isinstance(given, str):
+        return {"output": "log"} if given in {"log", "own_log"} else {}
+    if "screen" not in given:
+        return {"output": "log"}
+    return {"output": "screen"} if given == ["screen"] else {}
+
+
 def _stop(record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
-    """Return how long a process that is ended has until the next signal, and the one after it."""
-    stop = {}
-    for given, key in (("sigterm_timeout", "timeout"), ("sigkill_timeout", "kill_timeout")):
-        if record.get(given):
-            try:
-                stop[key] = _seconds(float(record[given]))
-            except ValueError:
-                todo.append(f"{given} {record[given]}")
-    return stop
+    """Return how long launch waits for an end after SIGINT, and after SIGTERM."""
+    times: dict[str, float] = {}
+    for key in ("sigterm_timeout", "sigkill_timeout"):
+        try:
+            times[key] = float(record.get(key, _LAUNCH_STOP_S))
+        except ValueError:
+            todo.append(f"{key} {record[key]}")
+    if len(times) < 2 or set(times.values()) == {_LAUNCH_STOP_S}:  # noqa: PLR2004 (both are known)
+        return {}
+    timeout_s, kill_s = times["sigterm_timeout"], times["sigkill_timeout"]
+    stop = {"timeout": _seconds(timeout_s)} if timeout_s != _LAUNCH_STOP_S else {}
+    return {"stop": stop | ({"kill_timeout": _seconds(kill_s)} if kill_s != timeout_s else {})}
 
 
 def _restarts(record: dict[str, Any]) -> dict[str, Any]:

@@ -521,9 +521,11 @@ class ExecuteProcess(Action):
         env = {**context.environment, **_texts(given.get("additional_env"), context)}
         env |= _texts(given.get("env"), context)
         what: dict[str, Any] = {"id": id(self), "env": env, "period": context.period_s, "after": dict(context.after)}
-        for key in ("cwd", "prefix", "output", "sigterm_timeout", "sigkill_timeout"):
-            if given.get(key) is not None and not isinstance(given[key], Mapping):
+        for key in ("cwd", "prefix", "sigterm_timeout", "sigkill_timeout"):
+            if given.get(key) is not None:
                 what[key] = text_of(given[key], context)
+        if given.get("output") is not None:
+            what["output"] = _output(given["output"], context)
         for key in ("shell", "respawn", "emulate_tty"):
             if given.get(key) is not None:
                 what[key] = given[key] if isinstance(given[key], bool) else truth(given[key], context)
@@ -545,6 +547,24 @@ class ExecuteProcess(Action):
 
 class ExecuteLocal(Action):
     pass
+
+
+_OUTPUTS = frozenset({"screen", "log", "both", "own_log", "full"})
+
+
+def _output(given: Any, context: Context) -> str | list[str]:
+    """Return launch's word for where the output goes; the places where the word is not one of launch's but a mapping.
+
+    Raises:
+        FailedError: if launch has no such word.
+    """
+    if isinstance(given, Mapping):
+        several = ([places] if isinstance(places, str) else places for places in given.values())
+        return sorted({place for places in several for place in places})
+    word = text_of(given, context)
+    if word not in _OUTPUTS:
+        raise FailedError(f"output={word!r}")
+    return word
 
 
 def _optional(value: Any, context: Context) -> str | None:
@@ -608,7 +628,7 @@ class LifecycleTransition(Action):
 
 
 class ComposableNode(Action):
-    """A description of a component. Who has it loaded visits it, so that its condition counts as an action's does."""
+    """A node that a container loads; ``context.container`` is that, while it is visited."""
 
     def __init__(self, *, package: Any, plugin: Any = None, name: Any = None, namespace: Any = None,
                  parameters: Any = None, remappings: Any = None, extra_arguments: Any = None,
@@ -617,29 +637,32 @@ class ComposableNode(Action):
         name, namespace = kwargs.pop("node_name", name), kwargs.pop("node_namespace", namespace)
         super().__init__(**kwargs)
         self.package, self.plugin, self.name, self.namespace = package, plugin, name, namespace
-        self.parameters, self.remappings, self.extra = parameters, remappings, extra_arguments
-        self.container: Any = None
-        self.waits: dict[str, Any] = {}
+        self.parameters, self.remappings, self.extra_arguments = parameters, remappings, extra_arguments
 
     def execute(self, context: Context) -> None:
+        if context.container is None:
+            raise FailedError("no container loads it")
+        extra = parameters_of(self.extra_arguments, context, self.at)
         context.record(
-            "component", self.at, container=self.container, package=text_of(self.package, context),
+            "component", self.at, id=id(self), container=context.container, package=text_of(self.package, context),
             plugin=text_of(self.plugin, context), name=_optional(self.name, context),
             namespace=below(context.namespace, _optional(self.namespace, context)),
             params=[*context.params, *parameters_of(self.parameters, context, self.at)],
-            remap=[*context.remaps, *rules_of(self.remappings, context)],
-            extra=parameters_of(self.extra, context, self.at), **self.waits,
+            remap=[*context.remaps, *rules_of(self.remappings, context)], extra=extra, period=context.period_s,
+            after=dict(context.after),
         )  # fmt: skip
 
     def described(self, context: Context) -> str:
-        return f"the component {plain([self.package])}/{plain([self.plugin])}"
+        return f"the component {plain([self.plugin])}"
 
 
-def _load(components: Any, container: Any, context: Context, **waits: Any) -> None:
-    for one in components if isinstance(components, (list, tuple)) else ():
-        if isinstance(one, ComposableNode):
-            one.container, one.waits = container, waits
-            one.visit(context)
+def _visit_components(several: Any, container: str, context: Context) -> None:
+    """Record components; ``container`` is the id of the action that starts theirs, or the full name of its node."""
+    before, context.container = context.container, container
+    try:
+        visit_all(list(several or ()), context)
+    finally:
+        context.container = before
 
 
 class ComposableNodeContainer(Node):
@@ -649,7 +672,7 @@ class ComposableNodeContainer(Node):
 
     def execute(self, context: Context) -> None:
         self.record(context, "container")
-        _load(self.components, id(self), context)
+        _visit_components(self.components, str(id(self)), context)
 
 
 class LoadComposableNodes(Action):
@@ -659,8 +682,12 @@ class LoadComposableNodes(Action):
 
     def execute(self, context: Context) -> None:
         container = self.container
-        target = id(container) if isinstance(container, Node) else text_of(container, context)
-        _load(self.components, target, context, period=context.period_s, after=dict(context.after))
+        target = str(id(container)) if isinstance(container, Node) else f"/{text_of(container, context).strip('/')}"
+        _visit_components(self.components, target, context)
+
+    def described(self, context: Context) -> str:
+        container = self.container.node if isinstance(self.container, Node) else self.container
+        return f"{len(list(self.components or ()))} components for {plain([container])}"
 
 
 class Unknown(Action):

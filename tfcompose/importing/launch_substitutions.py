@@ -89,6 +89,8 @@ class Context:
         self.records: list[dict[str, Any]] = []
         self.period_s = 0.0
         self.after: dict[str, str] = {}
+        #: What loads the components that are visited: the id of its action, or the full name of its node.
+        self.container: str | None = None
         self.conditions: list[str] = []
         self.file = ""
         self.depth = 0

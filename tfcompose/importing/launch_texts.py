@@ -105,7 +105,8 @@ def _of_list(listed: list[Any], path: Steps, source: Source) -> Iterator[Entity]
 
 
 def _of_value(tag: str, value: Any, path: Steps, source: Source) -> Entity:
-    entity = Entity(tag, {}, [], (source.file, source.at_key(path).line))
+    place = source.at(path) if isinstance(path[-1], int) else source.at_key(path)
+    entity = Entity(tag, {}, [], (source.file, place.line))
     if isinstance(value, list):
         entity.children = list(_of_list(value, path, source))
         return entity
@@ -287,18 +288,14 @@ def _made(entity: Entity, context: Context) -> Iterator[Any]:
         entity.used.update(entity.attributes)
         raise FailedError("it is not known here")
     several = make(entity, context)
-    condition = _condition(entity)
+    condition: Any = None
+    if (given := entity.get("if")) is not None:
+        condition = conditions.IfCondition(substituted(given))
+    elif (given := entity.get("unless")) is not None:
+        condition = conditions.UnlessCondition(substituted(given))
     for one in several:
         one.condition = condition
         yield one
-
-
-def _condition(entity: Entity) -> Any:
-    if (given := entity.get("if")) is not None:
-        return conditions.IfCondition(substituted(given))
-    if (given := entity.get("unless")) is not None:
-        return conditions.UnlessCondition(substituted(given))
-    return None
 
 
 def _need(entity: Entity, *names: str) -> Any:
@@ -400,25 +397,27 @@ class _OfRos1(actions.Action):
         return self.node.described(context)
 
 
-def _component(entity: Entity) -> actions.ComposableNode:
-    extra = [dict([_parameter(one)]) for one in entity.all("extra_arg")]
-    one = actions.ComposableNode(
+def _component(entity: Entity, _context: Context) -> list[Any]:
+    component = actions.ComposableNode(
         package=_need(entity, "pkg"), plugin=_need(entity, "plugin"), name=_optional(entity, "name"),
         namespace=_optional(entity, "namespace"), parameters=_parameters(entity),
-        remappings=[(_need(rule, "from"), _need(rule, "to")) for rule in entity.all("remap")], extra_arguments=extra,
-        condition=_condition(entity),
+        remappings=[(_need(rule, "from"), _need(rule, "to")) for rule in entity.all("remap")],
+        extra_arguments=[dict([_parameter(one)]) for one in entity.all("extra_arg")],
     )  # fmt: skip
-    one.at = entity.at
-    return one
+    return [component]
+
+
+def _components(entity: Entity) -> list[_Text]:
+    return [_Text(one) for one in entity.all("composable_node")]
 
 
 def _container(entity: Entity, _context: Context) -> list[Any]:
-    components = [_component(one) for one in entity.all("composable_node")]
-    return [actions.ComposableNodeContainer(**_node_words(entity), composable_node_descriptions=components)]
+    words = _node_words(entity)
+    return [actions.ComposableNodeContainer(**words, composable_node_descriptions=_components(entity))]
 
 
 def _load(entity: Entity, _context: Context) -> list[Any]:
-    components = [_component(one) for one in entity.all("composable_node")]
+    components = _components(entity)
     target = _need(entity, "target")
     return [actions.LoadComposableNodes(target_container=target, composable_node_descriptions=components)]
 
@@ -473,6 +472,7 @@ _MAKERS: dict[str, Callable[[Entity, Context], list[Any]]] = {
         actions.ExecuteProcess(cmd=command_line(_need(one, "cmd")), name=_optional(one, "name"), **_common(one))
     ],
     "node_container": _container,
+    "composable_node": _component,
     "load_composable_node": _load,
     "group": _group,
     "include": _include,

@@ -26,6 +26,13 @@ if TYPE_CHECKING:
 
 STATE_PUBLISHER = "robot_state_publisher"
 JOINT_PUBLISHERS = frozenset({"joint_state_publisher", "joint_state_publisher_gui"})
+_FROM_TOPIC = (
+    "nothing, if the node takes the description from the topic robot_description, where tfcompose publishes it"
+)
+#: The package of the stock containers of components.
+CONTAINERS = "rclcpp_components"
+#: Between the words of a class's name.
+_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 #: How often joint_state_publisher sends, unless it is told.
 _JOINTS_HZ = 10.0
 #: As what a path begins whose package is not found.
@@ -56,7 +63,8 @@ class Program:
     ``argv`` are its own arguments, or the whole command without a package; ``shell`` says that it is one text for a
     shell. ``params`` are parameters, and names of files, in order: the last one counts. ``namespace`` is absolute, or
     None where nothing is said. ``keys`` are further keys of the process, as in a robot file; ``period_s`` is how long
-    after the launch it is started. ``todo`` is what of it could not be taken. One that ``loads`` is a container.
+    after the launch it is started. ``todo`` is what of it could not be taken. It is a container of components if it
+    ``loads`` them, and a component where it has a ``plugin``, its class.
     """
 
     at: Span | None
@@ -76,22 +84,7 @@ class Program:
     description: Description | None = None
     todo: tuple[str, ...] = ()
     loads: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class LoadedNode:
-    """A component as the source has it loaded; its keys are those of ``Program``. ``container`` is one of the draft."""
-
-    at: Span | None
-    container: str
-    package: str
-    plugin: str
-    name: str | None = None
-    namespace: str | None = None
-    params: tuple[Mapping[str, Any] | str, ...] = ()
-    remap: tuple[tuple[str, str], ...] = ()
-    extra_arguments: Mapping[str, Any] = field(default_factory=dict)
-    todo: tuple[str, ...] = ()
+    plugin: str = ""
 
 
 def add_program(draft: Draft, program: Program, target: Target) -> str | None:
@@ -105,34 +98,17 @@ def add_program(draft: Draft, program: Program, target: Target) -> str | None:
         return None
     if program.executable in JOINT_PUBLISHERS:
         return _add_joint_publisher(draft, program)
-    if program.loads or (program.package == _COMPONENTS and program.executable in _CONTAINERS):
-        return _add_container(draft, program, target)
     return _add_process(draft, program, target)
-
-
-def add_component(draft: Draft, node: LoadedNode, target: Target) -> str:
-    """Add a component to the draft; return the name of its process."""
-    class_name = node.plugin.rpartition("::")[2]
-    name = draft.free_name(node.name or _CAMEL.sub("_", class_name).lower())
-    keys: dict[str, Any] = {"component": f"{node.package}/{node.plugin}", "container": node.container}
-    notes = [] if node.name else [f"the source does not name the node: it is called {name} here"]
-    left = _as_node(keys, name, node, target)
-    keys |= {"extra_arguments": dict(node.extra_arguments)} if node.extra_arguments else {}
-    draft.process(name, keys, where(node.at), *notes)
-    for one in (*node.todo, *left):
-        draft.todo(one, node.at, ("processes", name))
-    return name
 
 
 def one_clock(draft: Draft) -> None:
     """Let the robot's clock be the simulated one where parameters of nodes say so, and none says otherwise."""
-    processes = [*draft.sections["processes"].values(), *draft.sections["containers"].values()]
-    several = [process["params"] for process in processes if "params" in process]
+    several = [process["params"] for process in draft.started().values() if "params" in process]
     if {params.get("use_sim_time", True) for params in several} == {True} and any(
         "use_sim_time" in params for params in several
     ):
         draft.sections["ros"]["clock"] = "sim"
-        for process in processes:
+        for process in draft.started().values():
             if process.get("params", {}).pop("use_sim_time", None) and not process["params"]:
                 del process["params"]
 
@@ -265,72 +241,73 @@ def _hertz(value: float) -> Any:
     return Bare(f"{number(value)} Hz")
 
 
-def _add_container(draft: Draft, program: Program, target: Target) -> str:
-    """Add a container; programs of rclcpp_components are named by what their executors are."""
-    name = draft.free_name((program.name and program.label) or program.name or "container")
-    argv = list(program.argv)
-    keys: dict[str, Any] = {}
-    of_stock = _CONTAINERS.get(program.executable or "") if program.package == _COMPONENTS else None
-    if of_stock is None:
-        keys = {"package": program.package, "executable": program.executable}
-    elif of_stock == "isolated" and _SEVERAL_THREADS in argv:
-        argv.remove(_SEVERAL_THREADS)
-        keys = {"isolation": "isolated", "executor": "multi"}
-    else:
-        keys = {"isolated": {"isolation": "isolated"}, "multi": {"executor": "multi"}}.get(of_stock, {})
-    keys |= {"args": argv} if argv else {}
-    left = _as_node(keys, name, program, target)
-    keys |= {"env": dict(program.env)} if program.env else {}
-    keys |= dict(program.keys)
-    draft.process(name, keys, where(program.at), section="containers")
-    for one in (*program.todo, *left):
-        draft.todo(one, program.at, ("containers", name))
-    return name
-
-
-#: The containers of rclcpp_components, by how their executors are.
-_COMPONENTS = "rclcpp_components"
-_CONTAINERS = {"component_container": "shared", "component_container_mt": "multi",
-               "component_container_isolated": "isolated"}  # fmt: skip
-_SEVERAL_THREADS = "--use_multi_threaded_executor"
-#: Between the words of a class's name.
-_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-
-
-def _as_node(keys: dict[str, Any], name: str, node: Program | LoadedNode, target: Target) -> list[str]:
-    """Add what an entry of this name is as a node: its names, parameters, remappings. Return what cannot be added."""
-    keys |= {"node": node.name} if node.name and node.name != name else {}
-    namespace = (node.namespace or "").strip("/")
-    keys |= {"namespace": namespace} if namespace else {}
-    params, left = _params(node.params, target)
-    keys |= {"params": params} if params else {}
-    keys |= {"remap": dict(node.remap)} if node.remap else {}
-    return left
-
-
 def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
-    run = _run(program)
-    usual = _usual_name(program.package) if program.package and not program.name else None
+    usual = _usual_name(program.package) if program.package and not program.name and not program.plugin else None
     wanted = (program.name and program.label) or program.name or usual or program.label or _plain(program) or "process"
     name = draft.free_name(wanted)
-    keys: dict[str, Any] = {"run": run}
-    keys |= {"shell": True} if program.shell else {}
+    keys = _way(program)
     notes = [where(at)]
-    is_node = program.package is not None and "launch" not in run
-    if is_node and not program.name and not usual:
+    is_node = program.package is not None and "launch" not in keys.get("run", ())
+    if program.name and program.name != name:
+        keys["node"] = program.name
+    elif is_node and not program.name and not usual:
         notes.append(f"the source does not name the node: it is called {name} here")
-    left = _as_node(keys, name, program, target)
+    if program.namespace and program.namespace.strip("/"):
+        keys["namespace"] = program.namespace.strip("/")
+    params, left = _params(program.params, target)
+    keys |= {"params": params} if params else {}
+    keys |= {"remap": remappings(program.remap)} if program.remap else {}
     keys |= {"env": dict(program.env)} if program.env else {}
     keys |= dict(program.keys)
-    draft.process(name, keys, *(note for note in notes if note))
+    section = "containers" if program.loads else "processes"
+    draft.process(name, keys, *(note for note in notes if note), section=section)
     for word in _texts((*program.argv, *program.env.values())):
         if PACKAGE in word:
             todo.append(f"{word} is in a package that is not found here: write its path")
             advice = "--package NAME=FOLDER, or source the workspace's setup file"
     for one in (*todo, *left):
-        draft.todo(one, at, ("processes", name), advice)
+        draft.todo(one, at, (section, name), advice)
+    if program.description is not None:
+        draft.todo("the parameter robot_description", at, (section, name), _FROM_TOPIC)
     return name
+
+
+def remappings(rules: Sequence[tuple[str, str]]) -> dict[str, str]:
+    """Return remappings as a robot file has them: ROS takes the first of several rules for one name."""
+    return dict(reversed(list(dict(reversed(rules)).items())))
+
+
+def _way(program: Program) -> dict[str, Any]:
+    """Return the keys that say how the program runs."""
+    if program.plugin:
+        return {"component": Bare(f"{program.package}/{program.plugin}"), "container": ""}
+    if program.loads:
+        return _container_keys(program)
+    return {"run": _run(program)} | ({"shell": True} if program.shell else {})
+
+
+#: Containers of rclcpp_components, with the keys that name them.
+_CONTAINERS: dict[str, dict[str, Any]] = {
+    "component_container": {},
+    "component_container_mt": {"executor": "multi"},
+    "component_container_isolated": {"isolation": "isolated"},
+}
+_MULTI = "--use_multi_threaded_executor"
+
+
+def _container_keys(program: Program) -> dict[str, Any]:
+    """Return what a container is: by its isolation and executor if it is a stock one, else by its program."""
+    words = list(program.argv)
+    stock = _CONTAINERS.get(program.executable or "") if program.package == CONTAINERS else None
+    if stock is None:
+        keys: dict[str, Any] = {"package": program.package} if program.package != CONTAINERS else {}
+        return keys | {"executable": program.executable} | ({"args": words} if words else {})
+    keys = dict(stock)
+    if keys.get("isolation") and _MULTI in words:
+        words.remove(_MULTI)
+        keys["executor"] = "multi"
+    return keys | ({"args": words} if words else {})
 
 
 def _usual_name(package: str) -> str | None:
@@ -366,6 +343,8 @@ def _plain(program: Program) -> str:
             word = file
         case ("ros2", verb, *_) if program.package is None:
             word = f"ros2_{verb}"
+        case _ if program.plugin:
+            return _CAMEL.sub("_", program.plugin.rpartition("::")[2]).lower()
         case _:
             word = program.executable or (program.argv[0].split()[0] if program.argv and program.argv[0] else "")
     plain = posixpath.basename(word).partition(".")[0]

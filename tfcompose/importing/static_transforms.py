@@ -19,6 +19,12 @@ if TYPE_CHECKING:
     from tfcompose.geometry import Vector
 
 PROGRAM = "static_transform_publisher"
+#: The same as a component, which has the values as parameters.
+PLUGIN = "tf2_ros::StaticTransformBroadcasterNode"
+_PARAMETERS = {
+    **{f"translation.{axis}": f"--{axis}" for axis in "xyz"}, **{f"rotation.{axis}": f"--q{axis}" for axis in "xyzw"},
+    "frame_id": "--frame-id", "child_frame_id": "--child-frame-id",
+}  # fmt: skip
 
 #: Who reads the arguments: the program of ROS 2, that of ROS 1's tf, or that of ROS 1's tf2_ros.
 Reader = Literal["ros2", "tf", "tf2_ros"]
@@ -82,6 +88,14 @@ def static_transform(words: Sequence[str], reader: Reader = "ros2") -> StaticTra
     if given:
         raise RefusedError(f"{loose[0]} stands beside {next(iter(given))}: arguments are by name or in order")
     return _in_order(loose, reader)
+
+
+def static_words(params: Sequence[Any]) -> list[str]:
+    """Return the arguments that say what the component is told by parameters."""
+    given: dict[str, Any] = {}
+    for one in params:
+        given |= one if isinstance(one, dict) else {}
+    return [word for name, flag in _PARAMETERS.items() if name in given for word in (flag, str(given[name]))]
 
 
 def _without_ros_arguments(words: Sequence[str]) -> list[str]:

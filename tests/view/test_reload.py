@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from tests.support.tables import for_each
 from tests.support.waiting import until
@@ -83,6 +84,17 @@ def test_a_file_that_is_gone_leaves_the_scene(shown: ReloadedPanel, tmp_path: Pa
     (tmp_path / "r.yaml").unlink()
     assert not shown.reload()
     assert shown.found
+
+
+def test_a_mesh_that_is_changed_is_read_again(shown: ReloadedPanel, tmp_path: Path) -> None:
+    for number, radius in enumerate((1.0, 2.0)):
+        trimesh.creation.icosphere(subdivisions=1, radius=radius).export(tmp_path / "tip.stl")
+        if number == 0:
+            replace(tmp_path / "r.yaml", TEXT.replace("arm: {}", "arm: {visual: {mesh: tip.stl}}"))
+        until(shown.reload)
+        least, most = shown.panel.scene.bounds("arm")
+        assert [*least, *most] == pytest.approx([-radius] * 3 + [radius] * 3, rel=0.2)
+    assert not shown.reload()
 
 
 def test_a_save_is_no_change_on_disk(shown: ReloadedPanel) -> None:

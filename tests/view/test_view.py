@@ -397,7 +397,7 @@ def test_a_running_tree_takes_neither_edit_nor_html(rover: Path, option: tuple[s
     assert not (rover.parent / "r.html").exists()
 
 
-@for_each([(["--at", "3"],), (["--at", "0"],), (["--html", "r.html", "--edit"],)])
+@for_each([(["--at", "3"],), (["--at", "0"],), (["--html", "r.html", "--edit"],), (["--tolerance", "2mm"],)])
 def test_an_option_without_what_it_is_for_is_refused(words: list[str], tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_bytes(ROVER.read_bytes())
     done = tfcompose_in(tmp_path, "view", "r.yaml", "--port", "0", *words)

@@ -88,11 +88,15 @@ def add_bag(parser: ArgumentParser, text: str = "read a recording instead of the
     parser.add_argument("--bag", metavar="BAG", help=f"{text}: a rosbag2 folder, .mcap or .db3")
 
 
+#: How far a pose may be off.
+TOLERANCE = "1mm,0.1deg"
+
+
 def add_tolerance(parser: ArgumentParser) -> None:
     """Add --tolerance."""
     parser.add_argument(
-        "--tolerance", type=tolerance, default="1mm,0.1deg", metavar="T",
-        help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
+        "--tolerance", type=tolerance, default=TOLERANCE, metavar="T",
+        help=f"how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: {TOLERANCE}",
     )  # fmt: skip
 
 

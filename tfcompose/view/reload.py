@@ -13,12 +13,13 @@ from tfcompose.view.findings import findings_html
 from tfcompose.view.panel import Panel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     import viser
     from typing_extensions import Self
 
     from tfcompose.findings import Finding
+    from tfcompose.model import Robot
     from tfcompose.view.session import Session
 
 #: What changes together is one change, in milliseconds.
@@ -26,11 +27,12 @@ _TOGETHER_MS = 100
 
 
 class Files:
-    """Reads files, and knows which it has read, and what was in them."""
+    """Reads files, and knows which it has read, and what was in them; of meshes, when they were changed."""
 
     def __init__(self, read: Callable[[str], str]) -> None:
         self._read = read
         self._texts: dict[str, str] = {}
+        self._meshes: dict[str, int] = {}
 
     def __call__(self, file: str) -> str:
         """Return the text of a file; raises what reading raises."""
@@ -42,20 +44,34 @@ class Files:
         """Know of a text that the file has from now on: it is no change."""
         self._texts[file] = text
 
+    def look_at(self, meshes: Iterable[str]) -> None:
+        """Know of these mesh files, and no others, and when they were changed."""
+        self._meshes = {file: _changed_ns(file) for file in meshes}
+
     @property
     def folders(self) -> set[Path]:
         """The folders of all files that were read: editors replace files by others."""
-        return {folder for file in self._texts if (folder := Path(file).resolve().parent).is_dir()}
+        several = (*self._texts, *self._meshes)
+        return {folder for file in several if (folder := Path(file).resolve().parent).is_dir()}
 
     def differ(self) -> bool:
-        """Return whether a file has another text than when it was read."""
-        return any(self._now(file) != text for file, text in self._texts.items())
+        """Return whether a file has another text than when it was read, or a mesh was changed."""
+        return any(self._now(file) != text for file, text in self._texts.items()) or any(
+            _changed_ns(file) != before for file, before in self._meshes.items()
+        )
 
     def _now(self, file: str) -> str:
         try:
             return self._read(file)
         except RejectedError:
             return ""
+
+
+def _changed_ns(file: str) -> int:
+    try:
+        return Path(file).stat().st_mtime_ns
+    except OSError:
+        return 0
 
 
 class Watcher:
@@ -94,6 +110,11 @@ class Watcher:
                     break
 
 
+def _meshes(robot: Robot) -> set[str]:
+    bodies = (shape for link in robot.links.values() for shape in (*link.visuals, *link.collisions))
+    return {shape.mesh.path for shape in bodies if shape.mesh and shape.mesh.path}
+
+
 class ReloadedPanel:
     """The panel of a session, made anew with each good version of its files.
 
@@ -112,6 +133,7 @@ class ReloadedPanel:
         self._edit, self._joints = edit, joints
         self._broken: Any = None
         self.panel = Panel(server, session, edit=edit, joints=joints)
+        files.look_at(_meshes(session.robot))
 
     def end(self) -> None:
         """Let the panel move nothing any more."""
@@ -132,6 +154,7 @@ class ReloadedPanel:
             self._show(state.found)
             return False
         self.session.replace(texts, state)
+        self.files.look_at(_meshes(state.robot))
         before = self.panel
         before.end()
         with self._server.atomic():

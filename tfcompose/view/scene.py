@@ -217,6 +217,12 @@ class RobotScene:
         """Show or hide the edges of an owner."""
         self._lines[owner].visible = visible
 
+    def bounds(self, frame: str) -> tuple[Vector, Vector]:
+        """Return the least and the most of what the scene shows of a frame's body, in the frame and in metres."""
+        columns = list(zip(*self._corners[frame], strict=True))
+        (x0, y0, z0), (x1, y1, z1) = (tuple(map(one, columns)) for one in (min, max))
+        return (x0, y0, z0), (x1, y1, z1)
+
     def is_shown(self, frame: str) -> bool:
         """Return whether the scene shows the body of a frame."""
         return bool(self._bodies[frame].visible)

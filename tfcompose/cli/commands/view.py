@@ -13,7 +13,7 @@ from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_tolerance, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, TOLERANCE, add_bag, add_tolerance, add_variant, tolerance
 from tfcompose.cli.terminal import UNREADABLE, fail, warn
 from tfcompose.signals import take_interrupt
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.cli.bag_view import BagView
+    from tfcompose.geometry import Offset
     from tfcompose.view.reload import Files
     from tfcompose.view.session import Session
 
@@ -48,6 +49,7 @@ def arguments(parser: ArgumentParser) -> None:
         help="with --bag: the time to begin with, in seconds after its first transform, or since the epoch; default: 0",
     )  # fmt: skip
     add_tolerance(parser)
+    parser.set_defaults(tolerance=None)
     parser.add_argument("--edit", action="store_true", help="move mounts, and save them in the file")
     parser.add_argument("--html", metavar="FILE", help="write one HTML file that needs nothing else, and end")
     parser.add_argument(
@@ -79,6 +81,8 @@ def run(arguments: Namespace) -> int:
         fail(f"{given} shows what is published: leave out --html and --edit", UNREADABLE)
     if arguments.at is not None and not arguments.bag:
         fail("--at is a time of a recording: give --bag, too", UNREADABLE)
+    if arguments.tolerance is not None and not (arguments.live or arguments.bag):
+        fail("--tolerance compares with what is published: give --live or --bag, too", UNREADABLE)
     if arguments.edit and arguments.html:
         fail("--html writes a page, in which nothing is moved: leave out --edit", UNREADABLE)
     file = arguments.file or _running_plan(arguments) or DEFAULT_FILE
@@ -112,7 +116,7 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
             if arguments.live:
                 from tfcompose.cli.live_view import follow
 
-                return follow(server, shown, watcher.changed, arguments.tolerance, joints=arguments.joints)
+                return follow(server, shown, watcher.changed, _tolerance(arguments), joints=arguments.joints)
             while True:
                 watcher.changed.wait()
                 watcher.changed.clear()
@@ -124,10 +128,14 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
         stop(server)
 
 
+def _tolerance(arguments: Namespace) -> Offset:
+    return arguments.tolerance or tolerance(TOLERANCE)
+
+
 def _bag_view(session: Session, arguments: Namespace) -> BagView:
     from tfcompose.cli.bag_view import BagView
 
-    return BagView(arguments.bag, arguments.at or 0.0, session, arguments.tolerance)
+    return BagView(arguments.bag, arguments.at or 0.0, session, _tolerance(arguments))
 
 
 def _write(session: Session, path: Path) -> None:

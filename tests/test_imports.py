@@ -64,6 +64,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "publishers": {"files", "geometry", "plan", "process", "ros", "signals", "text"},
     "tf2": {"geometry", "ros"},
     "compile": FOUNDATIONS | STAGES,
+    "deploy": {"emit", "export", "files", "findings", "launcher", "model", "plan", "ros", "text"},
     "provenance": {"load", "model"},
     "pages": {"catalogue", "check"},
     "importing": {
@@ -108,6 +109,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 #: Packages from elsewhere, and the only parts that may import them.
 ONLY_IN: dict[str, set[str]] = {
     "yaml": {"export", "importing", "load"},  # importing: launch reads parameters as YAML
+    "asyncssh": {"deploy"},
     "markdown_it": {"cli"},
     "pydantic": {"language"},
     "pydantic_core": {"language", "units"},

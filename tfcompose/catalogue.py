@@ -271,6 +271,12 @@ CATALOGUE: dict[str, Code] = {
         Code("TF909", "ros_settings_contradict", "environment", "error"),
         Code("TF910", "written_otherwise", "environment", "error"),
         Code("TF911", "schedule_refused", "environment", "error"),
+        Code("TF912", "not_deployable", "environment", "error"),
+        Code("TF913", "host_unreachable", "environment", "error"),
+        Code("TF914", "host_unfit", "environment", "error"),
+        Code("TF915", "host_locked", "environment", "error"),
+        Code("TF916", "hosts_apart", "environment", "error"),
+        Code("TF917", "release_failed", "environment", "error"),
     )
 }
 

@@ -506,6 +506,34 @@ materials. Nothing is written then. This is a bug in tfcompose; please report it
 schedule: {cpus: [2, 3], priority: 80} needs these processors here, and the right to that real-time priority. The kernel
 is asked before anything is started. rtprio in /etc/security/limits.conf gives the right to a user after the next login,
 LimitRTPRIO= to a systemd unit, and --cap-add SYS_NICE or --ulimit rtprio to a container.""",
+    "TF912": """The robot cannot be deployed as it is described.
+
+deploy needs hosts: in the robot file, and each process has to run on one of them: what names no host runs where static
+does, processes: {static: {host: NAME}}. A file that the robot names has to be there, because it is copied. --rollback
+needs a release before the current one.""",
+    "TF913": """A host cannot be reached.
+
+hosts: {NAME: {ssh: user@address, port: N}} says where it is; names, keys and jump hosts of ~/.ssh/config hold, too. The
+host must let you in without a password (ssh-copy-id), and its own key must be known (ssh to it once). Nothing was
+changed on any host.""",
+    "TF914": """A host cannot run the robot.
+
+It needs Python 3.10 or newer with tfcompose, the files of setup, and systemd; for the units of a user a login with a
+user manager, for --system root. A robot that was started there by hand has to be ended first: it would own the same
+edges. Nothing was changed on any host.""",
+    "TF915": """Somebody else deploys to a host at the same time.
+
+Each deployment holds a lock on each host while it lasts, so that two never mix. The lock ends with the connection of
+who holds it.""",
+    "TF916": """Nodes on the hosts would not find each other.
+
+All computers of a robot share a ROS domain, a middleware, and a discovery that reaches beyond one computer. What setup
+files set holds on their host; ros: {domain_id: N, discovery: subnet} holds on all.""",
+    "TF917": """A release did not come up on every host, or a host was lost.
+
+A release is kept only once every edge of every host is live, as the launcher and the guard on each host say. Else every
+host goes back to the release before; the notes say which, and what the unit printed. tfcompose logs --all-hosts shows
+more.""",
 }
 
 

@@ -3,6 +3,7 @@
 No process runs: what judges is given what it would have seen.
 """
 
+import asyncio
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -15,6 +16,8 @@ from unittest import mock
 from tests.support import guard_history as guarded
 from tests.support.bags import drive, write_bag
 from tests.support.cli import inside
+from tests.support.deployed import LATE, NOWHERE, RUNNING, STATE, STATUS, StandInHost, release_of, rollout_to
+from tests.support.deployed import ROBOT as HOSTED
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, run_process
 from tests.support.plans import compiled_plan
 from tests.support.presets import MAST, WRONG_IN_MAST
@@ -39,6 +42,8 @@ from tfcompose.cli.commands import echo
 from tfcompose.cli.compiling import library
 from tfcompose.cli.parser import main
 from tfcompose.compile import compile_robot
+from tfcompose.deploy.connection import LostError, Settings, connected
+from tfcompose.deploy.rollout import Rollout, target_of
 from tfcompose.emit import emit
 from tfcompose.files import Target
 from tfcompose.findings import Finding, RejectedError, Span, finding
@@ -61,6 +66,7 @@ from tfcompose.plan import (
     Plan,
     PlanClaim,
     PlanEdge,
+    PlanHost,
     PlanProcess,
     Ready,
     RosSettings,
@@ -617,6 +623,54 @@ def imported() -> Iterator[Finding]:
     yield from draft.found
 
 
+# Hosts.
+
+
+def deployed() -> Iterator[Finding]:
+    """Deploy to hosts that lack something, are apart, are lost or do not come up."""
+    hosted = compiled_plan(HOSTED)
+    for plan, names in ((replace(hosted, hosts={}), []), (compiled_plan(NOWHERE), []), (hosted, ["jetsn"])):
+        try:
+            target_of(plan, names, {})
+        except RejectedError as error:
+            yield from error.findings
+    refused = asyncio.run(connected("rear", PlanHost("root@127.0.0.1", 1), Settings("x.rear", "x"), None))
+    yield refused if isinstance(refused, Finding) else AN_EXAMPLE
+    lacks: tuple[dict[str, dict[str, Any]], ...] = (
+        {"jetson": {"problems": ["systemd does not run for this user: Failed to connect to bus"]}},
+        {"jetson": {"tfcompose": None}},
+        {"jetson": {"env": {"ROS_DOMAIN_ID": "7", "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}}},
+        {"jetson": {"machine": "b"}, "main": {"env": {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}}},
+    )
+    for probes in lacks:
+        yield from asyncio.run(rollout_to(StandInHost("main"), StandInHost("jetson"), probes=probes).examine())
+    yield from asyncio.run(rollout_to(StandInHost("main"), StandInHost("jetson", offset_s=2)).examine())
+    for answers in (
+        {"take_lock": {"holder": "ann@laptop, pid 7, since 12:00:00"}},
+        {"state": STATE | STATUS | {"stranger": 4711}},
+        {"start": LostError("is lost: the connection has ended"), "back": LostError("is lost")},
+        {"wait": STATUS | {"failed": True, "lines": ["tfcompose: error"]}, "back": {"release": None, "active": False}},
+        {"wait": STATUS | {"robot": RUNNING | {"missing": ["base_link → arm"], "processes": [LATE]}}},
+        {},
+    ):
+        yield from asyncio.run(_rolled_out(rollout_to(StandInHost("main"), StandInHost("jetson", answers))))
+
+
+async def _rolled_out(rollout: Rollout) -> list[Finding]:
+    """Return what is found when the hosts are deployed to, and then are to go back."""
+    try:
+        await rollout.lock()
+        await rollout.compare(release_of())
+        if found := rollout.strangers():
+            return found
+        await rollout.send()
+        await rollout.activate()
+        await rollout.plan_return()
+    except RejectedError as error:
+        return list(error.findings)
+    return []
+
+
 SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     doctor,
     with_a_plan,
@@ -626,4 +680,5 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     compiled,
     recordings,
     imported,
+    deployed,
 )

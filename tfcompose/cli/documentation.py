@@ -25,7 +25,7 @@ TOPICS = {
     "guard": "what is watched while the robot runs, and what a finding says",
     "strict": "holding back what a process does not own",
     "background": "robots without a terminal: ps, logs, restart, down",
-    "hosts": "a robot on several computers",
+    "hosts": "a robot on several computers, and `deploy`",
     "rmw": "Fast DDS, Cyclone DDS or Zenoh",
     "exports": "systemd, docker compose, Kubernetes and launch files",
     "ci": "lint, diff and verify in CI; exit codes",

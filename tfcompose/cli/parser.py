@@ -18,6 +18,7 @@ from tfcompose.cli.command_parser import Command, Parser, command_parser
 from tfcompose.cli.commands import (
     build,
     completion,
+    deploy,
     diff,
     doctor,
     down,
@@ -74,7 +75,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "wait": wait,
     },
     "Look": {"view": view, "doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
-    "Ship": {"export": export},
+    "Ship": {"deploy": deploy, "export": export},
     "Help": {"help": manual, "completion": completion},
 }
 COMMANDS: dict[str, Command] = {name: command for group in GROUPS.values() for name, command in group.items()}

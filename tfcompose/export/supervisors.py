@@ -238,7 +238,7 @@ def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mappin
         f"Type={kind}",
         *(["NotifyAccess=all"] if kind == "notify" else []),
         *([f"TimeoutStartSec={60 + settling_s:g}"] if kind == "notify" or settling_s else []),
-        *(f"Environment={_quoted(f'{name}={value}')}" for name, value in sorted(machine.env.items())),
+        *(f"Environment={quoted(f'{name}={value}')}" for name, value in sorted(machine.env.items())),
         *_logs(plan, machine),
         f"WorkingDirectory={_plain(machine.folder)}",
         f"ExecStart={_exec(process, machine)}",
@@ -266,14 +266,14 @@ def _exec(process: PlanProcess, machine: Machine) -> str:
     words = command_of(process, machine.python, f"{machine.folder}/plan.json")
     if machine.setup:
         words = ["/bin/bash", "-c", _SOURCING, " ".join(machine.setup), *words]
-    return " ".join(_quoted(word).replace("$", "$$") for word in words)
+    return " ".join(quoted(word).replace("$", "$$") for word in words)
 
 
 def _plain(text: str) -> str:
     return text.replace("%", "%%")
 
 
-def _quoted(word: str) -> str:
+def quoted(word: str) -> str:
     """Return the word as systemd reads it back; a percent sign is doubled."""
     text = _plain(word)
     if text and all(c.isalnum() or c in "/.:=@+,-_%" for c in text):

@@ -100,3 +100,9 @@ def _elsewhere(process: PlanProcess) -> PlanProcess:
     return replace(
         process, kind="external", argv=(), component=None, params_file=None, lifecycle={}, after={}, ready=ready
     )
+
+
+def without_computer(plan: Plan) -> tuple[str, ...]:
+    """Return the processes that would run on no computer under ``hosts``, where the plan is deployed to these."""
+    own = (one for one in plan.managed if one.kind != "guard")
+    return tuple(process.name for process in own if process.host not in plan.hosts)

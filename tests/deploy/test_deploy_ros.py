@@ -1,0 +1,231 @@
+"""deploy, on three computers with an sshd of their own: what comes to all of them, or to none."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support import processes
+from tests.support.computers import SHIFTED, Computers, missing
+from tests.support.waiting import TIMEOUT_S, until
+
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.xdist_group("computers"),
+    pytest.mark.skipif(bool(missing()), reason=missing() or "all is there"),
+]
+
+NAMES = ("brain", "rear", "arm")
+ROBOT = """
+tfcompose: 1
+robot: rover
+hosts:
+  brain: {ssh: root@10.77.0.2, port: 2222}
+  rear: {ssh: root@10.77.0.3, port: 2222}
+  arm: {ssh: root@10.77.0.4, port: 2222}
+links: {base_link: {visual: {mesh: meshes/wheel.stl}}}
+frames:
+  odom: {}
+  rear_mount: {parent: base_link, owner: rear_drive, rate: 20 Hz}
+  tool: {parent: base_link, owner: arm_drive, rate: 20 Hz}
+  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
+joints: {base_joint: {type: fixed, parent: odom, child: base_link}}
+processes:
+  static: {host: brain}
+  rear_drive: {simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: rear}
+  arm_drive: {simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: arm}
+"""
+MOVED = ROBOT.replace("[0, 0, 0.3]", "[0, 0, 0.4]")
+#: Its owner runs, and publishes nothing.
+SIMULATED = "simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: rear"
+SILENT = ROBOT.replace(SIMULATED, 'run: [sh, -c, "sleep 1000"], host: rear')
+
+
+@pytest.fixture(scope="module")
+def computers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Computers]:
+    folder = tmp_path_factory.mktemp("computers")
+    (folder / "robot/meshes").mkdir(parents=True)
+    (folder / "robot/meshes/wheel.stl").write_bytes(b"\0" * 84)
+    with Computers(folder, NAMES) as all_of_them:
+        yield all_of_them
+
+
+def deploy(computers: Computers, text: str, *words: str) -> subprocess.CompletedProcess[str]:
+    process = deploying(computers, text, *words)
+    output, errors = process.communicate(timeout=2 * TIMEOUT_S)
+    return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
+
+
+def deploying(computers: Computers, text: str, *words: str) -> subprocess.Popen[str]:
+    folder = computers.folder / "robot"
+    (folder / "robot.yaml").write_text(text)
+    command = computers.in_office(sys.executable, "-m", "tfcompose", "deploy", *words)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return processes.start(command, env=computers.environment(), cwd=folder, **pipes)
+
+
+def current(computers: Computers) -> dict[str, str]:
+    links = {name: one.base / f"rover.{name}" / "current" for name, one in computers.computers.items()}
+    return {name: link.readlink().name for name, link in links.items() if link.is_symlink()}
+
+
+def runs(computers: Computers, name: str) -> dict[str, object]:
+    done = computers.computers[name].run("python3", "-m", "tfcompose", "ps", "--format", "json")
+    robots = json.loads(done.stdout or "[]")
+    return {} if not robots else {"ready": robots[0]["ready"], "launcher": robots[0]["launcher"]}
+
+
+def is_complete(computers: Computers) -> bool:
+    return all(runs(computers, name).get("ready") for name in NAMES)
+
+
+def journals(computers: Computers) -> str:
+    """Return what the units printed, for a test that fails."""
+    return "".join(
+        one.run("sh", "-c", "tail -n 20 $XDG_RUNTIME_DIR/*.journal").stdout for one in computers.computers.values()
+    )
+
+
+def test_from_nothing_every_edge_of_every_host_is_live_and_a_second_run_changes_nothing(computers: Computers) -> None:
+    checked = deploy(computers, ROBOT, "--check")
+    assert (checked.returncode, current(computers)) == (1, {}), checked
+    first = deploy(computers, ROBOT)
+    assert first.returncode == 0, first
+    assert re.search(r"4 edges live on brain, rear, arm", first.stdout), first
+    assert is_complete(computers)
+    before = {name: (runs(computers, name), current(computers)) for name in NAMES}
+    for words in ((), ("--check",), ("--diff",)):
+        again = deploy(computers, ROBOT, *words)
+        assert (again.returncode, "nothing to change" in again.stdout) == (0, True), again
+    assert {name: (runs(computers, name), current(computers)) for name in NAMES} == before
+    mesh = (computers.computers["rear"].base / "rover.rear/current/files").glob("**/wheel.stl")
+    assert next(mesh).stat().st_size == 84
+
+
+def test_what_would_change_is_listed_and_shown_and_changes_nothing(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    done = deploy(computers, MOVED, "--check", "--diff")
+    assert done.returncode == 1, done
+    assert {f"{name}: plan.json: changed" for name in NAMES} <= set(done.stdout.splitlines())
+    assert any(line.startswith("+") and "0.4" in line for line in done.stdout.splitlines())
+    assert current(computers) == before
+    (computers.computers["arm"].base / "rover.arm/current/plan.json").write_text("{}")
+    drifted = deploy(computers, ROBOT, "--check")
+    assert [line for line in drifted.stdout.splitlines() if "changed" in line] == ["arm: plan.json: changed"]
+    assert deploy(computers, ROBOT).returncode == 0
+    assert deploy(computers, ROBOT, "--check").returncode == 0
+
+
+def test_a_release_that_does_not_come_up_is_taken_back_everywhere(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    done = deploy(computers, SILENT, "--timeout", "8")
+    assert (done.returncode, "TF917" in done.stderr, "base_link → rear_mount" in done.stderr) == (1, True, True), done
+    for name in NAMES:
+        assert f"{name} is back on release {before[name]}" in done.stderr
+    assert current(computers) == before
+    assert until(lambda: is_complete(computers)), journals(computers)
+    assert deploy(computers, ROBOT, "--check").returncode == 0
+
+
+def test_a_host_that_is_down_is_named_before_anything_changes(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before, launcher = current(computers), runs(computers, "brain")
+    computers.computers["rear"].lose_power()
+    try:
+        done = deploy(computers, MOVED)
+        assert (done.returncode, "TF913" in done.stderr, "rear cannot be reached" in done.stderr) == (1, True, True)
+    finally:
+        computers.boot("rear")
+    assert (current(computers), runs(computers, "brain")) == (before, launcher)
+    assert until(lambda: is_complete(computers)), journals(computers)
+
+
+def test_a_host_that_loses_power_in_the_middle_takes_all_back(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    process = deploying(computers, SILENT)
+    trial = Path(f"/proc/{computers.computers['rear'].inside()}/root/run/rear/systemd/user")
+    assert until(lambda: list(trial.glob("*.d/trial.conf")))
+    computers.computers["rear"].lose_power()
+    try:
+        _, errors = process.communicate(timeout=2 * TIMEOUT_S)
+    finally:
+        computers.boot("rear")
+    assert (process.returncode, "rear is lost" in errors) == (1, True), errors
+    for name in ("brain", "arm"):
+        assert f"{name} is back on release {before[name]}" in errors
+    assert current(computers) == before
+    assert until(lambda: is_complete(computers)), journals(computers)
+
+
+def test_whoever_deploys_may_be_killed(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    process = deploying(computers, SILENT)
+    trial = Path(f"/proc/{computers.computers['rear'].inside()}/root/run/rear/systemd/user")
+    assert until(lambda: list(trial.glob("*.d/trial.conf")))
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert until(lambda: not list(trial.glob("*.d/trial.conf")))
+    assert until(lambda: is_complete(computers)), journals(computers)
+    assert current(computers) == before
+
+
+def test_clocks_that_are_apart_are_found_before_the_start(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    shifted = computers.folder / "shifted"
+    shifted.mkdir()
+    (shifted / "sitecustomize.py").write_text(SHIFTED)
+    python = shifted / "python"
+    python.write_text(f'#!/bin/sh\nPYTHONPATH="{shifted}:$PYTHONPATH" exec {sys.executable} "$@"\n')
+    python.chmod(0o755)
+    ahead = MOVED.replace("10.77.0.4, port: 2222", f"10.77.0.4, port: 2222, python: {python}")
+    done = deploy(computers, ahead)
+    assert (done.returncode, "TF834" in done.stderr) == (1, True), done
+    assert re.search(r"the clock of arm is (2|1\.9\d|2\.0\d) s ahead", done.stderr), done
+    assert current(computers) == before
+    assert deploy(computers, ahead, "--check", "--clock-limit", "3").returncode == 1
+
+
+def test_rollback_returns_to_the_release_before(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    assert deploy(computers, MOVED).returncode == 0
+    after = current(computers)
+    assert not set(before.items()) & set(after.items())
+    done = deploy(computers, MOVED, "--rollback")
+    assert done.returncode == 0, done
+    assert current(computers) == before
+    assert is_complete(computers)
+    assert deploy(computers, ROBOT, "--check").returncode == 0
+
+
+def test_of_two_at_once_the_second_says_who_holds_the_hosts(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    first = deploying(computers, SILENT, "--timeout", "12")
+    trial = Path(f"/proc/{computers.computers['rear'].inside()}/root/run/rear/systemd/user")
+    assert until(lambda: list(trial.glob("*.d/trial.conf")))
+    second = deploy(computers, MOVED)
+    assert (second.returncode, "TF915" in second.stderr, f"pid {first.pid}" in second.stderr) == (1, True, True), second
+    first.communicate(timeout=2 * TIMEOUT_S)
+    assert (first.returncode, current(computers)) == (1, before)
+
+
+def test_one_host_alone_is_deployed_to_and_waited_for(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    before = current(computers)
+    done = deploy(computers, MOVED, "--host", "rear")
+    assert (done.returncode, "1 edge live on rear" in done.stdout) == (0, True), done
+    after = current(computers)
+    assert [name for name in NAMES if before[name] != after[name]] == ["rear"]
+    wrong = deploy(computers, MOVED, "--host", "raer")
+    assert (wrong.returncode, "TF819" in wrong.stderr) == (1, True), wrong

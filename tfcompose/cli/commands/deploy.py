@@ -1,0 +1,123 @@
+"""Bring a robot to its computers, and start it there.
+
+Build the robot once, copy it to every computer under hosts: by ssh, start it there as a unit of systemd, and wait until
+every edge of every host is live; else bring every host back to the release before. What a host has already is not
+copied again: a second run changes nothing. tfcompose help hosts says more.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.options import add_file, add_variant, positive
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tfcompose.deploy.release import Release
+    from tfcompose.deploy.rollout import Rollout, Target
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_file(parser)
+    add_variant(parser)
+    parser.add_argument("--check", action="store_true", help="change nothing; exit 1 if something would change")
+    parser.add_argument("--diff", action="store_true", help="print how the files on the hosts differ")
+    parser.add_argument("--rollback", action="store_true", help="return to the release before the current one")
+    parser.add_argument(
+        "--host", action="append", default=[], metavar="NAME", dest="hosts", help="only this host; repeatable"
+    )
+    parser.add_argument(
+        "--no-wait", dest="wait", action="store_false", help="keep the release without waiting for its edges"
+    )
+    parser.add_argument("--wait", action="store_true", help="wait for the edges, which is the default")
+    parser.add_argument(
+        "--timeout", type=positive, default=60.0, metavar="S",
+        help="go back if not every edge is live S seconds after the start; default: 60",
+    )  # fmt: skip
+    parser.add_argument(
+        "--clock-limit", type=positive, default=0.1, metavar="S",
+        help="refuse hosts whose clocks differ by more than S seconds; default: 0.1",
+    )  # fmt: skip
+    parser.add_argument(
+        "--wheels", metavar="FOLDER", help="install these wheels there, in a Python of the release's own"
+    )
+    parser.add_argument("--system", action="store_true", help="units of the system, as root; default: of the user")
+    parser.set_defaults(wait=True)
+
+
+def run(arguments: Namespace) -> int:
+    """Deploy; exit code 0, 1 if it failed or --check found a change, 2 where something cannot be read."""
+    from importlib.util import find_spec
+
+    from tfcompose.cli.compiling import compiled_without_errors
+    from tfcompose.emit.plan import plan_of
+    from tfcompose.findings import RejectedError
+
+    if find_spec("asyncssh") is None:
+        fail("deploy needs the package asyncssh: pip install 'tfcompose[deploy]'", UNREADABLE)
+    wheels = Path(arguments.wheels) if arguments.wheels else None
+    if wheels and not any(wheels.glob("*.whl")):
+        fail(f"there is no wheel in {wheels}", UNREADABLE)
+    robot, _ = compiled_without_errors(arguments.file, arguments)
+    import asyncio
+
+    from tfcompose.deploy.release import packed
+    from tfcompose.deploy.rollout import target_of
+
+    try:
+        places = {name: host.at for name, host in robot.hosts.items()}
+        target = target_of(
+            plan_of(robot.with_final_names()), arguments.hosts, places, system=arguments.system,
+            clock_limit_s=arguments.clock_limit, timeout_s=arguments.timeout, waits=arguments.wait,
+        )  # fmt: skip
+        release = None if arguments.rollback else packed(robot, wheels)
+        return asyncio.run(_deploy(target, release, arguments))
+    except RejectedError as error:
+        reject(error.findings)
+
+
+async def _deploy(target: Target, release: Release | None, arguments: Namespace) -> int:
+    from tfcompose.deploy.rollout import reached
+
+    async with reached(target, has_wheels=bool(release and release.has_wheels), report=_report) as rollout:
+        if found := await rollout.examine():
+            print_findings(found, sys.stderr)
+            return FAILED
+        if not arguments.check:
+            await rollout.lock()
+        if release is None:
+            await rollout.plan_return()
+        else:
+            await rollout.compare(release)
+        if found := rollout.strangers():
+            print_findings(found, sys.stderr)
+            return FAILED
+        if arguments.diff:
+            print("\n".join(await rollout.difference()))
+        changes = rollout.changes()
+        if not changes:
+            return _unchanged(rollout)
+        if arguments.check:
+            print("\n".join(f"{name}: {line}" for name, lines in changes.items() for line in lines))
+            return FAILED
+        if release is not None:
+            await rollout.send()
+        print(await rollout.activate())
+    return 0
+
+
+def _report(line: str) -> None:
+    print(line, flush=True)
+
+
+def _unchanged(rollout: Rollout) -> int:
+    """Say that the hosts have the release already, and what is not live there; exit code 1 in that case."""
+    print(f"nothing to change: {rollout.described()}")
+    found = rollout.not_live()
+    print_findings(found, sys.stderr)
+    return FAILED if found else 0

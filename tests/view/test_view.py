@@ -397,6 +397,12 @@ def test_a_running_tree_takes_neither_edit_nor_html(rover: Path, option: tuple[s
     assert not (rover.parent / "r.html").exists()
 
 
+def test_without_ros_nothing_is_served_live(rover: Path) -> None:
+    done = tfcompose_in(rover.parent, "view", rover.name, "--live", "--port", "0", RMW_IMPLEMENTATION="rmw_of_nobody")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "[TF901]" in done.stderr
+
+
 @for_each([(["--at", "3"],), (["--at", "0"],), (["--html", "r.html", "--edit"],), (["--tolerance", "2mm"],)])
 def test_an_option_without_what_it_is_for_is_refused(words: list[str], tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_bytes(ROVER.read_bytes())

@@ -6,7 +6,6 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.live import set_up_ros
 from tfcompose.cli.process_table import HEAD, row, uptime
 from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject, warn
@@ -189,13 +188,12 @@ def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
 def follow(
     server: viser.ViserServer, shown: ReloadedPanel, changed: threading.Event, tolerance: Offset, *, joints: bool
 ) -> int:
-    """Show the running tree until a signal comes; return the exit code.
+    """Show the running tree until a signal comes, in a process that is set up for its ROS; return the exit code.
 
     Raises:
         SystemExit: after saying why ROS cannot be started.
     """
     plan = plan_of_session(shown.session)
-    set_up_ros(plan.ros)
     following = Following(server, shown, changed, tolerance, joints=joints)
     with Stop() as stop:
         try:

@@ -104,6 +104,11 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     from tfcompose.view.server import started, stop
 
     bag = _bag_view(session, arguments) if arguments.bag else None
+    if arguments.live:
+        from tfcompose.cli.live import set_up_ros
+        from tfcompose.cli.view_session import plan_of_session
+
+        set_up_ros(plan_of_session(session).ros)
     token = "" if arguments.host in _LOOPBACK else secrets.token_urlsafe(16)
     server = started(arguments.host, _free(arguments.host, arguments.port), session.robot.name, token)
     try:

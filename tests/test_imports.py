@@ -125,6 +125,8 @@ ONLY_IN: dict[str, set[str]] = {
     "regex": {"launcher"},
     "rich": {"cli"},
     "rclpy": {"ros"},
+    "zenoh": {"ros"},
+    "xxhash": {"ros"},
     "rosbags": {"bags"},
     "tf2_msgs": {"ros"},
     "geometry_msgs": {"ros"},

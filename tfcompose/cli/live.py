@@ -11,7 +11,7 @@ from tfcompose.cli.terminal import INTERRUPTED, UNREADABLE, fail, reject, warn
 from tfcompose.findings import Note, finding
 from tfcompose.plan import RosSettings
 from tfcompose.plan.topics import parts_of, topics_below
-from tfcompose.ros.environment import RosError, child_environment, ros_trouble
+from tfcompose.ros.environment import RosError, child_environment, reads_zenoh_alone, ros_trouble
 from tfcompose.signals import Stop
 from tfcompose.verdict.setup import elsewhere_help, settings_text
 
@@ -99,12 +99,18 @@ def observe(  # noqa: PLR0913 (all but two are named)
     Raises:
         SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
     """
-    set_up_ros(ros)
-    from tfcompose.live.listener import listen  # rclpy reads the environment when it is loaded
-
+    alone = set_up_ros(ros, zenoh_alone=True)
+    elsewhere: tuple[str, ...] = ()
     with Stop() as stop:
         try:
-            seconds, elsewhere = listen(name, observers, stop, duration_s=duration_s, every_s=every_s, show=show)
+            if alone:
+                from tfcompose.live.zenoh_listener import listen_on_zenoh
+
+                seconds = listen_on_zenoh(observers, stop, duration_s=duration_s, every_s=every_s, show=show)
+            else:
+                from tfcompose.live.listener import listen  # rclpy reads the environment when it is loaded
+
+                seconds, elsewhere = listen(name, observers, stop, duration_s=duration_s, every_s=every_s, show=show)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
         heard = any(observer.received_any for observer in observers.values())
@@ -114,16 +120,19 @@ def observe(  # noqa: PLR0913 (all but two are named)
         _reject_silence(list(observers), seconds, elsewhere)
 
 
-def set_up_ros(ros: RosSettings | None = None) -> None:
-    """Set this process up as the plan says.
+def set_up_ros(ros: RosSettings | None = None, *, zenoh_alone: bool = False) -> bool:
+    """Set this process up as the plan says; return whether TF is to be read from Zenoh alone, if that is enough.
 
     Raises:
         SystemExit: after saying why ROS cannot be started so.
     """
     os.environ.update(child_environment(os.environ, ros or RosSettings(), own=True))
+    if zenoh_alone and reads_zenoh_alone(os.environ):
+        return True
     trouble = ros_trouble(os.environ, ros)
     if trouble:
         reject([trouble])
+    return False
 
 
 def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) -> None:

@@ -24,12 +24,13 @@ from tfcompose.ipc import Clear, Complete
 from tfcompose.live.publishers import MessageReader, forget_oldest
 from tfcompose.live.topics import RunMarks, TFGraph, TFTopics
 from tfcompose.plan.codec import decode
+from tfcompose.plan.middleware import IMPLEMENTATIONS
 from tfcompose.plan.topics import GLOBAL, parts_of, private_topics
 from tfcompose.process import ready, say
 from tfcompose.ros.clock import ClockWatch, SimClock
 from tfcompose.ros.environment import PROFILE_VARIABLES
 from tfcompose.ros.graph import ids_say_who
-from tfcompose.ros.node import WaitSet, open_node
+from tfcompose.ros.node import WaitSet, middleware, open_node
 from tfcompose.ros.tf_codec import number_of_transforms
 from tfcompose.text import counted
 from tfcompose.variables import (
@@ -268,6 +269,8 @@ def guard(own: Own, stop: Stop) -> None:
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         if not ids_say_who(node):
             say("this rmw does not say with a message who sent it: findings name all who may have, where several may")
+            if middleware() == IMPLEMENTATIONS["zenoh"]:
+                say("pip install 'tfcompose[zenoh]' reads it from Zenoh's liveliness tokens")
         watches = _watches(own, node, plans, emit, left)
         judged = [watch.judge for watch in watches]
         switches = Switches(node, own.plan, emit) if judges else None

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.live.publishers import PARTICIPANT, OtherRun, Publisher, forget_oldest
 from tfcompose.live.state import NO_NODE
+from tfcompose.plan.middleware import IMPLEMENTATIONS
 from tfcompose.plan.topics import GLOBAL, is_fence
-from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
+from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, ids_say_who, own_gid, own_name, writers, writers_unmapped
 from tfcompose.ros.node import PublicTFReader, TFSubscription, middleware
 from tfcompose.ros.processes import began_at, environments, origin
 
@@ -260,13 +261,18 @@ class TFGraph:
         self, ask: Callable[[Node, str], list[Writer]], topics: Topics, *, fenced: bool | None = None
     ) -> list[Publisher]:
         moving, fixed = topics
-        own = self._own_gid()[:PARTICIPANT]
         return [
             self._publisher(one, topic, static=static, fenced=fenced)
             for static, topic in ((True, fixed), (False, moving))
             for one in ask(self._node, topic)
-            if one.gid[:PARTICIPANT] != own
+            if not self._is_own(one)
         ]
+
+    def _is_own(self, one: Writer) -> bool:
+        """Whether a publisher is of this process: by its id, or on Zenoh, whose ids are hashes, by its node's name."""
+        if middleware() == IMPLEMENTATIONS["zenoh"]:
+            return one.node == own_name(self._node)
+        return one.gid[:PARTICIPANT] == self._own_gid()[:PARTICIPANT]
 
     def _by_topic(self, topics: Topics, there: list[Publisher]) -> Iterator[Publisher]:
         """Yield what stands for all that send on a topic, as a message does not say which of them did."""

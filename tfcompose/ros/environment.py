@@ -76,6 +76,12 @@ def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) 
     return no_ros() or _domain(environment.get(DOMAIN, "")) or _middleware(named, ros) or _configuration(environment)
 
 
+def reads_zenoh_alone(environment: Mapping[str, str]) -> bool:
+    """Return whether TF on Zenoh has to be read, and can be, without ROS: by eclipse-zenoh, of the extra ``zenoh``."""
+    wanted = environment.get(RMW) == IMPLEMENTATIONS["zenoh"] and find_spec("zenoh") and find_spec("xxhash")
+    return bool(wanted) and (missing_ros() is not None or _middleware(IMPLEMENTATIONS["zenoh"], None) is not None)
+
+
 def other_middleware(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
     """Return a warning where the environment names another middleware than the plan: tools see no process then."""
     here, wanted = environment.get(RMW), IMPLEMENTATIONS[ros.rmw] if ros.rmw else None

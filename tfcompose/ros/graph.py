@@ -3,21 +3,25 @@
 rmw says a publisher's id twice: with each message, and in the graph, where its node's name stands. With rmw_fastrtps
 the two are equal. With rmw_cyclonedds that which comes with a message is a number of the receiving process's own
 (rmw_cyclonedds#446), and tells senders apart without saying who they are. What a publisher of one's own has in
-messages is what ``rmw_get_gid_for_publisher`` returns; by that every rmw can be asked which kind it is.
+messages is what ``rmw_get_gid_for_publisher`` returns; by that every rmw can be asked which kind it is. Where
+rmw_zenoh's graph does not have the ids of messages, its liveliness tokens have them, which eclipse-zenoh reads.
 """
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import time
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
+from tfcompose.plan.middleware import IMPLEMENTATIONS
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.processes import has_ended
 
@@ -26,6 +30,8 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
     from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+    from tfcompose.ros.zenoh_graph import RobotGraph
 
 #: What rmw says instead of a name while it does not know whose node a publisher is.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
@@ -37,6 +43,8 @@ ASKING = "/_tfcompose/who_am_i"
 SHOWN_WITHIN_S = 0.5
 
 _says_who: dict[str, bool] = {}
+#: Where rmw_zenoh's tokens are asked instead of rclpy, the one graph of them.
+_tokens: list[RobotGraph] = []
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +69,9 @@ def writers(node: Node, topic: str) -> list[Writer]:
 
     A relative ``topic`` is taken in the node's namespace, and the node's remappings are applied.
     """
+    if _tokens:
+        found = _tokens[0].publishers(node.resolve_topic_name(topic))
+        return [Writer(one.gid, one.node, one.durability, one.reliability, one.type) for one in found]
     return _sorted(node.get_publishers_info_by_topic(topic))
 
 
@@ -83,7 +94,7 @@ def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[Writer]:
 
 def volatile_readers(node: Node, topic: str) -> list[str]:
     """Return the names of other nodes that listen to the topic and do not ask for what was sent before they came."""
-    own = _own_name(node)
+    own = own_name(node)
     infos = node.get_subscriptions_info_by_topic(topic)
     volatile = [info for info in infos if info.qos_profile.durability == DurabilityPolicy.VOLATILE]
     return sorted({_full_name(info.node_namespace, info.node_name) for info in volatile} - {own, UNKNOWN_NODE})
@@ -138,11 +149,12 @@ def is_offered(node: Node, service: str) -> bool:
     if not node.count_services(service):
         return False
     found = node.get_subscriptions_info_by_topic(f"rq{service}Request", no_mangle=True)  # its name in DDS
-    own = next((one.gid for one in writers(node, "/parameter_events") if one.node == _own_name(node)), b"")
+    own = next((one.gid for one in writers(node, "/parameter_events") if one.node == own_name(node)), b"")
     return not found or not all(has_ended(bytes(one.endpoint_gid[:16]), own) for one in found)
 
 
-def _own_name(node: Node) -> str:
+def own_name(node: Node) -> str:
+    """Return the node's own full name."""
     return _full_name(node.get_namespace(), node.get_name())
 
 
@@ -162,7 +174,7 @@ def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
 
     ``topic`` is a full name; the node's own ends are left out.
     """
-    own = _own_name(node)
+    own = own_name(node)
     infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
     infos += [(info, False) for info in node.get_subscriptions_info_by_topic(topic)]
     named = [(_full_name(info.node_namespace, info.node_name), info.topic_type, sends) for info, sends in infos]
@@ -171,7 +183,7 @@ def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
 
 def nodes(node: Node) -> list[str]:
     """Return the full names of the other nodes that ``node`` has discovered until now, sorted."""
-    own = _own_name(node)
+    own = own_name(node)
     names = {_full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()}
     return sorted(names - {own, UNKNOWN_NODE})
 
@@ -197,8 +209,22 @@ def ids_say_who(node: Node) -> bool:
     if rmw.startswith("rmw_fastrtps"):
         return True
     if rmw not in _says_who:
-        _says_who[rmw] = _ask(node)
+        _says_who[rmw] = _ask(node) or _by_tokens(rmw)
     return _says_who[rmw]
+
+
+def _by_tokens(rmw: str) -> bool:
+    """Ask liveliness tokens from now on, if the rmw is Zenoh's, eclipse-zenoh is installed, and there is a router."""
+    if rmw != IMPLEMENTATIONS["zenoh"] or find_spec("zenoh") is None or find_spec("xxhash") is None:
+        return False
+    from tfcompose.ros.zenoh_graph import RobotGraph  # noqa: PLC0415 (what only robots on Zenoh need)
+
+    try:
+        _tokens.append(RobotGraph())
+    except RosError:
+        return False
+    atexit.register(_tokens[0].close)
+    return True
 
 
 def gid_of(publisher: Any) -> bytes:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.command_parser import Command, command_parser
+from tfcompose.cli.documentation import TOPICS
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
@@ -29,6 +30,10 @@ def candidates(commands: Mapping[str, Command], words: Sequence[str], at: int) -
         return _beginning(word, [*commands, "--help", "--version"])
     if before[0] not in commands:
         return []
+    if before == ["help"]:
+        from tfcompose.language.reference import keys, paths
+
+        return _beginning(word, [*TOPICS, *commands, *(paths() if "." in word else keys())])
     actions = command_parser(before[0], commands[before[0]])._actions  # noqa: SLF001 (argparse has no other way)
     options = {text: action for action in actions for text in action.option_strings}
     valued = options.get(before[-1])

@@ -72,6 +72,12 @@ def key_page(path: str) -> str | None:
     return "\n".join(lines).rstrip() + "\n" if lines else None
 
 
+def paths() -> list[str]:
+    """Return where each key of a robot file is, such as ``sensors.place``, without the names between."""
+    found = walk(LANGUAGES["robot"])
+    return [".".join(step for step in (*at, name) if step != "*") for at, kind in found for name in fields_of(kind)]
+
+
 def keys() -> list[str]:
     """Return the names of all keys of a robot file, and the kinds of its sections."""
     kinds = dict.fromkeys(kind for _, kind in walk(LANGUAGES["robot"]))

@@ -130,7 +130,8 @@ Edges that come and go, such as those of tags, are allowed under guard: allow.""
 
 The process has several nodes, or nodes whose edges are known, and none of them publishes this edge; or it is a launch
 file, and none of its nodes is named. The guard would report whoever does. Name another owner, or declare which node
-publishes it: node: NAME, or publishes: [{parent, child, off}].""",
+publishes it: node: NAME, or publishes: [{parent, child, off}]; off is the parameter with the value that stops it, such
+as {publish_tf: false}, or none.""",
     "TF333": """A node's parameter contradicts the tree.
 
 tfcompose sets the names of frames, and what a node publishes, from the tree and its owners. Remove the parameter, or

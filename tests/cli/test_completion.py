@@ -27,7 +27,7 @@ CASES = {
     "explain rover.yaml ma": {"map"},
     "presets realsense/d45": {"realsense/d455", "realsense/d456", "realsense/d457"},
     "export sy": {"systemd"},
-    "help back": {"background"},
+    "help backg": {"background"},
     "help sensors.pl": {"sensors.place"},
     "help docto": {"doctor"},
     "down --robot ": set(),

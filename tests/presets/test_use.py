@@ -263,7 +263,7 @@ def test_what_needs_an_unknown_pose_is_refused_and_says_what_would_give_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     placed = compiled("realsense/d457", place="s_color_optical_frame", xyz=[0, 0, 1]).errors
-    expect(placed[0], "TF404", "s_color_frame", "sensors.s.frames.s_color_frame")
+    expect(placed[0], "TF404", "s_color_frame", "frames: {s_color_frame: {xyz:")
     file = tmp_path / "r.yaml"
     file.write_text(f"{HEAD}sensors: {{s: {{preset: realsense/d457, parent: base_link, xyz: [1, 0, 0]}}}}\n")
     assert main(["pose", str(file), "base_link", "s_depth_optical_frame"]) == 0

@@ -61,14 +61,13 @@ class _Work:
         at = edge.owner_at or edge.at
         if owner.name in self.known and owner.kind != "simulate":
             message = f"{owner.name} is not known to publish {edge.name}"
-            advice = (
-                f"processes: {{{owner.name}: {{publishes: [{{parent: {edge.parent}, child: {edge.child}, off: …}}]}}}}"
-            )
+            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
+            advice = f"if it does, add {entry} to {owner.name}; off can name the parameter that stops it"
             self.found.append(finding("TF332", message, at, help=advice))
         elif len(owner.nodes) > 1:
-            message = f"{owner.name} has {len(owner.nodes)} nodes, and none is said to publish {edge.name}"
-            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: …}}]"
-            advice = f"write at the node that does: {entry}"
+            message = f"{owner.name} has {len(owner.nodes)} nodes, and none is known to publish {edge.name}"
+            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
+            advice = f"add to the node that does: {entry}"
             self.found.append(finding("TF332", message, at, help=advice))
         return edge
 

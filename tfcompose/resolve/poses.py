@@ -223,7 +223,7 @@ class Solver:
                 raise _UnsolvableError(None)  # TF605 says so
             if not edge.pose_known:
                 message = f"only {edge.owner} knows where {edge.child} is, so the pose cannot be solved"
-                advice = f"give this unit's values: sensors.{edge.sensor}.frames.{edge.child}"
+                advice = _values_of(edge)
                 raise _UnsolvableError(finding("TF404", message, at, help=advice))
             pose = self._edge(index).pose @ pose
         return pose
@@ -246,7 +246,7 @@ class Solver:
         if nominal and draft.at not in self.broken:
             edge = nominal[-1]
             message = f"{place} is placed through {edge.name}, which {edge.owner} publishes with its unit's own values"
-            advice = f"give this unit's values: sensors.{draft.edge.sensor}.frames.{edge.child}"
+            advice = _values_of(edge)
             self.found.append(finding("TF405", message, at, help=advice))
         return pose
 
@@ -255,3 +255,8 @@ def _circle(drafts: list[Draft]) -> Finding:
     names = ", ".join(draft.edge.name for draft in drafts)
     at = next((at for draft in drafts if (at := draft.relative_at or draft.place_at)), drafts[0].edge.at)
     return finding("TF404", f"these poses are given relative to each other: {names}", at)
+
+
+def _values_of(edge: Edge) -> str:
+    """Return the help where the values of a unit's own frame are missing."""
+    return f"write this unit's values at the sensor: frames: {{{edge.child}: {{xyz: […], rpy: […]}}}}"

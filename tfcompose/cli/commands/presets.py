@@ -28,7 +28,7 @@ def arguments(parser: ArgumentParser) -> None:
         "name",
         nargs="?",
         metavar="NAME",
-        help="a preset; or a vendor, package, kind or part of a name to list only those",
+        help="a preset; or a vendor, package, kind, part of a name or a word of what it is, to list only those",
     )
     parser.add_argument(
         "--preset-path", action="append", default=[], metavar="DIR", help="search this folder first; repeatable"
@@ -79,7 +79,8 @@ def _list(only: str | None, known: Library, form: str) -> int:
     words = sorted({word for row in rows for word in _words(row)})
     wanted = {only, *_KINDS.get(only or "", ())}
     exact = [row for row in rows if not only or not wanted.isdisjoint(_words(row))]
-    rows = exact or [row for row in rows if only and any(only.lower() in word for word in _words(row))]
+    partly = [row for row in rows if only and any(only.lower() in word for word in _words(row))]
+    rows = exact or partly or [row for row in rows if only and only.lower() in row["about"].lower()]
     if not rows:
         warn(f"no preset, vendor or kind {only}; {did_you_mean(only or '', words, 'tfcompose presets lists them')}")
         return 1
@@ -112,7 +113,14 @@ def _about(row: dict[str, str]) -> str:
 
 
 #: What kinds of sensors are called together.
-_KINDS = {"camera": ("rgbd", "stereo"), "lidar": ("lidar2d", "lidar3d"), "depth": ("rgbd", "stereo")}
+_KINDS = {
+    "camera": ("rgbd", "stereo"),
+    "lidar": ("lidar2d", "lidar3d"),
+    "depth": ("rgbd", "stereo"),
+    "scanner": ("lidar2d",),
+    "gps": ("gnss",),
+    "sonar": ("ultrasonic",),
+}
 
 
 def _words(row: dict[str, str]) -> tuple[str, ...]:

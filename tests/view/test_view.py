@@ -399,8 +399,8 @@ def test_a_running_tree_takes_neither_edit_nor_html(rover: Path, option: tuple[s
 
 def test_without_ros_nothing_is_served_live(rover: Path) -> None:
     done = tfcompose_in(rover.parent, "view", rover.name, "--live", "--port", "0", RMW_IMPLEMENTATION="rmw_of_nobody")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "[TF901]" in done.stderr
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "[TF909]" in done.stderr
 
 
 @for_each([(["--at", "3"],), (["--at", "0"],), (["--html", "r.html", "--edit"],), (["--tolerance", "2mm"],)])

@@ -6,7 +6,8 @@ import pytest
 
 from tests.support.bags import START_S, UP, write_bag
 from tests.support.bringups import compiled
-from tests.support.tree_history import END_NS, TreeHistory, sound_tree
+from tests.support.importing import PRESETS
+from tests.support.tree_history import BEGUN_NS, END_NS, TreeHistory, sound_tree
 from tfcompose.cli import main
 from tfcompose.importing.draft import Draft
 from tfcompose.importing.observed import Observed, round_rate, started_by
@@ -26,15 +27,37 @@ def test_edges_have_their_values_rates_and_owners(tmp_path: Path) -> None:
     assert data["frames"] == {
         "odom": {},
         "base_link": {"parent": "odom", "owner": "drive", "rate": "50 Hz"},
-        "laser": {"parent": "base_link", "owner": "static_2", "static": True},
+        "laser": {"parent": "base_link"},
     }
-    assert data["processes"] == {
-        "drive": {"external": True}, "static_2": {"external": True, "node": "/static"},
-    }  # fmt: skip
+    assert data["processes"] == {"drive": {"external": True}}, "static is tfcompose's own"
     assert "package: drive, executable: driver, args: [" in draft.text()
     result = compiled(draft.text(), tmp_path)
     assert result.robot
     assert not result.errors
+
+
+UPRIGHT, OPTICAL = (0.0, 0.0, 0.0, 1.0), (-0.5, 0.5, -0.5, 0.5)
+#: The frames of a camera of the D400 series, with their parents, positions, rotations and senders.
+CAMERA = {
+    "cam_bottom_screw_frame": ("base_link", (0.3, 0.0, 0.2), UPRIGHT, b"s"),
+    "cam_link": ("cam_bottom_screw_frame", (0.0106, 0.0175, 0.0125), UPRIGHT, b"s"),
+    "cam_depth_frame": ("cam_link", (0.0, 0.0, 0.0), UPRIGHT, b"e"),
+    "cam_depth_optical_frame": ("cam_depth_frame", (0.0, 0.0, 0.0), OPTICAL, b"e"),
+    "cam_color_frame": ("cam_link", (-0.0002, 0.0148, 0.0001), UPRIGHT, b"e"),
+    "cam_color_optical_frame": ("cam_color_frame", (0.0, 0.0, 0.0), OPTICAL, b"e"),
+}
+
+
+def test_which_model_a_calibrated_camera_is_stays_a_question_where_several_fit() -> None:
+    history = TreeHistory().knows(b"s", b"e")
+    for child, (parent, xyz, quat_xyzw, gid) in CAMERA.items():
+        history.takes((parent, child, 0, 0, *xyz, *quat_xyzw), gid, BEGUN_NS, static=True)
+    draft = Draft("rover")
+    observed = Observed(draft, lambda _: "", lambda _: ())
+    observed.add(history.observer.edges(END_NS))
+    observed.recognise(PRESETS)
+    assert any("realsense/d435i" in note for note in draft.notes["frames", "cam_bottom_screw_frame"])
+    assert "cam_color_frame" in draft.sections["frames"]
 
 
 def test_a_second_publisher_is_named() -> None:

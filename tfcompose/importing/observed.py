@@ -8,18 +8,29 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.findings import Span
 from tfcompose.importing.draft import pose_keys
+from tfcompose.importing.programs import STATE_PUBLISHER
+from tfcompose.importing.robot_file import sensor_keys
+from tfcompose.importing.sensors import recognised
 from tfcompose.importing.yaml_text import Bare, flow
+from tfcompose.model import Edge, Robot
 from tfcompose.numbers import number
+from tfcompose.resolve.presets import DRIVER, TFCOMPOSE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from tfcompose.geometry import Pose
     from tfcompose.importing.draft import Draft
+    from tfcompose.importing.sensors import Recognised
     from tfcompose.live.edges import EdgeState
+    from tfcompose.resolve import Library
 
 #: The process that owns moving edges whose publisher nobody knows, as in a bag.
 RECORDED = "recorded"
+#: The process of tfcompose's own that publishes fixed edges.
+STATIC = "static"
 #: A rate is taken for a rounder one that is so near.
 _NEAR = 0.03
 _PID = re.compile(r"as pid (\d+)")
@@ -31,13 +42,15 @@ class Observed:
     """What becomes of one observation.
 
     ``where`` gives, by a publisher's id, on which machine and as which process it runs; ``words_of`` the command line
-    of a process of this machine, empty where that cannot be had.
+    of a process of this machine, empty where that cannot be had. ``namespace`` is that of the robot, without slashes.
     """
 
     draft: Draft
     where: Callable[[bytes | None], str]
     words_of: Callable[[int], Sequence[str]]
+    namespace: str = ""
     _owners: dict[str, str] = field(default_factory=dict)
+    _poses: dict[str, Pose] = field(default_factory=dict)
 
     def add(self, edges: Iterable[EdgeState]) -> None:
         """Add the edges, parents before children, and their owners."""
@@ -54,7 +67,9 @@ class Observed:
                 self.draft.todo(f"{publisher} publishes {edge.name} as well", None, at)
             return
         frames[edge.child] = {}  # its place is kept while its owner is named
-        owner = self._owner(edge)
+        if stream.static:
+            self._poses[edge.child] = stream.pose
+        owner = None if stream.static and self._is_own(edge) else self._owner(edge)
         keys: dict[str, Any] = {"parent": edge.parent}
         if stream.static:
             keys |= pose_keys(stream.pose, quaternion=True)
@@ -64,6 +79,64 @@ class Observed:
             rate = round_rate(edge.timing.rate)
             keys |= {"rate": Bare(f"{number(rate)} Hz")} if rate else {}
         frames[edge.child] = keys
+
+    def _is_own(self, edge: EdgeState) -> bool:
+        """Return whether tfcompose's publisher of fixed edges sends the edge, or a stock node in its place."""
+        below = f"/{self.namespace}/" if self.namespace else "/"
+        return len(edge.nodes) == 1 and edge.nodes[0] in {below + STATIC, below + STATE_PUBLISHER}
+
+    def recognise(self, library: Library) -> None:
+        """Put sensors in the place of the fixed frames that a preset has, if at most one driver publishes these."""
+        frames = self.draft.sections["frames"]
+        for publisher in (DRIVER, TFCOMPOSE):
+            sensors, undecided = recognised(self._fixed(), library, publisher)
+            for sensor in sensors:
+                owners = {edge.child: frames[edge.child].get("owner") for edge in sensor.inside}
+                drivers = {owner for child, owner in owners.items() if child in sensor.sent} or {None}
+                others = {owner for child, owner in owners.items() if child not in sensor.sent} or {None}
+                if others == {None} and len(drivers) == 1 and (drivers == {None}) is (publisher == TFCOMPOSE):
+                    self._sensor(sensor, drivers.pop() or "")
+            for mount, note in undecided.items():
+                if mount in frames:
+                    self.draft.note(("frames", mount), note)
+
+    def _fixed(self) -> Robot:
+        """Return the fixed frames that are in the draft as a robot."""
+        at, frames = Span(""), self.draft.sections["frames"]
+        edges = tuple(
+            Edge(parent=keys["parent"], child=child, kind="static", owner="", pose=self._poses[child], at=at)
+            for child, keys in frames.items() if child in self._poses
+        )  # fmt: skip
+        return Robot("", "", dict.fromkeys((edge.child for edge in edges), at), edges, {}, (), None)
+
+    def _sensor(self, sensor: Recognised, driver: str) -> None:
+        """Put a sensor in the place of its frames; ``driver`` is the process that publishes those inside of it."""
+        frames, mount = self.draft.sections["frames"], sensor.mount.child
+        taken = sensor.name in self.draft.sections["processes"]
+        new = self._renamed(sensor.name) if taken else ""
+        own = {key: value for key, value in frames[mount].items() if key in {"owner", "static"}}
+        pose = pose_keys(sensor.mount.pose, quaternion=True)
+        keys = sensor_keys(sensor, pose, {}, new if driver == sensor.name else driver) | own
+        self.draft.sections["sensors"][sensor.name] = keys
+        for edge in sensor.edges:
+            self.draft.note(("sensors", sensor.name), *self.draft.notes.pop(("frames", edge.child), ()))
+            del frames[edge.child]
+            self.draft.brought.add(edge.child)
+
+    def _renamed(self, name: str) -> str:
+        """Give a process another name, which a sensor has: its driver is often called as it is."""
+        sections, at = self.draft.sections, ("processes", name)
+        node = next(node for node, process in self._owners.items() if process == name)
+        new = self.draft.free_name(f"{name}_driver")
+        sections["processes"] = {
+            (new if one == name else one): keys | ({"node": node} if one == name else {})
+            for one, keys in sections["processes"].items()
+        }
+        self.draft.notes["processes", new] = self.draft.notes.pop(at, [])
+        for keys in (*sections["frames"].values(), *sections["sensors"].values()):
+            keys |= {key: new for key in ("owner", "driver") if keys.get(key) == name}
+        self._owners[node] = new
+        return new
 
     def _owner(self, edge: EdgeState) -> str | None:
         """Return the process of an edge's publisher, or None where its node is not known."""

@@ -174,28 +174,11 @@ class _Writer:
         return {"parent": edge.parent, **self.values.pose(edge.pose), **_joint_name(edge)}
 
     def _sensor(self, sensor: Recognised) -> dict[str, Any]:
-        frames: dict[str, Any] = {}
-        mount = sensor.mount.child
-        if mount in sensor.names:
-            frames[sensor.names[mount]] = {"name": mount}
-        for edge in sensor.inside:
-            values: dict[str, Any] = {"name": edge.child} if edge.child in sensor.names else {}
-            if edge.child in sensor.own_xyz:
-                values["xyz"] = list(edge.pose.xyz)
-            if edge.child in sensor.own_rotation:
-                quat_xyzw = edge.pose.quat_xyzw
-                values["rpy"] = rotation(quat_xyzw, self.imported.rpy.get(quat_xyzw)) or [0, 0, 0]
-            values |= _joint_name(edge)
-            if values:
-                frames[sensor.names.get(edge.child, edge.child)] = values
         for edge in sensor.edges:
             self._note("sensors", sensor.name, *self.notes.pop(("joints", edge.joint_name), ()))
             if not self._has_body(edge.child):
                 self._note("sensors", sensor.name, *self.notes.pop(("links", edge.child), ()))
-        keys: dict[str, Any] = {"preset": sensor.preset, "parent": sensor.mount.parent}
-        keys |= self.values.pose(sensor.mount.pose) | _joint_name(sensor.mount)
-        keys |= {"options": sensor.options} if sensor.options else {}
-        return keys | ({"driver": "none"} if sensor.driven else {}) | ({"frames": frames} if frames else {})
+        return sensor_keys(sensor, self.values.pose(sensor.mount.pose), self.imported.rpy)
 
     def _processes(self) -> dict[str, Any]:
         free = [edge.joint_name for edge in self.robot.edges if edge.free]
@@ -204,6 +187,34 @@ class _Writer:
         several = ", ".join(free)
         self._note("processes", MOVER, f"the source does not say which process publishes {several}: name it here")
         return {MOVER: {"external": True}}
+
+
+def sensor_keys(
+    sensor: Recognised, pose: Mapping[str, Any], rpy: Mapping[Quaternion, Vector], driver: str = ""
+) -> dict[str, Any]:
+    """Return the keys of a sensor; ``pose`` are those of its mount, ``rpy`` the angles of rotations in the source.
+
+    ``driver`` is the process that publishes the frames inside of it, empty where tfcompose does.
+    """
+    frames: dict[str, Any] = {}
+    mount = sensor.mount.child
+    if mount in sensor.names:
+        frames[sensor.names[mount]] = {"name": mount}
+    for edge in sensor.inside:
+        values: dict[str, Any] = {"name": edge.child} if edge.child in sensor.names else {}
+        if edge.child in sensor.own_xyz:
+            values["xyz"] = list(edge.pose.xyz)
+        if edge.child in sensor.own_rotation:
+            quat_xyzw = edge.pose.quat_xyzw
+            values["rpy"] = rotation(quat_xyzw, rpy.get(quat_xyzw)) or [0, 0, 0]
+        values |= _joint_name(edge)
+        if values:
+            frames[sensor.names.get(edge.child, edge.child)] = values
+    keys: dict[str, Any] = {"preset": sensor.preset, "parent": sensor.mount.parent}
+    keys |= {**pose, **_joint_name(sensor.mount)}
+    keys |= {"options": sensor.options} if sensor.options else {}
+    without = {"driver": "none"} if sensor.driven else {}
+    return keys | ({"tf": "driver", "driver": driver} if driver else without) | ({"frames": frames} if frames else {})
 
 
 def _joint_name(edge: Edge) -> dict[str, str]:

@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from tfcompose.findings import RejectedError
 from tfcompose.geometry import Pose, angle_between
+from tfcompose.language.pose import ROTATIONS
 from tfcompose.language.preset import SensorKind
 from tfcompose.resolve.poses import rotation_of
-from tfcompose.resolve.presets import TFCOMPOSE, filled, holds
+from tfcompose.resolve.presets import DRIVER, TFCOMPOSE, filled, holds
 from tfcompose.text import listed
 
 if TYPE_CHECKING:
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 NEAR, NEAR_RAD = 1e-6, 2e-3
 #: As near as it must be to be left to the preset.
 EQUAL = 1e-13
+#: As far as a nominal frame of a device that was calibrated may be from it, where the driver publishes it.
+CALIBRATED, CALIBRATED_RAD = 0.02, 0.06
 #: Every camera has frames that are turned as optical ones are: that alone names no vendor.
 GENERIC = "generic"
 _MOST_CHOICES = 256
@@ -47,7 +50,8 @@ class Recognised:
 
     ``own_xyz`` and ``own_rotation`` are those of its frames whose position, or rotation, is not the preset's to the
     last digit. ``body`` is the frame on which the preset has a body, empty without one; ``driven`` tells whether the
-    preset starts a driver. ``names`` are those that frames have in the preset, where these are others.
+    preset starts a driver, which can publish the frames ``sent``. ``names`` are those that frames have in the preset,
+    where these are others.
     """
 
     name: str
@@ -60,6 +64,7 @@ class Recognised:
     body: str = ""
     driven: bool = False
     names: dict[str, str] = field(default_factory=dict)
+    sent: frozenset[str] = frozenset()
 
     @property
     def edges(self) -> tuple[Edge, ...]:
@@ -94,9 +99,12 @@ class _Match:
     tells: bool
 
 
-def recognised(robot: Robot, library: Library) -> tuple[list[Recognised], dict[str, str]]:
-    """Return the sensors of the robot, and for each mount where none could be decided on a note with the reason."""
-    search = _Search(robot, library)
+def recognised(robot: Robot, library: Library, publisher: str = TFCOMPOSE) -> tuple[list[Recognised], dict[str, str]]:
+    """Return the sensors of the robot, and for each mount where none could be decided on a note with the reason.
+
+    ``publisher`` says whether frames are looked for as tfcompose publishes them, or as drivers do.
+    """
+    search = _Search(robot, library, publisher)
     fits = sorted(search.fits(), key=lambda fit: fit.quality, reverse=True)
     taken: set[str] = set()
     sensors: list[Recognised] = []
@@ -151,6 +159,7 @@ def _words(*texts: str) -> frozenset[str]:
 class _Search:
     robot: Robot
     library: Library
+    publisher: str = TFCOMPOSE
     edges: dict[str, Edge] = field(default_factory=dict)
     _children: dict[str, list[Edge]] = field(default_factory=dict)
     _words_at: dict[str, frozenset[str]] = field(default_factory=dict)
@@ -262,7 +271,12 @@ class _Search:
         own_mount = filled(preset.mount, sensor, preset.words)
         for options in _options(preset):
             every = dict(choices) | options
-            wanted = {key: frame for key, frame in preset.frames.items() if holds(frame.when, every, TFCOMPOSE)}
+            wanted = {
+                key: self._as_sent(frame) for key, frame in preset.frames.items()
+                if holds(frame.when, every, self.publisher)
+            }  # fmt: skip
+            if self.publisher == DRIVER and not any(frame.driver for frame in wanted.values()):
+                continue
             names = {own_mount: mount.child} if has_own_names else {}
             found = self._matched(preset, sensor, wanted, names, has_own_names=has_own_names)
             inside = found.values()
@@ -282,9 +296,19 @@ class _Search:
                     names.get(body, body),
                     preset.driver is not None,
                     {there: own for own, there in names.items() if there != own},
+                    frozenset(match.edge.child for key, match in found.items() if wanted[key].driver),
                 ),
                 len(every) - len(given),
             )
+
+    def _as_sent(self, frame: PresetFrame) -> PresetFrame:
+        """Return the frame as its publisher sends it: a driver may have another parent or pose for it."""
+        if self.publisher != DRIVER or frame.by_driver is None:
+            return frame
+        own = frame.by_driver
+        turned = {key: getattr(own, key) for key in ROTATIONS} if rotation_of(own) is not None else {}
+        at = {"xyz": own.xyz} if own.xyz is not None else {}
+        return frame.model_copy(update={"parent": own.parent, **at, **turned})
 
     def _matched(
         self, preset: PresetSpec, sensor: str, wanted: Mapping[str, PresetFrame], names: dict[str, str],
@@ -302,7 +326,7 @@ class _Search:
                 if has_own_names:
                     edges = self._by_likeness(own, names.get(parent, parent), set(names.values()))
                 edges = [edge for edge in edges if edge.parent == names.get(parent, parent)]
-                match = next((match for edge in edges if (match := _match(preset, edge, key, frame))), None)
+                match = next((match for edge in edges if (match := self._match(preset, edge, key, frame))), None)
                 if match is None:
                     return {}
                 found[key] = match
@@ -313,6 +337,20 @@ class _Search:
         """Return the edges from a parent, those to frames of the most similar names first."""
         edges = [edge for edge in self._children.get(parent, ()) if edge.child not in taken]
         return sorted(edges, key=lambda edge: -difflib.SequenceMatcher(None, name, edge.child).ratio())
+
+    def _match(self, preset: PresetSpec, edge: Edge, pattern: str, frame: PresetFrame) -> _Match | None:
+        """Return the edge as that of a preset's frame, or None where it is another one."""
+        rotation = rotation_of(frame, pattern)
+        unknown = frame.xyz is None and rotation is None
+        nominal = Pose(frame.xyz or edge.pose.xyz, rotation or (edge.pose if unknown else Pose()).quat_xyzw)
+        far, twist = math.dist(nominal.xyz, edge.pose.xyz), angle_between(nominal.quat_xyzw, edge.pose.quat_xyzw)
+        is_calibrated = self.publisher == DRIVER and frame.nominal
+        most, most_rad = (CALIBRATED, CALIBRATED_RAD) if is_calibrated else (NEAR, NEAR_RAD)
+        if far > most or twist > most_rad:
+            return None
+        rotates = rotation is not None and rotation != Pose().quat_xyzw
+        tells = (frame.xyz is not None and any(frame.xyz)) or (preset.vendor == GENERIC and rotates)
+        return _Match(edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, tells)
 
 
 #: What names no model: a kind of sensor.
@@ -337,19 +375,6 @@ def _family(preset: str) -> str:
 
 def _vendor(preset: str) -> str:
     return _naming(preset.partition("/")[0], preset)
-
-
-def _match(preset: PresetSpec, edge: Edge, pattern: str, frame: PresetFrame) -> _Match | None:
-    """Return the edge as that of a preset's frame, or None where it is another one."""
-    rotation = rotation_of(frame, pattern)
-    unknown = frame.xyz is None and rotation is None
-    nominal = Pose(frame.xyz or edge.pose.xyz, rotation or (edge.pose if unknown else Pose()).quat_xyzw)
-    far, twist = math.dist(nominal.xyz, edge.pose.xyz), angle_between(nominal.quat_xyzw, edge.pose.quat_xyzw)
-    if far > NEAR or twist > NEAR_RAD:
-        return None
-    rotates = rotation is not None and rotation != Pose().quat_xyzw
-    tells = (frame.xyz is not None and any(frame.xyz)) or (preset.vendor == GENERIC and rotates)
-    return _Match(edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, tells)
 
 
 def _choices(preset: PresetSpec) -> Iterator[dict[str, str]]:

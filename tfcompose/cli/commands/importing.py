@@ -160,6 +160,7 @@ def _add_kits(draft: Draft, first: Source, arguments: Namespace) -> None:
 
 def _import_observed(arguments: Namespace) -> int:
     """Import what is published, or was recorded."""
+    from tfcompose.cli.compiling import library
     from tfcompose.cli.live import observe, read_bag
     from tfcompose.importing.draft import Draft, robot_name
     from tfcompose.importing.observed import Observed
@@ -179,7 +180,10 @@ def _import_observed(arguments: Namespace) -> int:
     draft = Draft(arguments.robot or robot_name(name), [head])
     if arguments.namespace:
         draft.sections["ros"] |= {"namespace": arguments.namespace, "isolate": "topics"}
-    Observed(draft, observer.publishers.where, words_of).add(observer.edges(observer.until_ns))
+    observed = Observed(draft, observer.publishers.where, words_of, arguments.namespace)
+    observed.add(observer.edges(observer.until_ns))
+    if not arguments.no_sensors:
+        observed.recognise(library())
     return _finish(draft, arguments)
 
 

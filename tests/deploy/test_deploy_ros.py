@@ -220,6 +220,39 @@ def test_of_two_at_once_the_second_says_who_holds_the_hosts(computers: Computers
     assert (first.returncode, current(computers)) == (1, before)
 
 
+def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+
+    def on_all(*words: str) -> subprocess.CompletedProcess[str]:
+        command = computers.in_office(sys.executable, "-m", "tfcompose", *words, "--all-hosts")
+        return processes.run(command, env=computers.environment(), cwd=computers.folder / "robot", check=False)
+
+    listed = on_all("ps", "--format", "json")
+    robots = json.loads(listed.stdout)
+    assert [(robot["host"], robot["ready"]) for robot in robots] == [(name, True) for name in NAMES], listed
+    tables = re.findall(r"^rover\.(\w+)@0: tree complete", on_all("ps").stdout, re.MULTILINE)
+    assert tuple(tables) == NAMES
+    logs = on_all("logs", "rear_drive", "guard").stdout.splitlines()
+    assert {line.partition("|")[0].strip() for line in logs if "rear_drive" in line} == {"rear"}
+    assert {line.partition("|")[0].strip() for line in logs if "guard" in line} == set(NAMES)
+    unknown = on_all("logs", "nobody")
+    assert (unknown.returncode, unknown.stderr.count("no log of nobody")) == (1, 3), unknown
+    following = processes.start(
+        computers.in_office(sys.executable, "-m", "tfcompose", "events", "--all-hosts", "--format", "json"),
+        env=computers.environment(), cwd=computers.folder / "robot", stdout=subprocess.PIPE,
+    )  # fmt: skip
+    down = on_all("down")
+    assert (down.returncode, sorted(line.partition(" |")[0].strip() for line in down.stdout.splitlines())) == (
+        0,
+        sorted(NAMES),
+    ), down
+    output, _ = following.communicate(timeout=TIMEOUT_S)
+    ended = {event["host"] for event in map(json.loads, output.splitlines()) if event["event"] == "Ended"}
+    assert (following.returncode, ended) == (0, set(NAMES))
+    assert on_all("ps").returncode == 1
+    assert deploy(computers, ROBOT).returncode == 0, "what is down is started again"
+
+
 def test_one_host_alone_is_deployed_to_and_waited_for(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)

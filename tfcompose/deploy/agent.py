@@ -73,7 +73,6 @@ class Agent:
         self.unit: str = settings["unit"]
         self.python: str = settings["python"]
         self.setup: list[str] = settings["setup"]
-        self.system: bool = settings["system"]
         self.gone = gone
         self.lock: int | None = None
         self.trial: dict[str, Any] | None = None
@@ -82,13 +81,15 @@ class Agent:
         runtime = Path(f"/run/user/{os.getuid()}")
         if "XDG_RUNTIME_DIR" not in os.environ and runtime.is_dir():
             os.environ["XDG_RUNTIME_DIR"] = str(runtime)
-        home = Path.home()
-        data = Path("/var/lib") if self.system else home / ".local/share"
-        self.base = data / "tfcompose" / self.name
-        self.units = Path("/etc/systemd/system") if self.system else home / ".config/systemd/user"
-        self.runtime = Path("/run/systemd/system")
-        if not self.system:
-            self.runtime = Path(os.environ.get("XDG_RUNTIME_DIR", runtime)) / "systemd/user"
+        self._be_of(system=settings["system"])
+
+    def _be_of(self, *, system: bool) -> None:
+        """Take the folders of the system's units, or of the user's."""
+        self.system = system
+        home, runtime = Path.home(), Path(os.environ.get("XDG_RUNTIME_DIR", "/run"))
+        self.base = (Path("/var/lib") if system else home / ".local/share") / "tfcompose" / self.name
+        self.units = Path("/etc/systemd/system") if system else home / ".config/systemd/user"
+        self.runtime = Path("/run/systemd/system") if system else runtime / "systemd/user"
 
     # What is asked before anything changes.
 
@@ -306,7 +307,9 @@ class Agent:
     # Everything else.
 
     def execute(self, words: list[str]) -> None:
-        """Become tfcompose with these words."""
+        """Become tfcompose with these words, where the robot runs: under the user's systemd, or the system's."""
+        system = Path("/etc/systemd/system", self.unit).is_file() and not (self.units / self.unit).is_file()
+        self._be_of(system=self.system or system)
         command = self._command([self._python_of(self.base / "current"), "-m", "tfcompose", *words])
         os.execvpe(command[0], command, self._environment())  # noqa: S606 (no shell: these are words)
 

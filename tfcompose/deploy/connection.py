@@ -36,13 +36,19 @@ _LONGEST = 64 * 1024 * 1024
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the agent is told first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name."""
+    """What the agent is given first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name."""
 
     name: str
     unit: str
     python: str = "python3"
     setup: tuple[str, ...] = ()
     system: bool = False
+
+
+def settings_of(robot: str, name: str, host: PlanHost, *, system: bool = False) -> Settings:
+    """Return what the agent of a robot's host is given first."""
+    share = f"{robot}.{name}"
+    return Settings(share, f"tfcompose-{share}.service", host.python or "python3", host.setup, system)
 
 
 class LostError(Exception):

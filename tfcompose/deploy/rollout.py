@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.deploy.agent import UNIT
-from tfcompose.deploy.connection import Host, LostError, RefusedError, Settings, connected
+from tfcompose.deploy.connection import Host, LostError, RefusedError, connected, settings_of
 from tfcompose.deploy.unit import Unit
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.plan.hosts import hosts_of, share_of, without_computer
@@ -472,9 +472,3 @@ async def reached(target: Target, has_wheels: bool, report: Callable[[str], None
         yield rollout
     finally:
         await asyncio.gather(*(host.close() for host in hosts), return_exceptions=True)
-
-
-def settings_of(robot: str, name: str, host: PlanHost, *, system: bool) -> Settings:
-    """Return what the agent of a host is told."""
-    share = f"{robot}.{name}"
-    return Settings(share, f"tfcompose-{share}.service", host.python or "python3", host.setup, system)

@@ -55,11 +55,14 @@ def run(arguments: Namespace) -> int:
     from importlib.util import find_spec
 
     from tfcompose.cli.compiling import compiled_without_errors
+    from tfcompose.cli.plans import in_folder, is_plan
     from tfcompose.emit.plan import plan_of
     from tfcompose.findings import RejectedError
 
     if find_spec("asyncssh") is None:
         fail("deploy needs the package asyncssh: pip install 'tfcompose[deploy]'", UNREADABLE)
+    if is_plan(in_folder(arguments.file)):
+        fail(f"{arguments.file} is built, and deploy builds: name the robot file", UNREADABLE)
     wheels = Path(arguments.wheels) if arguments.wheels else None
     if wheels and not any(wheels.glob("*.whl")):
         fail(f"there is no wheel in {wheels}", UNREADABLE)

@@ -1,0 +1,132 @@
+"""``--all-hosts``: a command on every host of a robot, by ssh, and what it prints there, as one."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from argparse import Namespace
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli.options import DEFAULT_FILE
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, printable
+from tfcompose.plan.hosts import hosts_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from tfcompose.deploy.connection import Host
+    from tfcompose.plan import Plan
+
+
+def run_on_all_hosts(arguments: Namespace, command: str, *words: str, processes: Sequence[str] = ()) -> int:
+    """Run the command with these words on every host, and print what it prints there; return the worst exit code.
+
+    With ``processes`` it is about these, and goes only to hosts that run any of them. Lines have their host before
+    them. Objects of ``--format json`` have it as a key; ``ps`` gives one list.
+
+    Raises:
+        SystemExit: after saying why there are no hosts.
+    """
+    if find_spec("asyncssh") is None:
+        fail("--all-hosts needs the package asyncssh: pip install 'tfcompose[deploy]'", UNREADABLE)
+    if arguments.robot is not None:
+        fail("--all-hosts takes the robot of --file: leave out --robot", UNREADABLE)
+    plan = _plan(arguments.file or DEFAULT_FILE)
+    printer = _Printer(command, is_json=getattr(arguments, "format", "text") == "json")
+    shares = {name: _of_host(plan, name, processes) for name in plan.hosts if name in hosts_of(plan)}
+    commands = {
+        name: [command, "--robot", f"{plan.robot}.{name}", *words, *(["--", *own] if own else [])]
+        for name, own in shares.items()
+        if own or not processes
+    }
+    return asyncio.run(_run(plan, commands, printer))
+
+
+def _of_host(plan: Plan, host: str, processes: Sequence[str]) -> list[str]:
+    """Return those of the processes that a host may know; it knows what is unknown here, and says so."""
+    elsewhere = {process.name for process in plan.processes if process.host not in (None, host)}
+    return [name for name in processes if name not in elsewhere]
+
+
+def _plan(file: str) -> Plan:
+    from tfcompose.cli.plans import expected_plan
+    from tfcompose.cli.terminal import reject
+    from tfcompose.deploy.rollout import target_of
+    from tfcompose.findings import RejectedError
+
+    plan, _ = expected_plan(file, Namespace(profiles=[], overlays=[], settings=[], given={}))
+    try:
+        target_of(plan, [], {})
+    except RejectedError as error:
+        reject(error.findings)
+    return plan
+
+
+async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _Printer) -> int:
+    printer.width = max(map(len, commands))
+    codes = await asyncio.gather(*(_run_on(plan, name, words, printer) for name, words in commands.items()))
+    printer.end(list(commands))
+    return max(codes)
+
+
+async def _run_on(plan: Plan, name: str, words: list[str], printer: _Printer) -> int:
+    from tfcompose.deploy.connection import Host, connected, settings_of
+
+    host = plan.hosts[name]
+    there = await connected(name, host, settings_of(plan.robot, name, host), None)
+    if not isinstance(there, Host):
+        print_findings([there], sys.stderr)
+        return FAILED
+    try:
+        return await _printed(there, words, printer)
+    finally:
+        await there.close()
+
+
+async def _printed(host: Host, words: list[str], printer: _Printer) -> int:
+    process = await host.execute(words)
+
+    async def errors() -> None:
+        while line := await process.stderr.readline():
+            sys.stderr.write(f"{host.name}: {printable(line.decode(errors='replace').rstrip())}\n")
+
+    complaining = asyncio.create_task(errors())
+    while line := await process.stdout.readline():
+        printer.take(host.name, line.decode(errors="replace").rstrip("\n"))
+    await complaining
+    await process.wait_closed()
+    return process.exit_status if process.exit_status is not None else FAILED
+
+
+class _Printer:
+    """What hosts print, as lines; a robot's table is printed at the end, in one piece."""
+
+    def __init__(self, command: str, *, is_json: bool) -> None:
+        self.width = 0
+        self._is_table = command == "ps"
+        self._is_json = is_json
+        self._kept: dict[str, list[str]] = {}
+
+    def take(self, host: str, line: str) -> None:
+        """Print a line, or keep it."""
+        if self._is_table:
+            self._kept.setdefault(host, []).append(line)
+        elif self._is_json:
+            self._put(json.dumps({"host": host} | json.loads(line), ensure_ascii=False))
+        else:
+            self._put(f"{host.ljust(self.width)} | {printable(line)}")
+
+    def end(self, hosts: list[str]) -> None:
+        """Print what was kept, host by host."""
+        lines = [self._kept.get(host, []) for host in hosts]
+        if self._is_table and self._is_json:
+            robots: list[Any] = [robot for some in lines if some for robot in json.loads("\n".join(some))]
+            self._put(json.dumps(robots, indent=1))
+        elif any(lines):
+            self._put("\n".join(printable(line) for some in lines for line in some))
+
+    def _put(self, text: str) -> None:
+        sys.stdout.write(f"{text}\n")
+        sys.stdout.flush()

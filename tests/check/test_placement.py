@@ -10,9 +10,12 @@ import pytest
 
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
+from tfcompose.rays import fixed_to
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
+    from tfcompose.geometry import Pose
+    from tfcompose.model import Robot
 
 HEAD = "tfcompose: 1\nrobot: r\nbase: base_link\n"
 CIRCLE = "optics: {scan: {horizontal: 360 deg, near: 0.05, far: 10}}"
@@ -74,6 +77,22 @@ def test_scanners_dazzle_each_other_where_one_plane_meets_the_others_window(
     for name, pose in (("left", "[0, 1, 0]"), ("right", f"[0, -1, {height_cm} cm]")):
         text += f"  {name}: {{preset: generic/lidar2d, parent: base_link, xyz: {pose}, {CIRCLE}}}\n"
     assert bool(found(text, "TF645")) == is_found
+
+
+def test_the_tree_is_walked_for_each_scanner_and_not_for_each_pair(monkeypatch: pytest.MonkeyPatch) -> None:
+    count = 8
+    text = "frames: {base_link: {}}\nsensors:\n"
+    for number in range(count):
+        text += f"  l{number}: {{preset: generic/lidar2d, parent: base_link, xyz: [0, {number}, 0], {CIRCLE}}}\n"
+    walked: list[str] = []
+
+    def walk(robot: Robot, frame: str) -> dict[str, Pose]:
+        walked.append(frame)
+        return fixed_to(robot, frame)
+
+    monkeypatch.setattr("tfcompose.check.placement.fixed_to", walk)
+    assert found(text, "TF645")
+    assert len(walked) == count
 
 
 def test_the_body_of_the_other_sensor_shields_nobody_from_it() -> None:

@@ -2,15 +2,17 @@
 
 import math
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tests.support.texts import reader
-from tfcompose.cli.compiling import library
+from tfcompose.cli.compiling import disk, library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.findings import Span
 from tfcompose.geometry import Pose, angle_between
@@ -350,6 +352,23 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     outside = compile_robot(head + mast + robot % "", "r.yaml", library(), read=lambda _: text).found
     assert [(one.code, one.severity) for one in outside] == [("TF615", "warning")]
     assert not compiled(robot % "", c_yaml=autoware()).found
+
+
+@pytest.mark.parametrize(("length_m", "found"), [(3.0, set()), (1.0, {"TF615"})])
+@pytest.mark.parametrize("kind", ["capsule", "mesh"])
+def test_a_calibration_is_outside_of_what_a_capsule_or_a_mesh_fills(
+    tmp_path: Path, kind: str, length_m: float, found: set[str]
+) -> None:
+    """The middle of a rod is 1 m up; the lens is 65 cm below the origin, off a short rod, and the way back is on it."""
+    rod = f"capsule: {{radius: 0.1, length: {length_m - 0.2}}}"
+    if kind == "mesh":
+        trimesh.creation.capsule(radius=100, height=1000 * length_m - 200).export(tmp_path / "rod.stl")
+        rod = "mesh: {uri: rod.stl, scale: 0.001}"
+    robot = HEAD.replace("visual: {box: [2, 2, 2]}", f"visual: {{{rod}, xyz: [0, 0, 1]}}")
+    robot += "frames: {lens: {parent: base_link, calibration: c.yaml}}\n"
+    text = "base_link: {lens: {x: 0, y: 0, z: -0.65, roll: 0, pitch: 0, yaw: 0}}\n"
+    done = compile_robot(robot, str(tmp_path / "r.yaml"), library(), read=lambda _: text, disk=disk())
+    assert {one.code for one in done.found} == found
 
 
 def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> None:

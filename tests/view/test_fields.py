@@ -13,7 +13,7 @@ from tfcompose.geometry import Pose
 from tfcompose.model import Robot
 from tfcompose.rays import contains, directions, is_plane
 from tfcompose.view.fields import FieldsOfView, outline, rims, streams, surface
-from tfcompose.view.session import poses_in_roots
+from tfcompose.view.kinematics import poses_in_roots
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 CONE = "{range: {horizontal: 60 deg, vertical: 20 deg, near: 0.1, far: 0.4}}"

@@ -27,11 +27,12 @@ from tfcompose.compile import Compiled, compile_robot
 from tfcompose.geometry import Pose, offset_of, quat_from_rpy
 from tfcompose.plan.file import read_plan
 from tfcompose.urdf.packages import Packages
+from tfcompose.view.kinematics import poses_in_roots
 from tfcompose.view.panel import Panel
 from tfcompose.view.plan_robot import robot_of_plan
 from tfcompose.view.scene import RobotScene, colours_of
 from tfcompose.view.server import started, stop
-from tfcompose.view.session import Session, poses_in_roots
+from tfcompose.view.session import Session
 from tfcompose.view.shapes import MOST_TRIANGLES
 
 ROVER = Path(__file__).parents[2] / "robots" / "field_rover.yaml"

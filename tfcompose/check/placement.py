@@ -15,7 +15,7 @@ from tfcompose.geometry import Pose, rotate
 from tfcompose.rays import bodies_around, cast, contains, different_streams, fixed_to, is_plane, view_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.geometry import Vector
     from tfcompose.model import MountedSensor, Optics, Robot, Zone
@@ -245,12 +245,14 @@ def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
     """
     limit = _limit(robot, "TF645")
     active = [(one, stream) for one in robot.sensors for stream in one.optics if stream.active and _is_light(stream)]
+    poses = {stream.frame: fixed_to(robot, stream.frame) for _, stream in active} if len(active) > 1 else {}
     reported = set()
     for (one, of_one), (other, of_other) in itertools.combinations(active, 2):
         if one is other or of_one.kind != of_other.kind or (one.name, other.name) in reported:
             continue
-        far = _distance_in_sight(robot, one, of_one, of_other, other)
-        if far is not None and far <= limit and _distance_in_sight(robot, other, of_other, of_one, one) is not None:
+        far = _distance_in_sight(robot, (one, of_one), (other, of_other), poses[of_one.frame])
+        back = _distance_in_sight(robot, (other, of_other), (one, of_one), poses[of_other.frame]) if far else None
+        if far is not None and far <= limit and back is not None:
             reported.add((one.name, other.name))
             message = f"{one.name} and {other.name} look into each other, {far:.2g} m apart; the limit is {limit:g} m"
             notes = [Note(f"{one.name} is defined here", one.at)]
@@ -267,10 +269,16 @@ _WINDOW_M = 0.03
 
 
 def _distance_in_sight(
-    robot: Robot, sensor: MountedSensor, optics: Optics, other: Optics, of_other: MountedSensor
+    robot: Robot,
+    viewer: tuple[MountedSensor, Optics],
+    viewed: tuple[MountedSensor, Optics],
+    poses: Mapping[str, Pose],
 ) -> float | None:
-    """Return how far the other stream's origin is, if the stream looks at it and nothing is between; else None."""
-    poses = fixed_to(robot, optics.frame)
+    """Return how far the viewed stream's origin is, if the viewer looks at it and nothing is between; else None.
+
+    ``poses`` are those of frames in the viewer's frame.
+    """
+    (sensor, optics), (of_other, other) = viewer, viewed
     pose = poses.get(other.frame)
     far = math.dist(pose.xyz, (0.0, 0.0, 0.0)) if pose else 0.0
     if pose is None or far < _WINDOW_M:

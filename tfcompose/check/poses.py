@@ -9,13 +9,13 @@ from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, finding
 from tfcompose.geometry import Pose, norm, rotate
 from tfcompose.model import is_optical
-from tfcompose.rays import fixed_to
+from tfcompose.rays import fixed_to, sphere_around
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.geometry import Vector
-    from tfcompose.model import Edge, Robot, Shape
+    from tfcompose.model import Edge, Link, Robot
 
 
 #: Degrees that people write. Read as radians, all but 5 are more than a full turn, which nobody means.
@@ -190,14 +190,14 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
     the unit: ``250 mm``. The limit is three times the size of the robot's bodies or typical mounts, and at least 5 m.
     Values with a unit are not reported.
     """
-    sizes = [max(shape.size) for link in robot.links.values() for shape in (*link.visuals, *link.collisions)]
+    sizes = {link.name: _sizes(link) for link in robot.links.values()}
     for link in robot.links.values():
-        largest = max((max(shape.size) for shape in (*link.visuals, *link.collisions)), default=0.0)
+        largest = max(sizes[link.name], default=0.0)
         if largest > _LARGEST_M:
             message = f"the body of {link.name} is {largest:g} m long"
             meant = f"{largest / 1000:g}" if robot.is_foreign(link.at) else f"{largest:g} mm"
             yield finding("TF414", message, link.at, help=f"if millimetres are meant, write {meant}")
-    body = max((size for size in sizes if size <= _LARGEST_M), default=0.0)
+    body = max((size for one in sizes.values() for size in one if size <= _LARGEST_M), default=0.0)
     below = placed(robot, moving=True)
     mounts = [norm(edge.pose.xyz) for edge in robot.edges if edge.given and edge.child in below and any(edge.pose.xyz)]
     limit = min(
@@ -219,6 +219,11 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
             meant = f"{number / 1000:g}" if robot.is_foreign(at) else f"{number:g} mm"
             advice = f"a bare number is in metres; if millimetres are meant, write {meant}"
             yield finding("TF414", message, at, help=advice)
+
+
+def _sizes(link: Link) -> list[float]:
+    """Return the largest size of each shape of the link but meshes, of which the file has only a scale."""
+    return [max(shape.size) for shape in (*link.visuals, *link.collisions) if shape.kind != "mesh"]
 
 
 #: The least and the greatest x, y, z.
@@ -273,32 +278,26 @@ def are_mirrored(one: Edge, other: Edge) -> bool:
 
 
 def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None:
-    """Return the least and greatest x, y, z in ``frame`` of the bodies that are fixed to it, or None without any.
+    """Return the least and greatest x, y, z in ``frame`` of the bodies that are fixed to it.
 
-    Each shape counts with the sphere around it. ``without`` names a sensor whose bodies do not count.
+    Each shape counts with the sphere around it. ``without`` names a sensor whose bodies do not count. None: there are
+    no bodies, or one of them is a mesh that cannot be read.
     """
     inside = {edge.child for edge in robot.edges if edge.sensor == without} if without else set()
-    spheres = [
-        (pose @ shape.pose, _radius(shape))
-        for name, pose in fixed_to(robot, frame, only_static=True).items()
-        if name in robot.links and name not in inside
-        for shape in (*robot.links[name].visuals, *robot.links[name].collisions)
-    ]
-    if not spheres:
-        return None
-    least = [min(pose.xyz[axis] - radius for pose, radius in spheres) for axis in range(3)]
-    most = [max(pose.xyz[axis] + radius for pose, radius in spheres) for axis in range(3)]
-    return least, most
+    least, most = [math.inf] * 3, [-math.inf] * 3
+    for name, pose in fixed_to(robot, frame, only_static=True).items():
+        if name not in robot.links or name in inside:
+            continue
+        for shape in (*robot.links[name].visuals, *robot.links[name].collisions):
+            sphere = sphere_around(shape)
+            if sphere is None:
+                return None
+            middle = (pose @ shape.pose @ Pose(sphere[0])).xyz
+            least = [min(low, value - sphere[1]) for low, value in zip(least, middle, strict=True)]
+            most = [max(high, value + sphere[1]) for high, value in zip(most, middle, strict=True)]
+    return (least, most) if least[0] < math.inf else None
 
 
 def is_near(box: Box, xyz: Vector) -> bool:
     """Return whether the point is in the box, or within reach of it."""
     return all(low - _REACH_M <= value <= high + _REACH_M for low, value, high in zip(box[0], xyz, box[1], strict=True))
-
-
-def _radius(shape: Shape) -> float:
-    if shape.kind == "sphere":
-        return shape.size[0]
-    if shape.kind == "cylinder":
-        return math.hypot(shape.size[0], shape.size[1] / 2)
-    return math.hypot(*shape.size) / 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -55,6 +56,20 @@ class Shape:
     pose: Pose
     material: Material | None = None
     mesh: Asset | None = None
+
+    @property
+    def radius(self) -> float:
+        """The radius of the sphere around the shape, in metres; endless for a mesh, whose extent its file knows."""
+        match self.kind:
+            case "sphere":
+                return self.size[0]
+            case "cylinder":
+                return math.hypot(self.size[0], self.size[1] / 2)
+            case "capsule":
+                return self.size[0] + self.size[1] / 2
+            case "mesh":
+                return math.inf
+        return math.hypot(*self.size) / 2
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ Pure functions of a ``Robot``; boxes, cylinders, spheres and capsules need no li
 is installed. Must not import ``language``, ``load``, ``resolve``, ``check``.
 """
 
-from tfcompose.rays.bodies import Body, bodies_around, fixed_to
+from tfcompose.rays.bodies import Body, bodies_around, fixed_to, sphere_around
 from tfcompose.rays.cast import Ray, View, cast, view_of
 from tfcompose.rays.directions import contains, different_streams, directions, is_plane
 
@@ -19,5 +19,6 @@ __all__ = [
     "directions",
     "fixed_to",
     "is_plane",
+    "sphere_around",
     "view_of",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from tfcompose.geometry import Pose
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from tfcompose.geometry import Vector
     from tfcompose.model import MountedSensor, Robot, Shape
 
 
@@ -21,21 +21,6 @@ class Body:
     link: str
     shape: Shape
     pose: Pose
-
-    @property
-    def radius(self) -> float:
-        """The radius of the sphere around the shape; endless for a mesh, whose extent its file knows."""
-        size = self.shape.size
-        match self.shape.kind:
-            case "sphere":
-                return size[0]
-            case "cylinder":
-                return math.hypot(size[0], size[1] / 2)
-            case "capsule":
-                return size[0] + size[1] / 2
-            case "mesh":
-                return math.inf
-        return math.hypot(*size) / 2
 
 
 def fixed_to(robot: Robot, frame: str, *, only_static: bool = False) -> dict[str, Pose]:
@@ -61,6 +46,22 @@ def fixed_to(robot: Robot, frame: str, *, only_static: bool = False) -> dict[str
                 poses[there] = poses[here] @ pose
                 waiting.append(there)
     return poses
+
+
+def sphere_around(shape: Shape) -> tuple[Vector, float] | None:
+    """Return the middle, in the shape's frame, and the radius of a sphere around the shape, in metres.
+
+    None: a mesh that cannot be read, because trimesh is not installed or the file is no mesh.
+    """
+    if shape.kind != "mesh":
+        return (0.0, 0.0, 0.0), shape.radius
+    x, y, z = shape.size
+    try:
+        from tfcompose.rays import meshes  # noqa: PLC0415 (numpy and trimesh: 0.3 s that most robots need not wait for)
+
+        return meshes.sphere_around(shape.mesh.path if shape.mesh else "", (x, y, z))
+    except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
+        return None
 
 
 def bodies_around(robot: Robot, sensor: MountedSensor, poses: Mapping[str, Pose]) -> Iterator[Body]:

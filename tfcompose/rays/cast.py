@@ -77,7 +77,7 @@ def cast(sensor: str, optics: Optics, into: Sequence[Vector], bodies: Sequence[B
     inside: dict[str, float] = {}
     left_out: dict[str, None] = {}
     for body in bodies:
-        if math.dist(body.pose.xyz, (0, 0, 0)) - body.radius > reach:
+        if math.dist(body.pose.xyz, (0, 0, 0)) - body.shape.radius > reach:
             continue
         depth, hits = _read_hits(body, into)
         if depth is None:
@@ -118,7 +118,7 @@ def _read_hits(body: Body, into: Sequence[Vector]) -> tuple[float | None, Hits]:
 
 def _hits(body: Body, to_shape: Pose, into: Sequence[Vector]) -> Hits:
     """Return the rays that hit a primitive, and where."""
-    (x, y, z), radius = body.pose.xyz, body.radius
+    (x, y, z), radius = body.pose.xyz, body.shape.radius
     miss = x * x + y * y + z * z - radius * radius
     hits = []
     for index, direction in enumerate(into):

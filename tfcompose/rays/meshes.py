@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,17 @@ def distances(path: str, scale: Vector, origin: Vector, directions: Sequence[Vec
     if len(where):
         np.minimum.at(found, rays, np.linalg.norm(where - origins[rays], axis=1))
     return [float(one) for one in found]
+
+
+def sphere_around(path: str, scale: Vector) -> tuple[Vector, float]:
+    """Return the middle of the mesh's box, in the mesh's frame, and the radius of the sphere around that box.
+
+    Raises:
+        Exception: whatever a reader raises for a file that is no mesh.
+    """
+    least, most = (tuple(map(float, corner)) for corner in _read(path, scale).bounds)
+    x, y, z = ((low + high) / 2 for low, high in zip(least, most, strict=True))
+    return (x, y, z), math.dist(least, most) / 2
 
 
 def depth_in(path: str, scale: Vector, point: Vector) -> float:

@@ -18,6 +18,7 @@ from tfcompose.load import load
 from tfcompose.model import JOINTS, STATIC, is_optical
 from tfcompose.numbers import number
 from tfcompose.units import UnitError, quantity
+from tfcompose.view.kinematics import poses_in_roots
 from tfcompose.view.rotations import FORMS
 from tfcompose.view.yaml_text import Keys, text_at, with_value
 
@@ -119,17 +120,10 @@ def mount_of(robot: Robot, source: Source, child: str) -> Mount:
     base = base if isinstance(base, str) else edge.parent
     if base not in robot.frames or place not in robot.frames:
         raise ImmovableError(f"the pose of {child} is given by frames that are not there")
-    in_parent = _pose_in_root(robot, edge.parent).inverse() @ _pose_in_root(robot, base)
-    in_child = _pose_in_root(robot, child).inverse() @ _pose_in_root(robot, place)
-    return Mount(edge, edge.entry, data, place, base, in_parent, in_child)
-
-
-def _pose_in_root(robot: Robot, frame: str) -> Pose:
-    pose, passed = Pose(), set[str]()
-    while (edge := robot.parent_edge(frame)) is not None and frame not in passed:
-        passed.add(frame)
-        pose, frame = edge.pose @ pose, edge.parent
-    return pose
+    poses = poses_in_roots(robot, {})
+    parent_from_base = poses[edge.parent].inverse() @ poses[base]
+    child_from_place = poses[child].inverse() @ poses[place]
+    return Mount(edge, edge.entry, data, place, base, parent_from_base, child_from_place)
 
 
 def change_of(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from tfcompose.text import listed
-from tfcompose.view.session import joint_positions
+from tfcompose.view.kinematics import joint_positions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

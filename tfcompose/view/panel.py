@@ -14,8 +14,8 @@ from tfcompose.numbers import clean_rpy
 from tfcompose.provenance import values_of
 from tfcompose.view.edit import ImmovableError
 from tfcompose.view.fields import REACH_M
+from tfcompose.view.kinematics import poses_in_roots
 from tfcompose.view.scene import RobotScene, wxyz
-from tfcompose.view.session import poses_in_roots
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

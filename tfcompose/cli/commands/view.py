@@ -146,9 +146,9 @@ def _bag_view(session: Session, arguments: Namespace) -> BagView:
 def _write(session: Session, path: Path) -> None:
     """Write the scene as one file; ends where it cannot be written."""
     from tfcompose.cli.writing import replace_file
+    from tfcompose.view.kinematics import poses_in_roots
     from tfcompose.view.scene import RobotScene
     from tfcompose.view.server import started, stop
-    from tfcompose.view.session import poses_in_roots
 
     robot, poses = session.robot, poses_in_roots(session.robot, {})
     server = started(_HOST, 0, robot.name)

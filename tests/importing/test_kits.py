@@ -47,6 +47,56 @@ def test_calibrations_of_autoware_are_frames(tmp_path: Path, capsys: pytest.Capt
     assert places(printed_errors(capsys), "TF020") == ["sensor_kit_calibration.yaml:9"]
 
 
+def individual_params(folder: Path, **kits: dict[str, str]) -> Path:
+    """Write a package of individual parameters: by vehicle, the kits with their calibrations below the kit's base."""
+    for vehicle, several in kits.items():
+        for kit, text in several.items():
+            inner = folder / "individual_params/config" / vehicle / kit
+            inner.mkdir(parents=True)
+            (inner / "sensors_calibration.yaml").write_text(SENSORS, encoding="utf-8")
+            (inner / "sensor_kit_calibration.yaml").write_text(text, encoding="utf-8")
+    return folder / "individual_params"
+
+
+WITHOUT_GNSS = KIT.partition("  gnss_link")[0]
+
+
+def test_the_vehicle_chooses_among_autowares_individual_parameters(tmp_path: Path) -> None:
+    moved = WITHOUT_GNSS.replace("x: 0.10731", "x: 0.2")
+    source = individual_params(tmp_path, default={"kit": KIT.replace(", spare: 1", "")}, lexus={"kit": moved})
+    text, data = import_of(source)
+    assert data["args"] == {"vehicle_id": {"type": "string", "default": "default", "choices": ["default", "lexus"]}}
+    assert data["frames"]["gnss_link"]["when"] == "${args.vehicle_id == 'default'}"
+    for vehicle, x in (("default", 0.10731), ("lexus", 0.2)):
+        robot = compiled(text, tmp_path, vehicle_id=vehicle).robot
+        assert robot
+        poses = {edge.child: edge.pose.xyz[0] for edge in robot.edges}
+        assert poses["camera0/camera_link"] == x
+        assert ("gnss_link" in poses) is (vehicle == "default")
+    text, data = import_of(source, "vehicle_id:=lexus")
+    assert data["args"]["vehicle_id"]["default"] == "lexus"
+
+
+def test_a_single_vehicle_is_no_argument_and_one_of_several_kits_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = individual_params(tmp_path, default={"a": KIT, "b": KIT})
+    for words in ((), ("sensor_model:=c",), ("sensor_model:=a", "vehicle_id:=lexus"), ("other:=a",)):
+        assert exit_code("import", str(source), *words) in {1, 2}, words
+    assert "sensor_model:=a|b" in printed_errors(capsys)
+    _, data = import_of(source, "sensor_model:=b")
+    assert "args" not in data
+    assert data["frames"]["gnss_link"]["calibration"].endswith("config/default/b/sensor_kit_calibration.yaml")
+    assert exit_code("import", str(tmp_path / "individual_params/config/default/a")) == 1
+
+
+def exit_code(*words: str) -> object:
+    try:
+        return main(list(words))
+    except SystemExit as stopped:
+        return stopped.code
+
+
 XACRO = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">'
 BASE = '<link name="base_link"/><link name="top"/><joint name="t" type="fixed"><parent link="base_link"/>'
 JOINT = '<joint name="${name}_joint" type="fixed"><xacro:insert_block name="origin"/><parent link="${parent_link}"/>'

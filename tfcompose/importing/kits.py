@@ -13,11 +13,17 @@ from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.importing.draft import pose_keys
 from tfcompose.importing.programs import where
+from tfcompose.importing.yaml_text import Expression, argument
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping
+    from pathlib import Path
+
+    from tfcompose.files import Target
     from tfcompose.geometry import Vector
     from tfcompose.importing.draft import Draft
-    from tfcompose.load import Path, Source
+    from tfcompose.load import Path as Steps
+    from tfcompose.load import Source
 
 _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Of Clearpath's mounts those that are in a folder of their own.
@@ -53,7 +59,7 @@ def add_autoware(draft: Draft, source: Source) -> None:
     draft.note(("", ""), f"{source.file}: calibration: FILE at a frame reads its pose from the file instead")
     for parent, children in source.data.items():
         for child, values in children.items():
-            path: Path = (parent, child)
+            path: Steps = (parent, child)
             at = source.at_key(path)
             numbers = [values.get(axis, 0.0) for axis in _AXES]
             if not all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers):
@@ -66,6 +72,74 @@ def add_autoware(draft: Draft, source: Source) -> None:
             left = sorted(values.keys() - set(_AXES))
             if left:
                 draft.todo(f"{child}: {', '.join(left)}", at, ("frames", str(child)))
+
+
+#: In a package of individual parameters: config/VEHICLE/KIT/….
+_CALIBRATIONS = ("sensors_calibration.yaml", "sensor_kit_calibration.yaml")
+
+
+def add_vehicles(
+    draft: Draft, folder: Path, target: Target, given: Mapping[str, str], read: Callable[[str], Source]
+) -> None:
+    """Add the calibrations of Autoware's individual parameters, in which each vehicle has a folder with its kits.
+
+    The vehicle stays an argument of the robot file where there are several. ``given`` may choose ``vehicle_id`` and
+    ``sensor_model``, as Autoware's launch files do.
+
+    Raises:
+        RejectedError: if the folder holds no calibrations, or it is not said of which kit they are to be.
+    """
+    config = folder / "config" if (folder / "config").is_dir() else folder
+    kits: dict[str, list[str]] = {}
+    for inner in sorted(config.glob("*/*")):
+        if any((inner / name).is_file() for name in _CALIBRATIONS):
+            kits.setdefault(inner.name, []).append(inner.parent.name)
+    kit = _one_of(kits, given, "sensor_model", str(folder), "kit")
+    vehicles = kits[kit]
+    usual = "default" if "default" in vehicles else vehicles[0]
+    vehicle = _one_of(vehicles, {"vehicle_id": given.get("vehicle_id", usual)}, "vehicle_id", str(folder), "vehicle")
+    word = argument("vehicle_id", vehicle) if len(vehicles) > 1 else vehicle
+    if len(vehicles) > 1:
+        draft.sections["args"]["vehicle_id"] = {"type": "string", "default": vehicle, "choices": vehicles}
+    draft.note(("", ""), f"the calibrations of {kit}, which stay in their files")
+    for name in _CALIBRATIONS:
+        files = {one: config / one / kit / name for one in vehicles}
+        sources = {one: read(str(file)) for one, file in files.items() if file.is_file()}
+        path = f"{target.from_folder(str(config))}/{word}/{kit}/{name}"
+        for (parent, child), several in _calibrated(draft, sources).items():
+            keys: dict[str, Any] = {"calibration": path}
+            if len(several) < len(vehicles):
+                keys["when"] = Expression(" or ".join(f"args.vehicle_id == '{one}'" for one in several))
+            draft.frame(parent, child, keys, sources[several[0]].at_key((parent, child)))
+
+
+def _calibrated(draft: Draft, sources: Mapping[str, Source]) -> dict[tuple[str, str], list[str]]:
+    """Return the edges of calibrations, each with the vehicles that have it."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for vehicle, source in sources.items():
+        if not is_autoware(source):
+            draft.todo("no calibration of Autoware's", Span(source.file))
+            continue
+        for parent, children in source.data.items():
+            for child in children:
+                found.setdefault((str(parent), str(child)), []).append(vehicle)
+    return found
+
+
+def _one_of(known: Collection[str], given: Mapping[str, str], argument: str, folder: str, what: str) -> str:
+    """Return the name that is given, or the only one.
+
+    Raises:
+        RejectedError: if there are none, or several and none is given.
+    """
+    wanted = given.get(argument, next(iter(known)) if len(known) == 1 else "")
+    if wanted in known:
+        return wanted
+    if not known:
+        message = f"no {' or '.join(_CALIBRATIONS)} below config/VEHICLE/KIT"
+        raise RejectedError([finding("TF002", message, Span(folder))])
+    message = f"there is no {what} {wanted}" if wanted else f"several {what}s: {', '.join(known)}"
+    raise RejectedError([finding("TF002", message, Span(folder), help=f"{argument}:={'|'.join(known)}")])
 
 
 def _words(value: Any) -> Any:
@@ -108,7 +182,7 @@ class _Clearpath:
         found = self.data.get(section)
         return [kind for kind, several in found.items() if several] if isinstance(found, dict) else []
 
-    def _entries(self, section: str, kind: str) -> list[tuple[int, Path, dict[str, Any]]]:
+    def _entries(self, section: str, kind: str) -> list[tuple[int, Steps, dict[str, Any]]]:
         found = self.data.get(section)
         several = found.get(kind) if isinstance(found, dict) else None
         listed = several if isinstance(several, list) else []
@@ -144,7 +218,7 @@ class _Clearpath:
             self.draft.note(("parts", "platform"), where(at))
         attachments = given.get("attachments")
         for index, entry in enumerate(attachments if isinstance(attachments, list) else []):
-            path: Path = ("platform", "attachments", index)
+            path: Steps = ("platform", "attachments", index)
             if not isinstance(entry, dict):
                 continue
             of, _, kind = str(entry.get("type", "")).rpartition(".")
@@ -159,7 +233,7 @@ class _Clearpath:
     def _of_platform(self) -> str:
         return f"package://clearpath_platform_description/urdf/{self.platform}/{self.platform}.urdf.xacro"
 
-    def _part(self, name: str, file: str, macro: str, entry: dict[str, Any], path: Path) -> None:
+    def _part(self, name: str, file: str, macro: str, entry: dict[str, Any], path: Steps) -> None:
         """Add what the generator calls a macro for."""
         at = self.source.at(path)
         params: dict[str, Any] = {"name": name, "parent_link": entry.get("parent", "base_link")}
@@ -173,7 +247,7 @@ class _Clearpath:
         self.draft.sections["parts"][name] = keys
         self.draft.note(("parts", name), where(at))
 
-    def _origin(self, entry: dict[str, Any], path: Path) -> dict[str, Any]:
+    def _origin(self, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
         vectors: dict[str, Vector] = {}
         for key in ("xyz", "rpy"):
             value = entry.get(key, [0.0, 0.0, 0.0])
@@ -185,7 +259,7 @@ class _Clearpath:
             vectors[key] = (x, y, z)
         return pose_keys(Pose(vectors["xyz"], quat_from_rpy(*vectors["rpy"])), vectors["rpy"]) or {"xyz": [0, 0, 0]}
 
-    def _sensor(self, name: str, entry: dict[str, Any], path: Path) -> None:
+    def _sensor(self, name: str, entry: dict[str, Any], path: Steps) -> None:
         at, model = self.source.at(path), str(entry.get("model", ""))
         if entry.get("urdf_enabled") is False:
             self.draft.todo(f"{name}, {model}: urdf_enabled is false", at)

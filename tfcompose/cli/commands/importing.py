@@ -37,12 +37,16 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
         "file", nargs="?", metavar="FILE",
-        help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml or calibrations of Autoware's; "
-        "-: a script's lines or a launch file from stdin",
+        help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml, calibrations of Autoware's or the "
+        "folder of its individual_params; -: a script's lines or a launch file from stdin",
     )  # fmt: skip
     parser.add_argument("more", nargs="*", metavar="FILE", help="further calibrations")
     parser.add_argument(
-        "given", nargs="*", default=[], metavar="NAME:=VALUE", help="an argument of the xacro or launch file"
+        "given",
+        nargs="*",
+        default=[],
+        metavar="NAME:=VALUE",
+        help="an argument of the xacro or launch file; of individual_params, vehicle_id and sensor_model",
     )
     parser.add_argument("--live", action="store_true", help="import the running tree")
     add_bag(parser, "import a recording")
@@ -109,7 +113,9 @@ def _import_bringup(arguments: Namespace) -> int:
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
     draft = Draft(wanted, [f"imported from {name} by tfcompose"])
-    if kit := _kit(arguments.file):
+    if Path(arguments.file).is_dir():
+        _add_vehicles(draft, arguments)
+    elif kit := _kit(arguments.file):
         _add_kits(draft, kit, arguments)
     elif arguments.file.endswith(_LAUNCH):
         _add_launch(draft, arguments, arguments.file)
@@ -156,6 +162,18 @@ def _add_kits(draft: Draft, first: Source, arguments: Namespace) -> None:
         draft.sections["packages"][package] = target.from_folder(folder)
     for source in (first, *(load(read_text(file), file) for file in arguments.more)):
         add_kit(draft, source)
+
+
+def _add_vehicles(draft: Draft, arguments: Namespace) -> None:
+    from tfcompose.cli.reading import read_text
+    from tfcompose.importing.kits import add_vehicles
+    from tfcompose.load import load
+
+    _refuse_more(arguments)
+    for name in arguments.given.keys() - {"vehicle_id", "sensor_model"}:
+        fail(f"{name}:=…: a folder of Autoware's individual_params takes vehicle_id and sensor_model", UNREADABLE)
+    folder = Path(arguments.file)
+    add_vehicles(draft, folder, _target(arguments), arguments.given, lambda file: load(read_text(file), file))
 
 
 def _import_observed(arguments: Namespace) -> int:

@@ -474,6 +474,70 @@ def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_n
     assert set(places(printed_errors(capsys), "TF020")) == {f"a.launch.xml:{line}" for line in wanted}
 
 
+#: As in bringups of MoveIt, TurtleBot 4 and Nav2.
+BRINGUP = """
+import launch
+from launch import LaunchContext, LaunchDescription
+from launch.substitutions import Command, EnvironmentVariable, LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+from moveit_configs_utils import MoveItConfigsBuilder
+from nav2_common.launch import LaunchConfigAsBool
+
+def generate_launch_description():
+    simple = EnvironmentVariable("NO_SUCH_SETTING", default_value="1").perform(LaunchContext())
+    moveit = (MoveItConfigsBuilder("arm").robot_description(mappings={"ros2_control": "true"})
+              .trajectory_execution(file_path="config/controllers.yaml").planning_pipelines("ompl", ["ompl"])
+              .to_moveit_configs())
+    xacro = Command(["xacro ", PathJoinSubstitution([FindPackageShare("no_such_arm"), "arm.xacro"]), " a:=b"])
+    stop = Node(package="stop", executable="stop", parameters=[{"level": simple}])
+    return LaunchDescription([
+        launch.actions.DeclareLaunchArgument("loud", default_value="Yes"),
+        Node(package="robot_state_publisher", executable="robot_state_publisher",
+             parameters=[{"robot_description": ParameterValue(xacro, value_type=str)}],
+             remappings=[("/tf", "tf"), ("/tf_static", "tf_static")]),
+        Node(package="moveit_ros_move_group", executable="move_group", name="move_group", parameters=[
+            moveit.robot_description_kinematics, moveit.trajectory_execution, moveit.planning_pipelines,
+            moveit.planning_scene_monitor, moveit.joint_limits, {"loud": LaunchConfigAsBool("loud")}]),
+        Node(package="diagnostic_aggregator", executable="aggregator_node",
+             parameters=[PathJoinSubstitution([FindPackageShare("arm_moveit_config"), "config", "diagnostics.yaml"])]),
+        stop,
+        launch.actions.RegisterEventHandler(launch.event_handlers.OnProcessExit(
+            target_action=stop, on_exit=[launch.actions.EmitEvent(event=launch.events.Shutdown())])),
+    ])
+"""
+
+
+def test_bringups_of_moveit_and_turtlebots_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "arm_moveit_config/config"
+    config.mkdir(parents=True)
+    (config.parent / "package.xml").write_text("<package><name>arm_moveit_config</name></package>", encoding="utf-8")
+    for name, text in {
+        "controllers": "{moveit_manage_controllers: true, trajectory: {names: [a, b]}}",
+        "kinematics": "{arm: {kinematics_solver_timeout: 0.05}}", "joint_limits": "{default_scaling: 0.1}",
+        "ompl_planning": "{planner: ompl}", "diagnostics": "{analyzers: {ros__parameters: {path: Robot}}}",
+    }.items():  # fmt: skip
+        (config / f"{name}.yaml").write_text(text, encoding="utf-8")
+    _, data = import_of(source(tmp_path, "arm.launch.py", BRINGUP), code=None)
+    processes = data["processes"]
+    assert processes["move_group"]["params"] == {
+        "robot_description_kinematics.arm.kinematics_solver_timeout": 0.05, "moveit_manage_controllers": True,
+        "trajectory.names": ["a", "b"], "planning_pipelines": ["ompl"], "default_planning_pipeline": "ompl",
+        "ompl.planner": "ompl", "publish_planning_scene": True, "publish_geometry_updates": True,
+        "publish_state_updates": True, "publish_transforms_updates": True,
+        "robot_description_planning.default_scaling": 0.1, "loud": True,
+    }  # fmt: skip
+    assert processes["analyzers"]["run"] == {"package": "diagnostic_aggregator", "executable": "aggregator_node"}
+    assert (processes["stop"]["required"], processes["stop"]["params"]) == (True, {"level": "1"})
+    (part,) = data["parts"].values()
+    assert (part["xacro"], part["args"]) == ("package://no_such_arm/arm.xacro", {"a": "b"})
+    assert "ros" not in data
+    printed = printed_errors(capsys)
+    assert "event handler" not in printed
+    assert "remapped" not in printed
+
+
 ROS1 = """<launch>
   <arg name="height" default="0.1"/>
   <node pkg="tf" type="static_transform_publisher" name="a" args="0.2 0 $(arg height) 0 0 0 base_link laser 100"/>

@@ -27,9 +27,11 @@ def test_edges_have_their_values_rates_and_owners(tmp_path: Path) -> None:
     assert data["frames"] == {
         "odom": {},
         "base_link": {"parent": "odom", "owner": "drive", "rate": "50 Hz"},
-        "laser": {"parent": "base_link"},
+        "laser": {"parent": "base_link", "owner": "static_2", "static": True},
     }
-    assert data["processes"] == {"drive": {"external": True}}, "static is tfcompose's own"
+    assert data["processes"] == {
+        "drive": {"external": True}, "static_2": {"external": True, "node": "/static"},
+    }  # fmt: skip
     assert "package: drive, executable: driver, args: [" in draft.text()
     result = compiled(draft.text(), tmp_path)
     assert result.robot

@@ -75,7 +75,7 @@ class Draft:
             more = "" if same else f"; {_described(parent, keys)} here"
             self.todo(f"{child} is published a second time{more}", span, ("frames", child))
             return False
-        frames[child] = {"parent": parent, **keys}
+        frames[child] = {**({"parent": parent} if parent else {}), **keys}
         self.note(("frames", child), *notes)
         return True
 
@@ -174,8 +174,10 @@ def robot_name(wanted: str) -> str:
 def text_with_findings(draft: Draft, lint: Callable[[str], Compiled]) -> tuple[str, Compiled]:
     """Return the robot file, and what ``lint`` finds in it.
 
-    Names of the source are no errors.
+    Names of the source are no errors, and a source without frames gives a robot of one.
     """
+    if not any(draft.sections[title] for title in ("links", "joints", "frames", "sensors", "parts")):
+        draft.frame("", "base_link", {}, None, "the source says nothing of frames: those of the robot belong here")
     compiled = lint(draft.text())
     if any(one.code == "TF501" for one in compiled.errors):
         draft.sections["rules"]["TF501"] = "warning"

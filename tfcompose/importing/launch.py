@@ -26,6 +26,7 @@ from tfcompose.importing.programs import (
     Description,
     Program,
     add_program,
+    isolated,
     one_clock,
     where,
 )
@@ -377,10 +378,8 @@ class _Work:
             self.draft.todo(f"robot_state_publisher: the parameter {key}", span)
         if program.namespace and program.namespace.strip("/"):
             ros.setdefault("namespace", program.namespace.strip("/"))
-        moved = {old: new for old, new in program.remap if old in {"/tf", "/tf_static"} and old != new}
-        if moved and program.namespace and all(new == old.strip("/") for old, new in moved.items()):
-            ros["isolate"] = "topics"
-        elif moved:
+        moved = dict(program.remap)
+        if not isolated(self.draft, moved, program.namespace):
             self.draft.todo(f"robot_state_publisher is remapped: {moved}", span)
         for one in program.todo:
             self.draft.todo(one, span)

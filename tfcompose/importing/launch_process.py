@@ -9,6 +9,8 @@ are named too.
 from __future__ import annotations
 
 import builtins
+import functools
+import importlib
 import importlib.abc
 import importlib.machinery
 import io
@@ -27,6 +29,7 @@ from tfcompose.importing import launch_conditions as conditions
 from tfcompose.importing import launch_substitutions as substitutions
 from tfcompose.importing import launch_texts as texts
 from tfcompose.importing.confinement import confine, limit
+from tfcompose.importing.launch_moveit import MoveItConfigsBuilder
 from tfcompose.importing.launch_substitutions import PACKAGE, Context, FailedError, Missing, place
 
 MOST_RECORDS = 20_000
@@ -83,6 +86,10 @@ class Reader:
                     return str(folder)
         return None
 
+    def share(self, name: str, **_more: Any) -> str:
+        """Return the folder of a package, or what stands for it."""
+        return self.find(name, self.context.file) or f"{PACKAGE}{name}"
+
     def load(self, path: str, context: Context) -> Any:
         """Return the launch description of a file.
 
@@ -127,6 +134,8 @@ class _Module(types.ModuleType):
         if name.startswith("__"):
             raise AttributeError(name)
         found = _known(self.__name__, name)
+        if found is None and self.__name__ in _WITH_MODULES and name in _MODULES:
+            found = importlib.import_module(f"{self.__name__}.{name}")
         if found is None:
             qualified = f"{self.__name__}.{name}"
             found = type(name, (actions.Unknown,), {"NAME": qualified}) if name[:1].isupper() else Missing(qualified)
@@ -134,6 +143,12 @@ class _Module(types.ModuleType):
         return found
 
 
+#: Packages that import their modules by themselves, and these: ``import launch`` gives ``launch.actions`` too.
+_WITH_MODULES = frozenset({"launch", "launch_ros"})
+_MODULES = frozenset({
+    "actions", "conditions", "descriptions", "event_handlers", "events", "launch_description_sources",
+    "parameter_descriptions", "some_substitutions_type", "substitutions", "utilities",
+})  # fmt: skip
 _ALIASES = {
     "PushROSNamespace": "PushRosNamespace", "SetROSRemap": "SetRemap", "PathJoin": "PathJoinSubstitution",
     "PythonLaunchDescriptionSource": "LaunchDescriptionSource", "AnyLaunchDescriptionSource": "LaunchDescriptionSource",
@@ -183,6 +198,14 @@ class _Rewritten(substitutions.Substitution):
         return file
 
 
+class _AsTruth(substitutions.Substitution):
+    """nav2_common's LaunchConfigAsBool: an argument as True or False, however it is written."""
+
+    def perform(self, context: Context) -> str:
+        text = substitutions.LaunchConfiguration(self.args[0]).perform(context)
+        return str(text.strip().lower() in {"true", "1", "yes", "on", "y", "t"})
+
+
 class _Document:
     """What xacro makes of a file."""
 
@@ -219,7 +242,10 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
             vars(module).update(process_file=_Document, process=lambda file, **more: _Document(file, **more).text,
                                 parse=_Document, process_doc=lambda *_a, **_k: None)  # fmt: skip
         elif spec.name.startswith("nav2_common"):
-            vars(module).update(RewrittenYaml=_Rewritten, ReplaceString=_Rewritten)
+            vars(module).update(RewrittenYaml=_Rewritten, ReplaceString=_Rewritten, LaunchConfigAsBool=_AsTruth)
+        elif spec.name.startswith("moveit_configs_utils"):
+            find, context = self.reader.share, self.reader.context
+            vars(module)["MoveItConfigsBuilder"] = functools.partial(MoveItConfigsBuilder, find, context)
         return module
 
     def exec_module(self, module: Any) -> None:
@@ -237,14 +263,11 @@ def _is_from_launch_file() -> bool:
 
 
 def _fill_index(module: types.ModuleType, reader: Reader) -> None:
-    def share(name: str, **_more: Any) -> str:
-        return reader.find(name, reader.context.file) or f"{PACKAGE}{name}"
-
     class PackageNotFoundError(KeyError):
         """The error of the real index, which is not raised here."""
 
-    several = {"get_package_share_directory": share, "get_package_prefix": share,
-               "get_package_share_path": lambda name, **_: Path(share(name)),
+    several = {"get_package_share_directory": reader.share, "get_package_prefix": reader.share,
+               "get_package_share_path": lambda name, **_: Path(reader.share(name)),
                "get_packages_with_prefixes": dict, "PackageNotFoundError": PackageNotFoundError}  # fmt: skip
     vars(module).update(several)
 

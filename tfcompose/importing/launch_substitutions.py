@@ -70,7 +70,8 @@ def scalar_of(text: str) -> Any:
 
 def with_package(path: str) -> str:
     """Return a path below a package that is not found as an address: pathlib takes one slash for two."""
-    return re.sub(r"^.*?package:/+", PACKAGE, path) if "package:/" in path else path
+    is_path = "package:/" in path and BEGIN not in path
+    return re.sub(r"^.*?package:/+", PACKAGE, path) if is_path else path
 
 
 class Context:
@@ -79,7 +80,9 @@ class Context:
     ``records`` is what came of it, in order; ``todo`` what could not be resolved.
     """
 
-    def __init__(self, find: Callable[[str, str], str | None], *, every_branch: bool) -> None:
+    def __init__(
+        self, find: Callable[[str, str], str | None] = lambda _name, _file: None, *, every_branch: bool = False
+    ) -> None:
         self.find, self.every_branch = find, every_branch
         self.configurations: dict[str, str] = {}
         self.environment: dict[str, str] = {}
@@ -184,8 +187,8 @@ def text_of(value: Any, context: Context) -> str:
         return str(value.perform(context))
     if isinstance(value, (list, tuple)):
         return "".join(text_of(one, context) for one in value)
-    if isinstance(value, Missing):
-        raise FailedError(f"{value.name} is not known here")
+    if isinstance(value, Missing) or hasattr(value, "perform"):
+        return str(value.perform(context))  # which says what is not known
     return with_package(str(value)) if isinstance(value, os.PathLike) else str(value)
 
 

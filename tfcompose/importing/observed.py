@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 #: The process that owns moving edges whose publisher nobody knows, as in a bag.
 RECORDED = "recorded"
-#: The process of tfcompose's own that publishes fixed edges.
-STATIC = "static"
+#: The node of tfcompose's own that publishes fixed edges.
+STATIC = "tfcompose_static"
 #: A rate is taken for a rounder one that is so near.
 _NEAR = 0.03
 _PID = re.compile(r"as pid (\d+)")

@@ -9,7 +9,10 @@ from __future__ import annotations
 import posixpath
 import re
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import yaml
 
 from tfcompose.importing.static_transforms import PROGRAM, RefusedError, reader_of, static_transform
 from tfcompose.importing.yaml_text import Bare, parameter
@@ -31,6 +34,7 @@ _FROM_TOPIC = (
 )
 #: The package of the stock containers of components.
 CONTAINERS = "rclcpp_components"
+_NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 #: Between the words of a class's name.
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 #: How often joint_state_publisher sends, unless it is told.
@@ -208,11 +212,21 @@ def _add_transform(draft: Draft, program: Program) -> None:
     notes = [where(at, transform.order)]
     added = draft.frame(transform.parent, transform.child, transform.keys(), at, *notes)
     entry = ("frames", transform.child)
-    if added and any(moved.get(topic, topic) != topic for topic in _TF):
+    if added and not isolated(draft, moved, program.namespace):
         several = ", ".join(f"{old} → {new}" for old, new in moved.items())
         draft.todo(f"the publisher is remapped: {several}", at, entry, advice="ros: {namespace: …, isolate: topics}")
     for one in program.todo:
         draft.todo(one, at, entry)
+
+
+def isolated(draft: Draft, moved: Mapping[str, str], namespace: str | None) -> bool:
+    """Return whether remappings leave TF where it is, or put it below the namespace, which the draft then says."""
+    new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
+    if any(name != topic.strip("/") for topic, name in new.items()):
+        return False
+    if new and namespace and namespace.strip("/"):
+        draft.sections["ros"] |= {"namespace": namespace.strip("/"), "isolate": "topics"}
+    return True
 
 
 def _add_joint_publisher(draft: Draft, program: Program) -> str:
@@ -243,6 +257,8 @@ def _hertz(value: float) -> Any:
 
 def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
+    if not program.name and program.package and (name := _named_in_files(program.params)):
+        program = replace(program, name=name)
     usual = _usual_name(program.package) if program.package and not program.name and not program.plugin else None
     wanted = (program.name and program.label) or program.name or usual or program.label or _plain(program) or "process"
     name = draft.free_name(wanted)
@@ -308,6 +324,26 @@ def _container_keys(program: Program) -> dict[str, Any]:
         words.remove(_MULTI)
         keys["executor"] = "multi"
     return keys | ({"args": words} if words else {})
+
+
+def _named_in_files(params: Sequence[Mapping[str, Any] | str]) -> str | None:
+    """Return the node that parameter files are written for, where that is one alone; None where none is named."""
+    names: set[str] = set()
+    for file in params:
+        if isinstance(file, str) and Path(file).is_file():
+            try:
+                data = yaml.load(Path(file).read_text("utf-8"), Loader=yaml.CSafeLoader)
+            except (OSError, UnicodeDecodeError, yaml.YAMLError):
+                continue
+            names |= (
+                {str(key).rpartition("/")[2] for key in data if "*" not in str(key)} if _is_of_nodes(data) else set()
+            )
+    name = names.pop() if len(names) == 1 else ""
+    return name if _NODE.fullmatch(name) else None
+
+
+def _is_of_nodes(data: Any) -> bool:
+    return isinstance(data, dict) and all(isinstance(one, dict) and "ros__parameters" in one for one in data.values())
 
 
 def _usual_name(package: str) -> str | None:

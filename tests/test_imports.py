@@ -46,6 +46,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "bags": {"geometry", "live", "plan", "ros", "tf2"},
     "verdict": {"catalogue", "findings", "geometry", "live", "plan", "ros", "text", "tree"},
     "variables": set(),
+    "fleet": {"findings", "language", "load", "plan", "ros", "signals", "tf2"},
     "process": {"findings", "plan", "ros", "signals", "variables"},
     "guard": {
         "findings",
@@ -125,7 +126,7 @@ ONLY_IN: dict[str, set[str]] = {
     "regex": {"launcher"},
     "rich": {"cli"},
     "rclpy": {"ros"},
-    "zenoh": {"ros"},
+    "zenoh": {"fleet", "ros"},
     "xxhash": {"ros"},
     "rosbags": {"bags"},
     "tf2_msgs": {"ros"},

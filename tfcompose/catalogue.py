@@ -259,6 +259,12 @@ CATALOGUE: dict[str, Code] = {
         Code("TF871", "other_rmw", "processes", "error"),
         Code("TF872", "second_router", "processes", "error"),
         Code("TF873", "router_out_of_reach", "processes", "error"),
+        Code("TF880", "fleet_edge_twice", "processes", "error"),
+        Code("TF881", "robots_apart", "processes", "warning"),
+        Code("TF882", "router_not_reached", "live", "error"),
+        Code("TF883", "stale_link", "live", "error"),
+        Code("TF884", "shared_edge_missing", "live", "error"),
+        Code("TF885", "robot_clock_ahead", "live", "warning"),
         # ROS, plans, bags, extras
         Code("TF901", "no_ros", "environment", "error"),
         Code("TF902", "bad_plan", "environment", "error"),
@@ -277,6 +283,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF915", "host_locked", "environment", "error"),
         Code("TF916", "hosts_apart", "environment", "error"),
         Code("TF917", "release_failed", "environment", "error"),
+        Code("TF920", "no_zenoh", "environment", "error"),
     )
 }
 

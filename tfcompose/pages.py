@@ -469,6 +469,30 @@ rmw_zenohd, or is called zenoh_router, takes its place.""",
 
 A session of rmw_zenoh looks for the router on its own computer. Say where it is for all of them:
 ros: {router: tcp/10.0.0.2:7447}.""",
+    "TF880": """Two edges of a fleet give one frame a parent.
+
+Lookups would jump between them. Robots with the same frames need prefixes of their own, which they have unless the file
+says otherwise; an edge is shared once.""",
+    "TF881": """A robot of a fleet is in no common tree with the others.
+
+A pose between two robots needs edges from a frame that both have, such as map: share map → odom and odom → base_link.
+Frames that are the same for all are listed in shared_frames; all others get their robot's prefix.""",
+    "TF882": """The Zenoh router of a robot is not reached.
+
+The robot is off, out of the network, or has no router: that is the process zenoh_router of a robot with ros: {rmw:
+zenoh}, and else Zenoh's own zenohd. Its address is in the fleet's file.""",
+    "TF883": """A robot of a fleet sends nothing, or stopped sending.
+
+Its process tfcompose fleet share sends twice a second, whatever the robot does. It does not run, or its link to the
+router is cut.""",
+    "TF884": """An edge that a robot of a fleet shares does not come, while the robot is reached.
+
+Nobody publishes it on the robot, or under other names, or on topics in another namespace than the fleet's file
+says.""",
+    "TF885": """A robot of a fleet stamps its edges ahead of this computer's clock.
+
+Poses between robots are looked up at one time, which only synchronised clocks have: use chrony or
+systemd-timesyncd.""",
     "TF901": """ROS 2 is missing, or cannot be used.
 
 pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",
@@ -535,6 +559,9 @@ files set holds on their host; ros: {domain_id: N, discovery: subnet} holds on a
 A release is kept only once every edge of every host is live, as the launcher and the guard on each host say. Else every
 host goes back to the release before; the notes say which, and what the unit printed. tfcompose logs --all-hosts shows
 more.""",
+    "TF920": """A command needs Zenoh, but eclipse-zenoh is not installed.
+
+pip install 'tfcompose[fleet]' brings it. It needs no ROS, but for fleet share, which reads the robot's TF.""",
 }
 
 

@@ -38,7 +38,7 @@ from tfcompose.bags import BagError
 from tfcompose.check.check import check
 from tfcompose.check.rule import rule
 from tfcompose.cli import live, writing
-from tfcompose.cli.commands import echo
+from tfcompose.cli.commands import echo, fleet
 from tfcompose.cli.compiling import library
 from tfcompose.cli.parser import main
 from tfcompose.compile import compile_robot
@@ -47,16 +47,20 @@ from tfcompose.deploy.rollout import Rollout, target_of
 from tfcompose.emit import emit
 from tfcompose.files import Target
 from tfcompose.findings import Finding, RejectedError, Span, finding
+from tfcompose.fleet.check import check_fleet
+from tfcompose.fleet.observe import EdgeStatus, LinkState, RobotStatus, problems_of
 from tfcompose.geometry import Pose
 from tfcompose.importing.draft import Draft
 from tfcompose.importing.shell import add_script
 from tfcompose.ipc import Alive, Clear, Found, GateShut, Live, ProcessRequest
 from tfcompose.language import set_value
+from tfcompose.language.validate import validate_fleet
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.schedule import refused_schedule
 from tfcompose.live.publishers import Message, OtherRun, Publisher, Senders
 from tfcompose.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, Topic, TreeState
+from tfcompose.load import Source, load
 from tfcompose.model import Robot
 from tfcompose.model.body import Asset
 from tfcompose.plan import (
@@ -544,6 +548,30 @@ def surroundings() -> Iterator[Finding]:
         yield from _refused(partial(live.from_bag, _no_bag))
 
 
+def fleets() -> Iterator[Finding]:
+    """Look at fleets: at files with faults, and at robots that are not as they should be."""
+    head = "fleet: 1\nrobots: {r1: {router: tcp/a:7447}, r2: {router: tcp/b:7447, prefix: PREFIX, share: [EDGE]}}\n"
+    text = f"{head}share: [map → odom, odom → base_link]\n"
+    for prefix, edge in (("r1/", "map → odom"), ("r2/", "odom → base_link"), ("r2/", "odom, base_link")):
+        source = load(text.replace("PREFIX", prefix).replace("EDGE", edge), "fleet.yaml")
+        yield from _refused(partial(_check_fleet, source))
+    source = load(text.replace("PREFIX", "r2/").replace("[EDGE]", "[]"), "fleet.yaml")
+    yield from check_fleet(validate_fleet(source), source)
+    ages = [(None, None, False), (9.0, 0.1, True), (0.1, -2.0, False)]
+    edges = tuple(EdgeStatus("r1/odom", f"r1/{age}", age, delay, stale) for age, delay, stale in ages)
+    states: list[tuple[LinkState, float | None]] = [
+        ("unreachable", None), ("unreachable", 4.0), ("stale", 4.0), ("silent", None), ("live", 0.1)
+    ]  # fmt: skip
+    with mock.patch.multiple(fleet, find_spec=lambda _: None, reject=_rejected):
+        yield from _refused(fleet.refuse_without_zenoh)
+    for state, age in states:
+        yield from problems_of(RobotStatus("r1", "tcp/a:7447", state, age, edges))
+
+
+def _check_fleet(source: Source) -> None:
+    raise RejectedError(list(check_fleet(validate_fleet(source), source)))
+
+
 def _no_bag() -> None:
     raise BagError("bag is no bag: it has no metadata.yaml", "ros2 bag reindex bag")
 
@@ -677,6 +705,7 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     guard,
     launcher,
     surroundings,
+    fleets,
     compiled,
     recordings,
     imported,

@@ -27,6 +27,7 @@ TOPICS = {
     "background": "robots without a terminal: ps, logs, restart, down",
     "hosts": "a robot on several computers, and `deploy`",
     "rmw": "Fast DDS, Cyclone DDS or Zenoh",
+    "fleet": "poses between several robots, over Zenoh",
     "exports": "systemd, docker compose, Kubernetes and launch files",
     "ci": "lint, diff and verify in CI; exit codes",
     "python": "the TF buffer in Python",

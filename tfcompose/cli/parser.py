@@ -26,6 +26,7 @@ from tfcompose.cli.commands import (
     events,
     explain,
     export,
+    fleet,
     graph,
     importing,
     init,
@@ -75,7 +76,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "wait": wait,
     },
     "Look": {"view": view, "doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
-    "Ship": {"deploy": deploy, "export": export},
+    "Ship": {"deploy": deploy, "export": export, "fleet": fleet},
     "Help": {"help": manual, "completion": completion},
 }
 COMMANDS: dict[str, Command] = {name: command for group in GROUPS.values() for name, command in group.items()}

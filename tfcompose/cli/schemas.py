@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-LANGUAGES = ("robot", "overlay", "preset", "node", "plan")
+LANGUAGES = ("robot", "overlay", "preset", "node", "plan", "fleet")
 
 
 def schema_text(language: str) -> str:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FAILED, UNREADABLE, INTERRUPTED, OUTPUT_CLOSED = 1, 2, 130, 141
 
 #: A file that cannot be read; ROS, trimesh and rosbags.
-_LACKING = frozenset({"TF001", "TF901", "TF905", "TF906"})
+_LACKING = frozenset({"TF001", "TF901", "TF905", "TF906", "TF920"})
 
 #: Control sequences (ECMA-48): those that end in m set colours, the others do something; and titles and links.
 _SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?|\033[ -/]*[0-~])")

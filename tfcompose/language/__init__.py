@@ -5,14 +5,23 @@ The models are the one description of validation, JSON Schema and reference. ``o
 """
 
 from tfcompose.language.args import ArgSpec, Given, GivenArg
+from tfcompose.language.fleet import FleetSpec
 from tfcompose.language.overlay import as_part, composed, lay_over, profiles_in, set_value, with_includes
 from tfcompose.language.pose import DIRECTIONS
-from tfcompose.language.validate import Validated, levels_of, validate, validate_node_preset, validate_preset
+from tfcompose.language.validate import (
+    Validated,
+    levels_of,
+    validate,
+    validate_fleet,
+    validate_node_preset,
+    validate_preset,
+)
 from tfcompose.language.variables import alternatives_of
 
 __all__ = [
     "DIRECTIONS",
     "ArgSpec",
+    "FleetSpec",
     "Given",
     "GivenArg",
     "Validated",
@@ -24,6 +33,7 @@ __all__ = [
     "profiles_in",
     "set_value",
     "validate",
+    "validate_fleet",
     "validate_node_preset",
     "validate_preset",
     "with_includes",

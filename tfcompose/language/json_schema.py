@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic.json_schema import GenerateJsonSchema
 
 from tfcompose.catalogue import CATALOGUE
+from tfcompose.language.fleet import FleetSpec
 from tfcompose.language.node_preset import NodePresetSpec
 from tfcompose.language.preset import PresetSpec
 from tfcompose.language.robot import RobotSpec
@@ -25,7 +26,12 @@ if TYPE_CHECKING:
     from tfcompose.language.preset import Option
     from tfcompose.language.spec import Spec
 
-LANGUAGES: dict[str, type[Spec]] = {"robot": RobotSpec, "preset": PresetSpec, "node": NodePresetSpec}
+LANGUAGES: dict[str, type[Spec]] = {
+    "robot": RobotSpec,
+    "preset": PresetSpec,
+    "node": NodePresetSpec,
+    "fleet": FleetSpec,
+}
 
 
 def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterable[str]) -> dict[str, Any]:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.catalogue import can_be_allowed, code_of
 from tfcompose.findings import Finding, RejectedError, without_duplicates
 from tfcompose.language.args import Given
 from tfcompose.language.conditions import unfolded
+from tfcompose.language.fleet import FleetSpec
 from tfcompose.language.node_preset import NodePresetSpec
 from tfcompose.language.overlay import is_for_later
 from tfcompose.language.preset import PresetSpec, wrong_names
 from tfcompose.language.reading import Refusal, read
 from tfcompose.language.robot import RobotSpec
 from tfcompose.language.rules import RuleSpec, level_of
+from tfcompose.language.spec import Spec
 from tfcompose.language.values import plain
 from tfcompose.language.variables import Variables, unused
 
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 
 _NOTHING = Given()
+M = TypeVar("M", bound=Spec)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,12 +122,25 @@ def validate_node_preset(source: Source) -> NodePresetSpec:
     Raises:
         RejectedError: with every finding, if anything is wrong with it.
     """
+    return _validated(NodePresetSpec, source)
+
+
+def validate_fleet(source: Source) -> FleetSpec:
+    """Return the typed fleet.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    return _validated(FleetSpec, source)
+
+
+def _validated(kind: type[M], source: Source) -> M:
     nulls = _nulls(source)
-    preset, refusals = read(NodePresetSpec, source.data, [one.path for one in nulls])
+    spec, refusals = read(kind, source.data, [one.path for one in nulls])
     found = (*source.found, *_findings([*nulls, *refusals], source))
-    if found or preset is None:
+    if found or spec is None:
         raise RejectedError(found)
-    return preset
+    return spec
 
 
 def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[str, str]]:

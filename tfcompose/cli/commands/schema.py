@@ -1,7 +1,7 @@
 """Print the language as JSON Schema, or as a reference.
 
-Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors and nodes, or of
-plan.json. With --reference print every key of the language as Markdown instead.
+Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors and nodes, of
+plan.json, or of a fleet. With --reference print every key of the language as Markdown instead.
 """
 
 from __future__ import annotations

@@ -1,0 +1,140 @@
+"""A fleet on loopback: simulated robots with Zenoh routers, poses between them, links that break."""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.support import processes
+from tests.support.fleets import Link, SimulatedRobot, fleet_of, fleet_text
+from tests.support.waiting import until
+from tests.support.zenoh_peers import free_port, session
+from tfcompose.fleet.observe import FleetObserver
+from tfcompose.fleet.share import SharedEdges
+from tfcompose.ros.tf_codec import Transform, decode, encode
+
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass
+class Two:
+    """Two robots that run, and the link from here to the second one's router."""
+
+    routers: dict[str, str]
+    link: Link
+
+
+@pytest.fixture
+def two() -> Iterator[Two]:
+    with ExitStack() as stack:
+        routers = {name: f"tcp/127.0.0.1:{free_port()}" for name in ("r1", "r2")}
+        for router in routers.values():
+            stack.enter_context(session("router", listen=[router]))
+        fleet = fleet_of(routers)
+        for x, name in enumerate(routers, 1):
+            robot = SimulatedRobot(fleet, name, float(x))
+            stack.callback(robot.close)
+        link = Link(routers["r2"])
+        stack.callback(link.close)
+        yield Two(routers | {"r2": link.endpoint}, link)
+
+
+@pytest.fixture
+def observe() -> Iterator[Callable[[dict[str, str]], FleetObserver]]:
+    with ExitStack() as stack:
+
+        def made(routers: dict[str, str]) -> FleetObserver:
+            observer = FleetObserver(fleet_of(routers))
+            stack.callback(observer.close)
+            return observer
+
+        yield made
+
+
+def test_a_pose_between_two_robots_is_found(two: Two, observe: Callable[[dict[str, str]], FleetObserver]) -> None:
+    observer = observe(two.routers)
+    assert observer.wait(60)
+    pose, stamp_ns = observer.buffer.latest("r1/base_link", "r2/base_link")
+    assert pose.xyz == pytest.approx((1.0, 0.0, 0.0))
+    assert stamp_ns is not None
+    assert [(one.robot, one.state) for one in observer.status()] == [("r1", "live"), ("r2", "live")]
+    assert list(observer.findings()) == []
+
+
+def test_a_broken_link_is_stale_within_3_s_and_live_again_when_it_is_mended(
+    two: Two, observe: Callable[[dict[str, str]], FleetObserver]
+) -> None:
+    observer = observe(two.routers)
+    assert observer.wait(60)
+    two.link.break_()
+    broken = time.monotonic()
+
+    def states() -> dict[str, str]:
+        return {one.robot: one.state for one in observer.status()}
+
+    assert until(lambda: states()["r2"] != "live")
+    assert time.monotonic() - broken < 3.0
+    assert states()["r1"] == "live"
+    assert {one.code for one in observer.findings()} <= {"TF882", "TF883"}
+    two.link.mend()
+    assert until(lambda: states()["r2"] == "live")
+
+
+def test_a_router_that_is_not_there_is_named_and_found_when_it_comes(
+    observe: Callable[[dict[str, str]], FleetObserver],
+) -> None:
+    router = f"tcp/127.0.0.1:{free_port()}"
+    observer = observe({"r1": router})
+    assert [one.code for one in observer.findings()] == ["TF882"]
+    with session("router", listen=[router]):
+        assert until(lambda: [one.code for one in observer.findings()] == ["TF883"])
+        robot = SimulatedRobot(fleet_of({"r1": router}), "r1", 0.0)
+        try:
+            assert until(lambda: list(observer.findings()) == [])
+        finally:
+            robot.close()
+
+
+def tf(*edges: tuple[str, str], stamp_ns: int = 0) -> bytes:
+    return encode([Transform(stamp_ns, parent, child, (1.0, 2.0, 3.0), IDENTITY) for parent, child in edges])
+
+
+def test_only_shared_edges_leave_with_their_names_in_the_fleet_once_in_each_period() -> None:
+    edges = SharedEdges(fleet_of({"r1": "tcp/localhost:1"}, rate="5 Hz"), "r1")
+    message = tf(("odom", "base_link"), ("base_link", "laser"), stamp_ns=7)
+    period_ns = 200_000_000
+    sent = edges.take(message, static=False, now_ns=10 * period_ns)
+    assert sent is not None
+    assert decode(sent) == [Transform(7, "r1/odom", "r1/base_link", (1.0, 2.0, 3.0), IDENTITY)]
+    assert edges.take(message, static=False, now_ns=11 * period_ns - 1) is None
+    assert edges.take(message, static=False, now_ns=11 * period_ns) is not None
+    assert edges.take(tf(("base_link", "laser")), static=False, now_ns=0) is None
+    assert decode(edges.fixed()) == []
+    assert edges.take(tf(("map", "odom"), ("map", "dock")), static=True, now_ns=0) is None
+    assert [(one.parent, one.child) for one in decode(edges.fixed())] == [("map", "r1/odom")]
+
+
+def test_the_command_lists_robots_prints_poses_and_says_what_is_wrong(two: Two, tmp_path: Path) -> None:
+    file = tmp_path / "fleet.yaml"
+    file.write_text(fleet_text(two.routers), encoding="utf-8")
+
+    def fleet(*words: str) -> tuple[int, str]:
+        done = processes.run([sys.executable, "-m", "tfcompose", "fleet", *words], cwd=tmp_path)
+        return done.returncode, done.stdout + done.stderr
+
+    code, output = fleet("ps", "--format", "json", "--for", "2")
+    assert (code, [one["state"] for one in json.loads(output)["robots"]]) == (0, ["live", "live"])
+    code, output = fleet("echo", "r1/base_link", "r2/base_link", "--once", "--format", "json")
+    assert code == 0, output
+    assert json.loads(output)["xyz"] == pytest.approx([1.0, 0.0, 0.0])
+    assert fleet("doctor", str(file), "--for", "2")[0] == 0
+    two.link.break_()
+    code, output = fleet("doctor")
+    assert code == 1
+    assert "TF882" in output or "TF883" in output
+    assert "r2" in output

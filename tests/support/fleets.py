@@ -1,0 +1,109 @@
+"""Simulated robots of a fleet on loopback, each with a router of Zenoh, and links that can break."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from tfcompose.fleet.share import Sender
+from tfcompose.language.validate import validate_fleet
+from tfcompose.load import load
+from tfcompose.ros.tf_codec import Transform, encode
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.language.fleet import FleetSpec
+
+_IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+def fleet_text(routers: Mapping[str, str], rate: str = "20 Hz") -> str:
+    """Return the file of a fleet whose robots share map → odom, which is fixed, and odom → base_link."""
+    robots = "".join(f"  {name}: {{router: {router}}}\n" for name, router in routers.items())
+    share = f"share: [map → odom, {{edge: odom -> base_link, rate: {rate}}}]"
+    return f"fleet: 1\nname: tests\n{share}\nrobots:\n{robots}"
+
+
+def fleet_of(routers: Mapping[str, str], rate: str = "20 Hz") -> FleetSpec:
+    """Return that fleet."""
+    return validate_fleet(load(fleet_text(routers, rate), "fleet.yaml"))
+
+
+class SimulatedRobot:
+    """What shares a robot's edges, given TF of the robot by a thread instead of ROS: it stands at ``x``, in metres."""
+
+    def __init__(self, fleet: FleetSpec, name: str, x: float, rate_hz: float = 50.0) -> None:
+        self._x = x
+        self._period_s = 1 / rate_hz
+        self.sender = Sender(fleet, name, lambda _: None)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End it."""
+        self._ended.set()
+        self._thread.join()
+        self.sender.close()
+
+    def _run(self) -> None:
+        beat = 0.0
+        fixed = Transform(0, "map", "odom", (self._x, 0.0, 0.0), _IDENTITY)
+        self.sender.on_message(encode([fixed]), True)  # noqa: FBT003 (as the listener calls)
+        while not self._ended.wait(self._period_s):
+            if time.monotonic() >= beat:
+                beat = time.monotonic() + 0.5
+                self.sender.beat()
+            moving = Transform(time.time_ns(), "odom", "base_link", (0.5, 0.0, 0.0), _IDENTITY)
+            self.sender.on_message(encode([moving]), False)  # noqa: FBT003 (as the listener calls)
+
+
+class Link:
+    """A network link to a router, as a port that passes on what comes, until it breaks: then nothing passes."""
+
+    def __init__(self, router: str) -> None:
+        self._to = router.partition("/")[2].split(":")
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.endpoint = f"tcp/127.0.0.1:{self._listener.getsockname()[1]}"
+        self._open: list[socket.socket] = []
+        self.passes = threading.Event()
+        self.passes.set()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def break_(self) -> None:
+        """Let nothing pass any more, and close no connection: as a cable that is pulled out."""
+        self.passes.clear()
+
+    def mend(self) -> None:
+        """Let everything pass again."""
+        self.passes.set()
+
+    def close(self) -> None:
+        """End all connections."""
+        self.passes.set()
+        for one in (self._listener, *self._open):
+            with suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+            one.close()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                near, _ = self._listener.accept()
+                far = socket.create_connection((self._to[0], int(self._to[1])))
+                self._open += [near, far]
+                for source, sink in ((near, far), (far, near)):
+                    threading.Thread(target=self._pass_on, args=(source, sink), daemon=True).start()
+
+    def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
+        with suppress(OSError):
+            while data := source.recv(65536):
+                self.passes.wait()
+                sink.sendall(data)
+        for one in (source, sink):
+            with suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)

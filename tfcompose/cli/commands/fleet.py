@@ -1,0 +1,209 @@
+"""Share edges between robots over Zenoh, and look poses up between them.
+
+What a robot shares, and where its Zenoh router is, stands in fleet.yaml, which can be named anywhere; default:
+fleet.yaml. `fleet lint` checks the file. `fleet share ROBOT` runs on the robot and sends its edges; it is the only one
+that needs ROS. `fleet ps` lists the robots and how old what they share is, `fleet echo A B` prints the pose of frame B
+in frame A, such as r1/base_link r2/base_link, and `fleet doctor` says what is wrong. `fleet ps` and `fleet doctor` exit
+with 1 where a robot is not live.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.options import add_for, add_format, positive
+from tfcompose.cli.terminal import FAILED, INTERRUPTED, UNREADABLE, exit_code_of, fail, print_findings, reject, warn
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tfcompose.findings import Finding
+    from tfcompose.fleet.observe import FleetObserver, RobotStatus
+    from tfcompose.language.fleet import FleetSpec
+
+#: What can be done, with the names that it takes.
+_ACTIONS = {"lint": (), "share": ("ROBOT",), "ps": (), "echo": ("A", "B"), "doctor": ()}
+_FILE = "fleet.yaml"
+_YAML = (".yaml", ".yml")
+#: A stale link is found within this time; a live one is known sooner.
+_OBSERVE_S = 3.0
+_HEAD = ("ROBOT", "STATE", "AGE", "EDGES", "ROUTER")
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("action", choices=_ACTIONS, help="what to do, as above")
+    parser.add_argument("words", nargs="*", metavar="NAME|FILE", help="ROBOT for share, A and B for echo; fleet.yaml")
+    add_for(parser, "ps and doctor: listen for S seconds; default: until all is known, at most 3; echo: end after S")
+    parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="echo: poses per second; default: 1")
+    parser.add_argument("--once", action="store_true", help="echo: print one pose and exit")
+    add_format(parser)
+
+
+def run(arguments: Namespace) -> int:
+    """Do it; exit code 0, 1 with findings, 2 for wrong use and what cannot be read."""
+    files = [word for word in arguments.words if word.endswith(_YAML)]
+    names = [word for word in arguments.words if not word.endswith(_YAML)]
+    wanted = _ACTIONS[arguments.action]
+    if len(names) != len(wanted) or len(files) > 1:
+        usage = " ".join(["tfcompose fleet", arguments.action, *wanted, "[FILE]"])
+        fail(f"fleet {arguments.action}: wrong number of names; usage: {usage}", UNREADABLE)
+    spec, found = _read(files[0] if files else _FILE)
+    print_findings(found, sys.stderr)
+    if spec is None or arguments.action == "lint":
+        return _lint_code(found)
+    refuse_without_zenoh()
+    if arguments.action == "share":
+        return _share(spec, names[0])
+    from tfcompose.fleet.observe import FleetObserver
+
+    observer = FleetObserver(spec)
+    try:
+        if arguments.action == "echo":
+            return _echo(observer, names[0], names[1], arguments)
+        return _report(observer, arguments)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    finally:
+        observer.close()
+
+
+def refuse_without_zenoh() -> None:
+    """End the command where eclipse-zenoh is not installed.
+
+    Raises:
+        SystemExit: after saying so.
+    """
+    from tfcompose.findings import finding
+
+    if find_spec("zenoh") is None:
+        help_ = "pip install 'tfcompose[fleet]'"
+        reject([finding("TF920", "eclipse-zenoh is not installed", None, help=help_)])
+
+
+def _read(file: str) -> tuple[FleetSpec | None, list[Finding]]:
+    """Return the fleet of a file, None where it has errors, and all findings."""
+    from tfcompose.cli.reading import read_text
+    from tfcompose.findings import RejectedError
+    from tfcompose.fleet.check import check_fleet
+    from tfcompose.language.validate import validate_fleet
+    from tfcompose.load import load
+
+    try:
+        source = load(read_text(file), file)
+        spec = validate_fleet(source)
+    except RejectedError as error:
+        return None, list(error.findings)
+    found = list(check_fleet(spec, source))
+    return (None if _lint_code(found) else spec), found
+
+
+def _lint_code(found: list[Finding]) -> int:
+    errors = [one for one in found if one.severity == "error"]
+    return exit_code_of(errors) if errors else 0
+
+
+def _share(spec: FleetSpec, robot: str) -> int:
+    from tfcompose.cli.live import set_up_ros
+    from tfcompose.findings import did_you_mean, finding
+    from tfcompose.process import ready, say
+    from tfcompose.ros.environment import RosError
+    from tfcompose.signals import Stop
+
+    if robot not in spec.robots:
+        advice = did_you_mean(robot, spec.robots, f"there is {', '.join(spec.robots)}")
+        fail(f"no robot {robot} in the fleet {spec.name}; {advice}", UNREADABLE)
+    set_up_ros()
+    from tfcompose.fleet.robot import share  # rclpy reads the environment when it is loaded
+
+    with Stop() as stop:
+        try:
+            ready()
+            share(spec, robot, stop, say)
+        except RosError as error:
+            reject([finding("TF901", str(error), None)])
+    return 0
+
+
+def _report(observer: FleetObserver, arguments: Namespace) -> int:
+    if arguments.duration is None:
+        observer.wait(_OBSERVE_S)
+    else:
+        time.sleep(arguments.duration)
+    if arguments.action == "doctor":
+        found = list(observer.findings())
+        if arguments.format == "json":
+            from tfcompose.render.formats import render_json
+
+            sys.stdout.write(render_json(found))
+        else:
+            print_findings(found, sys.stdout)
+            print(f"looked at {len(observer.fleet.robots)} robots: {len(found) or 'nothing is'} wrong")
+        return exit_code_of(found) if found else 0
+    robots = observer.status()
+    if arguments.format == "json":
+        from dataclasses import asdict
+        from json import dumps
+
+        print(dumps({"robots": [asdict(one) for one in robots]}, ensure_ascii=False))
+    else:
+        from tfcompose.cli.tables import Table
+
+        print("\n".join(Table(right=frozenset({2})).lines([_HEAD, *map(_row, robots)])))
+    return 0 if all(one.state == "live" for one in robots) else FAILED
+
+
+def _row(one: RobotStatus) -> tuple[str, ...]:
+    live = sum(edge.age_s is not None and not edge.stale for edge in one.edges)
+    age = "–" if one.age_s is None else f"{one.age_s:.1f} s"
+    return one.robot, one.state, age, f"{live}/{len(one.edges)}", one.router
+
+
+def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespace) -> int:
+    """Print poses until a signal comes; a link that is stale is named instead, once, and so is its return."""
+    from tfcompose.numbers import clean
+    from tfcompose.render.pose import pose_json, pose_text
+    from tfcompose.tf2 import TransformException
+
+    begun = time.monotonic()
+    shown = False
+    trouble, due = "", 0.0
+    while (now := time.monotonic()) - begun < (arguments.duration or float("inf")):
+        wrong = _trouble(observer, target, source)
+        try:
+            pose, stamp_ns = observer.buffer.latest(target, source)
+        except TransformException as error:
+            wrong = wrong or str(error)
+        waiting = not shown and now - begun < _OBSERVE_S
+        if wrong != trouble and not (wrong and waiting):
+            warn(wrong or "the links are live again")
+            trouble = wrong
+        if not wrong and now >= due:
+            due, shown = now + 1 / arguments.rate, True
+            age_s = None if stamp_ns is None else (time.time_ns() - stamp_ns) / 1e9
+            if arguments.format == "json":
+                sys.stdout.write(pose_json(target, source, clean(pose), stamp_ns=stamp_ns, age_s=age_s))
+            else:
+                when = ", fixed" if age_s is None else f", {age_s:.2f} s ago"
+                sys.stdout.write(pose_text(target, source, clean(pose), when))
+            sys.stdout.flush()
+        if (arguments.once and shown) or (arguments.once and not waiting):
+            break
+        time.sleep(0.05)
+    return 0 if shown else FAILED
+
+
+def _trouble(observer: FleetObserver, *frames: str) -> str:
+    """Return which links or edges are stale that a pose between the frames needs; empty: none."""
+    stale = []
+    for one in observer.status():
+        mine = {name for edge in one.edges for name in (edge.parent, edge.child)} - {*observer.fleet.shared_frames}
+        if mine.isdisjoint(frames):
+            continue
+        if one.state in {"stale", "unreachable"} and one.age_s is not None:
+            stale.append(f"the link to {one.robot} is stale")
+        stale += [f"{edge.parent} → {edge.child} of {one.robot} is stale" for edge in one.edges if edge.stale]
+    return stale[0] if stale else ""

@@ -1,0 +1,35 @@
+"""The process on a robot that shares its edges; it reads TF by ROS."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.fleet.share import BEAT_S, Sender
+from tfcompose.plan.topics import topics_below
+from tfcompose.ros.tf_listener import ThreadListener, Topic
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.language import FleetSpec
+    from tfcompose.signals import Stop
+
+
+def share(fleet: FleetSpec, robot: str, stop: Stop, say: Callable[[str], None]) -> None:
+    """Share a robot's edges until ``stop`` is requested.
+
+    Raises:
+        RosError: if ROS cannot start a node.
+    """
+    sender = Sender(fleet, robot, say)
+    moving, fixed = topics_below(fleet.robots[robot].namespace)
+    topics = [Topic(fixed, static=True, qos=None), Topic(moving, static=False, qos=None)]
+    listener = ThreadListener(sender.on_message, topics, use_sim_time=False)
+    listener.start()
+    try:
+        while not stop.requested:
+            sender.beat()
+            stop.wait(BEAT_S)
+    finally:
+        listener.close()
+        sender.close()

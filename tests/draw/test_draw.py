@@ -18,11 +18,11 @@ from PIL import Image
 
 from tests.support.tables import for_each
 from tfcompose.draw import Arrow, Graph, Group
+from tfcompose.draw.arrange import Direction
 from tfcompose.draw.graph import Kind, collapsed
-from tfcompose.draw.layout import Direction
 from tfcompose.draw.markup import dot, mermaid
 from tfcompose.draw.pdf import pdf
-from tfcompose.draw.picture import Box, Drawing, Text, draw
+from tfcompose.draw.picture import Box, Curve, Drawing, Text, draw
 from tfcompose.draw.png import png
 from tfcompose.draw.style import STYLES, width_of
 from tfcompose.draw.svg import svg
@@ -163,6 +163,40 @@ def test_a_long_chain_goes_down_by_itself_and_others_to_the_right() -> None:
     assert draw(chain(4)) == draw(chain(4), "right")
     assert "rankdir=TB" in dot(chain(4), is_down=True)
     assert mermaid(chain(4), is_down=True).startswith("flowchart TD")
+
+
+def broad(cameras: int) -> Graph:
+    arrows = [Arrow("odom", "base_link", "dynamic", "drive")]
+    for index in range(cameras):
+        names = ("base_link", f"cam{index}_link", f"cam{index}_frame", f"cam{index}_optical_frame")
+        arrows += [Arrow(parent, child, "static", "static") for parent, child in pairwise(names)]
+    groups = tuple(Group(f"cam{i}", (f"cam{i}_link", f"cam{i}_frame", f"cam{i}_optical_frame")) for i in range(cameras))
+    return Graph("broad", ("odom",), tuple(arrows), groups)
+
+
+def test_a_tall_picture_is_in_columns_by_itself_and_no_taller_than_wide() -> None:
+    drawing = draw(broad(60))
+    assert drawing == draw(broad(60), "columns")
+    assert drawing.height < 1.1 * drawing.width < draw(broad(60), "right").height
+    assert draw(broad(6)) == draw(broad(6), "right")
+    assert draw(chain(4), "columns") == draw(chain(4), "right")
+
+
+@for_each(FAMILY)
+def test_in_columns_no_edge_to_a_child_of_the_trunk_crosses_a_box(seed: int, frames: int, *, poses: bool) -> None:
+    graph = tree(seed, frames, poses=poses)
+    drawing = draw(graph, "columns")
+    boxes = [around(box) for box in boxes_of(drawing, "box", "root")]
+    for curve in (one for one in drawing.shapes if isinstance(one, Curve) and len(one.points) > 4):
+        for (x1, y1), (x2, y2) in pairwise(curve.points):
+            line = (min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2))
+            assert not any(overlaps(line, box) for box in boxes)
+
+
+def test_the_title_of_a_collapsed_picture_counts_the_frames_of_the_robot() -> None:
+    texts = [shape.text for shape in draw(collapsed(broad(3))).shapes if isinstance(shape, Text)]
+    assert "11 frames · 10 edges · 6 frames inside sensors not shown" in texts
+    assert "static (9 edges)" in texts
 
 
 def test_downwards_a_child_is_below_its_parent_and_to_its_right() -> None:

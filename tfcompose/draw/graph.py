@@ -41,7 +41,7 @@ class Graph:
     """A tree, or what is there instead: several roots, second parents and cycles are drawn as they are.
 
     Frames that edges name need not be in ``frames``. The order of frames and edges is that of the picture; ``owners``
-    are in the order of their colours.
+    are in the order of their colours. ``hidden`` are the edges to frames that are not drawn.
     """
 
     title: str
@@ -49,6 +49,7 @@ class Graph:
     arrows: tuple[Arrow, ...]
     groups: tuple[Group, ...] = ()
     owners: tuple[str, ...] = ()
+    hidden: tuple[Arrow, ...] = ()
 
     def all_frames(self) -> list[str]:
         """Return every frame once: those that were given, then those that only edges and groups name."""
@@ -82,7 +83,11 @@ def collapsed(graph: Graph) -> Graph:
     )
     groups = tuple(replace(group, frames=tuple(one for one in group.frames if one in needed)) for group in graph.groups)
     return replace(
-        graph, frames=tuple(frame for frame in graph.frames if frame not in gone), arrows=arrows, groups=groups
+        graph,
+        frames=tuple(frame for frame in graph.frames if frame not in gone),
+        arrows=arrows,
+        groups=groups,
+        hidden=tuple(arrow for arrow in graph.arrows if arrow.child in gone and not arrow.alternative),
     )
 
 

@@ -10,7 +10,7 @@ A group's rectangle is drawn around its own frames, and around their descendants
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from tfcompose.draw.style import STYLES, shortened, width_of
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.draw.graph import Forest, Graph
-
-Direction = Literal["auto", "right", "down"]
 
 NAME_SIZE, MORE_SIZE, LABEL_SIZE = STYLES["name"].size, STYLES["more"].size, STYLES["label"].size
 BOX_HEIGHT, POSE_HEIGHT = 24.0, 14.0
@@ -30,7 +28,6 @@ LABEL_STRIP = 16.0
 TREE_GAP = 10.0
 NEAREST, FARTHEST, STEEPNESS = 28.0, 100.0, 0.08  # from a parent to its children: more for a wide fan
 INDENT = 28.0  # downwards, from a parent's left edge to its children's
-WIDEST, WIDEST_RATIO = 1600.0, 3.0  # a picture is drawn downwards if it is wider, also in relation to its height
 PAD = 8.0  # between a text and its box, and between a group and its frames
 
 
@@ -66,24 +63,29 @@ class Area:
 
 
 @dataclass(frozen=True, slots=True)
+class Trunk:
+    """The line from a frame to its children in columns: its y above them, and by child the x where it goes down."""
+
+    frame: str
+    y: float
+    lines: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Layout:
-    """All places, the groups' areas (outer ones first), the size of it all, and whether it goes down."""
+    """All places, the groups' areas (outer ones first), the size of it all, and whether it goes down, or in columns."""
 
     places: dict[str, Place]
     areas: tuple[Area, ...]
     width: float
     height: float
     is_down: bool = False
+    trunk: Trunk | None = None
 
 
-def layout(graph: Graph, forest: Forest, direction: Direction = "auto") -> Layout:
-    """Return the position of everything, from (0, 0); ``auto`` goes to the right, unless that is too wide."""
-    if direction == "auto":
-        wide = layout(graph, forest, "right")
-        is_too_wide = wide.width > max(WIDEST, WIDEST_RATIO * wide.height)
-        return layout(graph, forest, "down") if is_too_wide else wide
+def layout(graph: Graph, forest: Forest, *, is_down: bool) -> Layout:
+    """Return the position of everything, from (0, 0), down or to the right."""
     places = {frame: _box(forest, frame) for frame in forest.order}
-    is_down = direction == "down"
     bands, height = _rows(forest, places, is_down=is_down)
     (_indented if is_down else _columns)(forest, places)
     areas, width = _areas(graph, forest, places, bands)

@@ -77,7 +77,8 @@ def _shape(shape: Box | Curve | Text) -> Iterator[str]:
 
 def _curve(curve: Curve) -> str:
     start, *others = [_point(x, y) for x, y in curve.points]
-    return f"{start} m {' '.join(others)} c "
+    ways = (" ".join(others[at : at + 3]) for at in range(0, len(others), 3))
+    return f"{start} m {' c '.join(ways)} c "
 
 
 def _box(box: Box) -> str:

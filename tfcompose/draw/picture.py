@@ -9,14 +9,15 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Union
 
+from tfcompose.draw.arrange import Direction, arrange
 from tfcompose.draw.graph import forest_of
-from tfcompose.draw.layout import BADGE_WIDTH, BETWEEN, INDENT, LABEL_STRIP, PAD, POSE_HEIGHT, layout
+from tfcompose.draw.layout import BADGE_WIDTH, BETWEEN, INDENT, LABEL_STRIP, PAD, POSE_HEIGHT
 from tfcompose.draw.style import STYLES, colour_of, shortened, width_of
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from tfcompose.draw.graph import Arrow, Forest, Graph
-    from tfcompose.draw.layout import Area, Direction, Layout, Place
+    from tfcompose.draw.layout import Area, Layout, Place
 
 Point = tuple[float, float]
 
@@ -50,16 +51,19 @@ class Box:
 
 @dataclass(slots=True)
 class Curve:
-    """A cubic curve by its four points; ``about`` is its description, in formats that can show one."""
+    """Cubic curves in a row, by their points: four of the first, three more of each further one.
 
-    points: tuple[Point, Point, Point, Point]
+    ``about`` is its description, in formats that can show one.
+    """
+
+    points: tuple[Point, ...]
     style: str
     about: str = ""
 
     @property
     def straight(self) -> bool:
         """Whether it is a level line from left to right."""
-        return self.points[0][1] == self.points[1][1] == self.points[2][1] == self.points[3][1]
+        return len({y for _, y in self.points}) == 1
 
 
 def _level(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
@@ -72,6 +76,22 @@ def _falling(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
     """Return the curve that leaves downwards and arrives horizontally."""
     corner = (start[0], end[1])
     return start, corner, corner, end
+
+
+def _along(*corners: Point) -> tuple[Point, ...]:
+    """Return the curves along level and upright lines, with rounded corners between the first and the last point."""
+    points = [corners[0]]
+    for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
+        into, out = _towards(corner, before), _towards(corner, after)
+        points += [into, into, into, corner, corner, out]
+    return (*points, corners[-1], corners[-1], corners[-1])
+
+
+def _towards(corner: Point, other: Point) -> Point:
+    """Return the point where a rounded corner begins, or ends."""
+    x, y = other[0] - corner[0], other[1] - corner[1]
+    part = min(1.0, CORNER / max(abs(x), abs(y), CORNER))
+    return corner[0] + part * x, corner[1] + part * y
 
 
 def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
@@ -108,7 +128,7 @@ class Drawing:
 def draw(graph: Graph, direction: Direction = "auto") -> Drawing:
     """Return the drawing of the graph: groups at the back, then edges, then frames, and the legend on top."""
     forest = forest_of(graph)
-    places = layout(graph, forest, direction)
+    places = arrange(graph, forest, direction)
     owners = {name: index for index, name in enumerate(graph.all_owners())}
     head, width, top = _legend(graph, owners, places.width, MARGIN)
     pen = _Pen(graph, forest, places, owners, MARGIN, top)
@@ -166,6 +186,11 @@ class _Pen:
         if self.layout.is_down:
             start = (parent.x + INDENT / 2 + self.left, parent.bottom + self.top)
             return self._curve(arrow, _falling(start, end))
+        trunk = self.layout.trunk
+        if trunk and arrow.parent == trunk.frame:
+            start = (parent.x + INDENT / 2 + self.left, parent.bottom + self.top)
+            line, above = trunk.lines[arrow.child] + self.left, trunk.y + self.top
+            return self._curve(arrow, _along(start, (start[0], above), (line, above), (line, end[1]), end))
         return self._curve(arrow, _level((parent.right + self.left, parent.y + self.top), end))
 
     def _back(self, arrow: Arrow) -> Curve:
@@ -173,7 +198,7 @@ class _Pen:
         start = (parent.x + 0.7 * parent.width + self.left, parent.bottom + self.top)
         return self._curve(arrow, _sagging(start, (child.x + 0.3 * child.width + self.left, child.bottom + self.top)))
 
-    def _curve(self, arrow: Arrow, points: tuple[Point, Point, Point, Point]) -> Curve:
+    def _curve(self, arrow: Arrow, points: tuple[Point, ...]) -> Curve:
         kind = "alternative" if arrow.alternative else arrow.kind
         about = f"{arrow.parent} → {arrow.child}: {', '.join(_facts(arrow))}"
         return Curve(points, f"edge{colour_of(self.owners[arrow.owner])} {kind}", about)
@@ -219,9 +244,11 @@ def _facts(arrow: Arrow) -> list[str]:
 
 def _legend(graph: Graph, owners: dict[str, int], width: float, margin: float) -> tuple[list[Shape], float, float]:
     """Return the title and the legend, the width of everything without margins, and the y where the tree begins."""
-    edges = Counter(arrow.owner for arrow in graph.arrows if not arrow.alternative)
+    edges = Counter(arrow.owner for arrow in (*graph.arrows, *graph.hidden) if not arrow.alternative)
     title = shortened(graph.title)
-    totals = f"{counted(len(graph.all_frames()), 'frame')} · {counted(edges.total(), 'edge')}"
+    frames = len(graph.all_frames())
+    totals = f"{counted(frames + len(graph.hidden), 'frame')} · {counted(edges.total(), 'edge')}"
+    totals += f" · {counted(len(graph.hidden), 'frame')} inside sensors not shown" if graph.hidden else ""
     title_width = width_of(title, STYLES["title"].size, bold=True)
     totals_width = width_of(totals, STYLES["label"].size)
     base = margin + 14.0

@@ -81,7 +81,7 @@ def _shape(shape: Shape) -> str:
 
 def _curve(curve: Curve) -> str:
     start, *others = [f"{x:g} {y:g}" for x, y in curve.points]
-    way = f"M{start}H{curve.points[3][0]:g}" if curve.straight else f"M{start}C{' '.join(others)}"
+    way = f"M{start}H{curve.points[-1][0]:g}" if curve.straight else f"M{start}C{' '.join(others)}"
     if not curve.about:
         return f'<path class="{curve.style}" d="{way}"/>\n'
     return f'<path class="{curve.style}" d="{way}"><title>{_text(curve.about)}</title></path>\n'

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.draw import Arrow, Graph
+    from tfcompose.draw.arrange import Direction
     from tfcompose.draw.graph import Kind
-    from tfcompose.draw.layout import Direction
     from tfcompose.live.edges import EdgeState, TreeObserver
     from tfcompose.plan import Plan
 
@@ -50,8 +50,8 @@ def arguments(parser: ArgumentParser) -> None:
         "--poses", action="store_true", help="show each frame's pose in its parent, in metres and degrees"
     )
     parser.add_argument(
-        "--direction", choices=("auto", "right", "down"), default="auto",
-        help="where children are; default: auto, which is right unless that is too wide for a page",
+        "--direction", choices=("auto", "right", "down", "columns"), default="auto",
+        help="where children are; default: auto, which is right unless that is too wide or too tall for a page",
     )  # fmt: skip
     parser.add_argument(
         "--collapse",

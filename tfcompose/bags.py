@@ -244,7 +244,7 @@ def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) ->
             f"{path} has neither {' nor '.join(requested)}", f"TF is on {names}: {namespace_options(others)}"
         )
     names = ", ".join(sorted({topic for topic, _ in held})[:_NAMED_AT_MOST])
-    return BagError(f"{path} holds no TF", f"it holds {names}" if names else "it holds nothing")
+    return BagError(f"{path} holds no TF", f"it holds {names}" if names else "it is empty")
 
 
 def _help_of(type_: str) -> str:

@@ -355,9 +355,9 @@ ROS does not connect publishers and subscribers of different types: nobody recei
 that was converted with the old type, tf/msg/tfMessage.""",
     "TF833": """An edge's stamps are already old when they arrive.
 
-A lookup of now, or of a scan that was just taken, is "extrapolation into the future" until the edge arrives: message
-filters wait, or drop. The node uses an old stamp, publishes late, is overloaded, or its machine's clock is behind.
-Listeners can look up the latest time (time 0), or wait with a timeout.""",
+A lookup at the current time, or of a scan just taken, is "extrapolation into the future" until the edge arrives:
+message filters wait, or drop. The node uses an old stamp, publishes late, is overloaded, or its machine's clock is
+behind. Listeners can look up the latest time (time 0), or wait with a timeout.""",
     "TF834": """The clock of another machine differs from this one.
 
 Stamps of that machine's nodes are ahead or behind by as much, and lookups across machines extrapolate. DDS writes into
@@ -365,9 +365,9 @@ each message when it was sent: one that arrives before that comes from a clock t
 is by how much a clock is behind, or a network is slow. Use chrony or ptp on all machines.""",
     "TF835": """An edge is stamped ahead of time.
 
-AMCL, SLAM and others stamp map → odom up to a second ahead, so that lookups of now find it. A larger tolerance, or
-odometry and joints that are ahead at all, is a guess about where the robot will be, or a clock that is ahead: a lookup
-for a scan returns the pose from before the scan, and obstacles appear beside where they are.""",
+AMCL, SLAM and others stamp map → odom up to a second ahead, so that lookups at the current time find it. A larger
+tolerance, or odometry and joints that are ahead at all, is a guess about where the robot will be, or a clock that is
+ahead: a lookup for a scan returns the pose from before the scan, and obstacles appear beside where they are.""",
     "TF836": """Nodes use simulated time, but nobody publishes it.
 
 A node with use_sim_time: true takes its time from /clock; until the first message its time is 0 and does not advance:

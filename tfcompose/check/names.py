@@ -48,7 +48,7 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
         if not _PROCESS.fullmatch(process.name):
             yield _invalid(process.name, process.at, "process name")
         elif process.name == _LAUNCHER:
-            message = f"a process cannot be called {_LAUNCHER}: that is the launcher in logs and findings"
+            message = f"a process cannot be called {_LAUNCHER}: logs and findings use that name for the launcher"
             yield finding("TF501", message, process.at, help="give the process another name")
         elif (process.package or process.kind != "run" or process.params) and not _NODE.fullmatch(process.node):
             yield _invalid(process.node, process.at, "node name")

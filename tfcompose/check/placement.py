@@ -306,13 +306,13 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
         if zone.frame not in robot.frames:
             if not robot.excuses(zone.frame):
                 advice = did_you_mean(zone.frame, robot.frames)
-                yield finding("TF646", f"the zone {zone.name}: no frame {zone.frame}", zone.at, help=advice)
+                yield finding("TF646", f"the zone {zone.name}: unknown frame {zone.frame}", zone.at, help=advice)
             continue
         names = [sensor.name for sensor in robot.sensors]
         wrong = [one for one in zone.by if one not in KINDS and one not in names]
         if wrong:
             advice = did_you_mean(wrong[0], [*KINDS, *names])
-            yield finding("TF646", f"the zone {zone.name}: no sensor {wrong[0]}", zone.at, help=advice)
+            yield finding("TF646", f"the zone {zone.name}: unknown sensor {wrong[0]}", zone.at, help=advice)
             continue
         part, unknown = _covered(robot, zone)
         if part < zone.least - 1e-9:

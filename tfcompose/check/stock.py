@@ -124,5 +124,5 @@ def _publishes_too(process: Process, what: str, edge: Edge, *, sure: bool = True
     will = "publishes" if sure else "probably publishes"
     message = f"{process.name} {will} {what}, and so does {edge.owner}, the owner"
     notes = [Note(f"{edge.name} is defined here", edge.owner_at or edge.at)]
-    advice = f"remove {process.name}, or write owner: {process.name} on what it is to publish"
+    advice = f"remove {process.name}, or write owner: {process.name} on the edges that it is meant to publish"
     return finding("TF317", message, process.at, help=advice, notes=notes, severity="error" if sure else "warning")

@@ -139,7 +139,7 @@ def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]
     """
     for frame in (a, b):
         if frame not in robot.frames:
-            fail(f"no frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
+            fail(f"unknown frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
     up, down = _ancestry(robot, a), _ancestry(robot, b)
     shared = {id(edge) for edge in up} & {id(edge) for edge in down}
     rising = [edge for edge in up if id(edge) not in shared]

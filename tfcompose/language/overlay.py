@@ -330,7 +330,7 @@ def _wrong_profiles(source: Source) -> list[Finding]:
 def _unknown_profile(source: Source, name: str, known: list[str]) -> Finding:
     there = f"there is {', '.join(known)}" if known else "the file has no profiles"
     span = source.at_key(("profiles",))
-    return finding("TF009", f"no profile {name}", span, help=did_you_mean(name, known, there))
+    return finding("TF009", f"unknown profile {name}", span, help=did_you_mean(name, known, there))
 
 
 MOST_FILES = 50

@@ -61,7 +61,7 @@ def is_rotation(rows: Matrix) -> Matrix:
     pairs = [(i, j) for i in range(3) for j in range(i + 1)]
     worst = max(abs(sum(a * b for a, b in zip(rows[i], rows[j], strict=True)) - (i == j)) for i, j in pairs)
     if worst > UNIT_TOLERANCE:
-        message = f"the matrix is not a rotation: its rows are off from orthonormal by {worst:.3g}"
+        message = f"the matrix is not a rotation: its rows are not orthonormal (off by {worst:.3g})"
         raise refused("TF403", message, "three rows; column i is the child's axis i in the parent")
     (a, b, c), (d, e, f), (g, h, i) = rows
     if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:

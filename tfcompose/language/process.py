@@ -76,7 +76,7 @@ def _arguments(value: Any) -> Any:
     wrong = [name for name, item in value.items() if isinstance(item, (dict, list))]
     if wrong:
         raise several(
-            *(((name,), refused("TF103", f"{shown(value[name])} is not a string or number")) for name in wrong)
+            *(((name,), refused("TF103", f"expected a string or a number, got {shown(value[name])}")) for name in wrong)
         )
     return [f"{name}:={_argument(item)}" for name, item in value.items()]
 

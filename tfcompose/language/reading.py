@@ -304,15 +304,15 @@ def _in_yaml(value: Any) -> str:
 
 #: pydantic's kinds of errors that the models can raise: code, message and help.
 WORDS = {
-    "bool_type": ("TF103", "{value} is not true or false", ""),
-    "dataclass_type": ("TF103", "{value} is not a mapping", ""),
-    "dict_type": ("TF103", "{value} is not a mapping", ""),
+    "bool_type": ("TF103", "expected true or false, got {value}", ""),
+    "dataclass_type": ("TF103", "expected a mapping, got {value}", ""),
+    "dict_type": ("TF103", "expected a mapping, got {value}", ""),
     "greater_than_equal": ("TF106", "{value} is less than {ge}", ""),
-    "int_type": ("TF103", "{value} is not a whole number", ""),
+    "int_type": ("TF103", "expected a whole number, got {value}", ""),
     "less_than_equal": ("TF106", "{value} is greater than {le}", ""),
-    "model_type": ("TF103", "{value} is not a mapping", ""),
-    "string_type": ("TF103", "{value} is not a string", ""),
-    "tuple_type": ("TF103", "{value} is not a list", ""),
+    "model_type": ("TF103", "expected a mapping, got {value}", ""),
+    "string_type": ("TF103", "expected a string, got {value}", ""),
+    "tuple_type": ("TF103", "expected a list, got {value}", ""),
 }
 #: For a kind that a later pydantic may bring.
 UNFORESEEN = ("TF103", "{value} cannot stand here", "")

@@ -77,7 +77,7 @@ class Mimic(Spec):
 
 def _only_one(value: Any) -> Any:
     if isinstance(value, list):
-        raise refused("TF103", f"{shown(value)} is not a string", "a joint has one parent")
+        raise refused("TF103", f"expected a string, got {shown(value)}", "a joint has one parent")
     return [value]
 
 
@@ -151,7 +151,7 @@ def _scalar(value: Any) -> str:
         return str(value)
     if isinstance(value, float):
         return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)  # noqa: PLR2004 (exact)
-    raise refused("TF103", f"{shown(value)} is not a string, number, true or false")
+    raise refused("TF103", f"expected a string, a number, true or false, got {shown(value)}")
 
 
 #: A parameter in XML, as the string that stands there.
@@ -164,7 +164,8 @@ def _by_name(value: Any) -> Any:
         return value
     wrong = [index for index, name in enumerate(value) if not isinstance(name, str)]
     if wrong:
-        raise several(*(((index,), refused("TF103", f"{shown(value[index])} is not a string")) for index in wrong))
+        got = {index: f"expected a string, got {shown(value[index])}" for index in wrong}
+        raise several(*(((index,), refused("TF103", message)) for index, message in got.items()))
     return {name: {} for name in value}
 
 

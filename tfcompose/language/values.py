@@ -136,7 +136,9 @@ def _is_true(value: Any) -> bool:
     if _truth(value) is True:
         return True
     is_meant = isinstance(value, str) and value.lower() in {"yes", "on"}
-    raise refused("TF106", f"{shown(value)} is not true", "write true" if is_meant else "write true, or remove the key")
+    raise refused(
+        "TF106", f"expected true, got {shown(value)}", "write true" if is_meant else "write true, or remove the key"
+    )
 
 
 def _names_a_variable(name: str) -> str:
@@ -158,7 +160,7 @@ def _with_opacity(value: Any) -> Any:
 def _colour_part(value: float) -> float:
     if 0 <= value <= 1:
         return value
-    raise refused("TF106", f"{shown(value)} is not a part of a colour: 0 to 1", "divide values up to 255 by 255")
+    raise refused("TF106", f"{shown(value)} is not a colour component: 0 to 1", "divide values up to 255 by 255")
 
 
 def _has_direction(axis: Vector) -> Vector:
@@ -171,7 +173,7 @@ def _has_direction(axis: Vector) -> Vector:
 def _is_visible(factors: Vector) -> Vector:
     if all(abs(factor) > SMALLEST for factor in factors):
         return factors
-    raise refused("TF106", "a scale of 0: nothing is left of the mesh", "for example 0.001")
+    raise refused("TF106", "a scale of 0 leaves nothing of the mesh", "for example 0.001")
 
 
 #: Colours that have names, in red, green and blue: those of HTML 4 and three that robots often have.

@@ -134,9 +134,7 @@ def _refuse_own_profile(process: PlanProcess, command: Command) -> None:
     if found is None:
         return
     variable, file = found[1], (found["file"] or "").strip("\"'")
-    message = (
-        f"a command sets {variable} itself{f' to {file}' if file else ''}, and so leaves the fence of guard: strict"
-    )
+    message = f"guard: strict cannot fence off a command that sets {variable} itself{f', to {file}' if file else ''}"
     advice = f"name the file in the robot's file, and the fence is added to it: env: {{{variable}: {file or 'FILE'}}}"
     raise _CannotFenceError(message, f"{advice}; or let it fence off by remapping: guard: {{fence: remap}}")
 

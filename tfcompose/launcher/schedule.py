@@ -41,7 +41,9 @@ def refused_schedule(process: PlanProcess) -> Finding | None:
         with ThreadPoolExecutor(1) as thread:
             lacking = set(schedule.cpus) - thread.submit(_cpus_with, schedule).result()
     except PermissionError:
-        message = f"{process.name} may not have the policy {schedule.policy} with priority {schedule.priority}"
+        message = (
+            f"this user may not start {process.name} with policy {schedule.policy} and priority {schedule.priority}"
+        )
         advice = "rtprio in /etc/security/limits.conf, LimitRTPRIO= in a systemd unit, or the capability CAP_SYS_NICE"
         return finding("TF911", message, None, help=advice)
     except (OSError, ValueError, OverflowError):
@@ -49,7 +51,7 @@ def refused_schedule(process: PlanProcess) -> Finding | None:
     if not lacking:
         return None
     message = f"{process.name} cannot run on {', '.join(f'CPU {one}' for one in sorted(lacking))}"
-    return finding("TF911", message, None, help="they count from 0; lscpu lists those that are there")
+    return finding("TF911", message, None, help="CPUs count from 0; lscpu lists them")
 
 
 def _cpus_with(schedule: Schedule) -> set[int]:

@@ -48,7 +48,7 @@ def read_plan(text: str, file: str) -> Plan:
         line, column = getattr(error, "lineno", 1), getattr(error, "colno", 1)
         raise RejectedError([_bad(f"not a plan: {error}", Span(file, line, column, line, column + 1))]) from None
     if not isinstance(data, dict) or "edges" not in data or "processes" not in data:
-        raise RejectedError([_bad("not a plan: it has no edges and processes", Span(file))])
+        raise RejectedError([_bad("not a plan: it has no edges or processes", Span(file))])
     if data.get("version") != VERSION or data["version"] is True:
         message = f"the plan has version {shown(data.get('version'))}; this tfcompose reads version {VERSION}"
         raise RejectedError([_bad(message, Span(file))])

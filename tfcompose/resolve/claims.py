@@ -94,7 +94,7 @@ class _Work:
         except KeyError:
             names = node_preset_names()
             advice = did_you_mean(name, names, f"there is {', '.join(names)}")
-            self.found.append(finding("TF601", f"no preset {name} of a node", self.source.at(path), help=advice))
+            self.found.append(finding("TF601", f"unknown node preset {name}", self.source.at(path), help=advice))
         except RejectedError as error:
             self.found += error.findings
         return None

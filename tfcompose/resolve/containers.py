@@ -98,7 +98,7 @@ def component_findings(path: Path, process: Process, validated: Validated) -> It
                 yield finding("TF103", f"{process.name}: {key} is {wrong}", source.at(at), help=_KINDS)
 
 
-_KINDS = "a parameter is true or false, a number, a text, or a list of one of these"
+_KINDS = "a parameter is true or false, a number, a string, or a list of one of these"
 
 
 def _not_a_parameter(value: object) -> str:

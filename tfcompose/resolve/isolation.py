@@ -64,7 +64,7 @@ def _wrong(robot: Robot, spec: RobotSpec, source: Source) -> list[Finding]:
         if frame not in robot.frames and not robot.excuses(frame):
             place = source.at(("ros", "shared_frames", index))
             advice = did_you_mean(frame, robot.frames, "remove it")
-            found.append(finding("TF203", f"shared_frames: no frame {frame}", place, help=advice))
+            found.append(finding("TF203", f"shared_frames: unknown frame {frame}", place, help=advice))
     return found
 
 
@@ -112,7 +112,7 @@ class _Filler:
         if frame not in self.robot.frames and not self.robot.excuses(frame):
             advice = did_you_mean(frame, self.robot.frames)
             at = self.source.at(path)
-            self.found.append(finding("TF203", f"${{frame({frame})}}: no frame {frame}", at, help=advice))
+            self.found.append(finding("TF203", f"${{frame({frame})}}: unknown frame {frame}", at, help=advice))
         return self.robot.final(frame)
 
     def _file(self, name: str, path: Path) -> str:

@@ -119,5 +119,5 @@ def _useless(part: PartEntry, file: str, validated: Validated) -> list[Finding]:
         if section == "vars" and name in given and name not in known:
             at = part.source.at_key((*part.at, "vars", name))
             advice = did_you_mean(name, known, "remove it")
-            found.append(finding("TF105", f"{file} has no use for the variable {name}", at, help=advice))
+            found.append(finding("TF105", f"{file} does not use the variable {name}", at, help=advice))
     return found

@@ -182,7 +182,7 @@ class Solver:
             raise _UnsolvableError(None)
         otherwise = f"one of: {listed(inside)}" if inside else ""
         advice = left_out_by(self.conditions, frame) or did_you_mean(frame, inside or self.frames, otherwise)
-        raise _UnsolvableError(finding("TF203", f"no frame {frame}", at, help=advice))
+        raise _UnsolvableError(finding("TF203", f"unknown frame {frame}", at, help=advice))
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
         """Return the frame and its ancestors, each with the index of the edge to its parent (the root: −1)."""

@@ -113,7 +113,7 @@ def _no_preset(name: str, library: Library, span: Span) -> Finding:
     there = f"of {vendor} there is {', '.join(same)}" if same else "tfcompose presets lists them"
     models = [one for one in names if one.rpartition("/")[2] == name.rpartition("/")[2].lower()]
     advice = f"did you mean {' or '.join(models)}?" if models and not same else did_you_mean(name, same or names, there)
-    return finding("TF601", f"no preset {name}", span, help=advice)
+    return finding("TF601", f"unknown preset {name}", span, help=advice)
 
 
 def _publisher(sensor: Sensor) -> str:

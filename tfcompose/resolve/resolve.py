@@ -221,7 +221,7 @@ class _Work:
                 return base
             if not robot.excuses(base):
                 advice = did_you_mean(base, robot.frames)
-                self.found.append(finding("TF203", f"no frame {base}", self.source.at(("base",)), help=advice))
+                self.found.append(finding("TF203", f"unknown frame {base}", self.source.at(("base",)), help=advice))
             return None
         if "base_link" in robot.frames:
             above = robot.parent_edge("base_link")

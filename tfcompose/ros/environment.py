@@ -128,11 +128,11 @@ def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
         found = {file.stem.removeprefix("lib") for folder in _folders() for file in folder.glob("librmw_*_cpp.so")}
         here = sorted(name for name in found if "_shared_" not in name and "__" not in name)
         package = f"ros-jazzy-{name.replace('_', '-')}"
-        advice, message = f"unset {RMW}, or install {package}", f"{RMW}={name}, and this ROS has no such middleware"
+        advice, message = f"unset {RMW}, or install {package}", f"{RMW}={name}, which is not installed"
         if ros and ros.rmw:
             advice, message = (
                 f"install {package}, or change rmw",
-                f"rmw: {ros.rmw} needs {name}, which this ROS has not",
+                f"rmw: {ros.rmw} needs {name}, which is not installed",
             )
         advice += f"; here is {', '.join(here)}" if here else ""
         return finding("TF909", message, None, help=advice)

@@ -103,7 +103,7 @@ def late_stamps(state: TreeState) -> Iterator[Finding]:
     for edges in by_publisher(state, is_late):
         late = duration(late_s(edges[0]))
         message = f"{names_of(edges)} from {who(edges[0])} arrives {late} after its stamp"
-        notes = [Note(f"a lookup of now, or of data that is newer, is extrapolation into the future by {late}")]
+        notes = [Note(f"lookups at the current time, or of newer data, extrapolate {late} into the future")]
         advice = "stamp with the time of the measurement and send at once; is the node overloaded, or its clock behind?"
         yield finding("TF833", message, None, severity="warning", notes=notes, help=advice)
 

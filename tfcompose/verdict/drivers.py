@@ -107,9 +107,8 @@ def driver_pose_differs(node: str, off: Sequence[tuple[Expected, Pose]], place: 
     )
     notes = [Note(f"{one.edge.child} in {one.edge.parent}: {compared(one.edge.pose, pose)}") for one, pose in others]
     own = f"{{{edge.child}: {{xyz: [{_row(sent.xyz)}], quat_xyzw: [{_row(sent.quat_xyzw)}]}}}}"
-    advice = (
-        f"is {driven.sensor} another model? If this unit is so, say so: sensors: {{{driven.sensor}: {{frames: {own}}}}}"
-    )
+    values = f"sensors: {{{driven.sensor}: {{frames: {own}}}}}"
+    advice = f"is {driven.sensor} another model? If these are this unit's values, write them: {values}"
     return finding("TF828", message, place, help=advice, notes=notes, severity="warning")
 
 

@@ -163,7 +163,7 @@ def both_topics(state: TreeState) -> Iterator[Finding]:
             continue
         moving, fixed = found[False], found[True]
         message = topics_message(child, [(state.topics[0], who(moving)), (state.topics[1], who(fixed))])
-        advice = "send it on one of them: tf2 throws the frame's history away each time that it changes"
+        advice = "send it on one of them: tf2 discards the frame's history whenever it changes"
         yield finding("TF809", message, None, help=advice)
 
 

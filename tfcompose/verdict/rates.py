@@ -134,7 +134,11 @@ def low_rate(state: TreeState) -> Iterator[Finding]:
             continue
         often = f"{rate:.2g} Hz" if rate < least / 2 else f"{rate:.3g} Hz"
         message = f"{edge.name} comes at {often} from {who(edge)}; it needs at least {least:.3g} Hz"
-        notes = [Note(f"between two messages, {duration(1 / rate)}, lookups of now are extrapolation into the future")]
+        notes = [
+            Note(
+                f"in the {duration(1 / rate)} between messages, lookups at the current time extrapolate into the future"
+            )
+        ]
         advice = "raise its rate: publish_rate, publish_frequency, frequency, transform_publish_period"
         yield finding("TF838", message, None, severity="warning", notes=notes, help=advice)
 

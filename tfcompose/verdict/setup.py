@@ -105,12 +105,12 @@ def settings_contradict(state: TreeState) -> Iterator[Finding]:
     if settings.get(LOCALHOST_ONLY) == "1":
         if value not in {"", "LOCALHOST"}:
             message = f"{LOCALHOST_ONLY}=1 is set, so {RANGE}={value} has no effect: other machines are not reached"
-            yield finding("TF909", message, None, severity="warning", help=f"unset {LOCALHOST_ONLY}; it is out of use")
+            yield finding("TF909", message, None, severity="warning", help=f"unset {LOCALHOST_ONLY}; it is deprecated")
     elif value not in {"", "SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"}:
         message = f"{RANGE}={value} is not one of SUBNET, LOCALHOST, OFF, SYSTEM_DEFAULT"
         yield finding("TF909", message, None, severity="warning", help="ROS takes SUBNET instead, with a warning")
     elif value == "OFF":
-        message = f"{RANGE}=OFF: nobody is discovered, not even on this machine"
+        message = f"{RANGE}=OFF: nodes discover nobody, not even on this machine"
         yield finding("TF909", message, None, help=f"export {RANGE}=LOCALHOST, or SUBNET for several machines")
 
 

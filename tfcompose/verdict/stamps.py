@@ -101,7 +101,8 @@ def advice(code: str, detail: str) -> str:
             "tf2 sorts it in behind newer ones, or drops it; was a bag or a simulation started again, or a clock set?"
         )
     if detail == "without a stamp":
-        return "a node with use_sim_time stamps 0 while there is no /clock; else set header.stamp from the node's clock"
+        simulated = "a node with use_sim_time stamps 0 while nothing publishes /clock"
+        return f"{simulated}; otherwise set header.stamp from the node's clock"
     apart = "no lookup can combine it with the rest"
     if "simulated" in detail or "/clock" in detail:
         return f"{apart}: use_sim_time must be the same for all nodes, and agree with ros.clock"
@@ -281,7 +282,7 @@ def stamps_ahead(state: TreeState) -> Iterator[Finding]:
     for edges in by_publisher(state, ahead):
         ahead_s = -(edges[0].timing.delay_s or 0.0)
         message = f"{who(edges[0])} stamps {names_of(edges)} {duration(ahead_s)} ahead of time"
-        advice = "lookups of now get a pose from before; is its clock ahead, or its time offset too large?"
+        advice = "lookups at the current time get an older pose; is its clock ahead, or its time offset too large?"
         yield finding("TF835", message, None, severity="warning", help=advice)
 
 

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 #: So many publishers are named of one frame.
 MOST_NOTES = 8
 _ZERO = 1e-9
-_FIX = "fix what the node computes it from; until then the frame is not there"
-_FIX_SOME = "fix what the node computes it from; tf2 goes on with those before and after"
+_FIX = "fix what the node computes it from; until then the frame does not exist"
+_FIX_SOME = "fix what the node computes it from; tf2 uses the messages before and after"
 _NORMALISE = (
-    "bring it to length 1 in the node: RViz shows the frame all the same, since tf2 on Jazzy does so when it takes it, "
+    "bring it to length 1 in the node: RViz shows the frame anyway, since tf2 on Jazzy normalises it, "
     "but stricter readers drop it"
 )
 
@@ -181,7 +181,7 @@ def _bridge(state: TreeState, root: str, main: set[str], own: set[str]) -> str:
         return f"is {root} meant to be {slip}? One of the two names is misspelt"
     for name in sorted(main):
         if root.rpartition("/")[2] == name.rpartition("/")[2]:
-            return f"is {root} meant to be {name}? One of the two has a frame_prefix too much or too little"
+            return f"is {root} meant to be {name}? One of the two has a frame_prefix too many or too few"
     return f"publish the edge that leads to {root}; is the node that should do it running?"
 
 

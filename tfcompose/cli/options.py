@@ -43,7 +43,7 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
         help="set one value, applied last: sensors.camera.tf=driver; repeatable",
     )  # fmt: skip
-    parser.add_argument("--show-args", action="store_true", help="print the robot file's arguments, and do no more")
+    parser.add_argument("--show-args", action="store_true", help="print the robot file's arguments and exit")
     parser.add_argument(
         "given", nargs="*", default=[], metavar="NAME:=VALUE", help="the value of an argument of the robot file"
     )

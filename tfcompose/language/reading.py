@@ -56,7 +56,13 @@ class Refusal:
         edits = [Edit(span, self.instead)] if self.instead is not None else []
         meant = _laid_over_nothing(source, self.path) if self.code == "TF102" and source.is_variant else ""
         if meant:  # one finding, whatever it lacks
-            return finding("TF102", f"{self.path[-1]} is new here, and not complete", span, help=meant, notes=notes)
+            return finding(
+                "TF102",
+                f"{self.path[-1]} does not exist, and is not complete as a new entry",
+                span,
+                help=meant,
+                notes=notes,
+            )
         return finding(self.code, self.message, span, help=self.help, notes=notes, edits=edits)
 
 

@@ -408,7 +408,9 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Findi
     known = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
     found = []
     if name != "none" and name not in known:
-        advice = did_you_mean(name, known, f"processes: {{{name}: {{external: true}}}}")
+        declare = f"processes: {{{name}: {{external: true}}}}"
+        otherwise = f"leave driver out to start that of the preset; or {declare}" if sensor.preset.driver else declare
+        advice = did_you_mean(name, known, otherwise)
         if name in OFF:
             advice = "driver: none starts no driver"
         found.append(

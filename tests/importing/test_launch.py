@@ -113,7 +113,7 @@ def test_each_action_of_a_python_launch_file_has_its_entry(package: Path, monkey
     assert [processes[f"camera_{i}"]["params"] for i in range(2)] == [{"id": 0}, {"id": 1}]
     drive = processes["drive"]
     assert drive["params"] == {
-        "speed": 20, "file": "../drive.yaml", "wheels.count": 4, "text": "4", "from_argument": "${args.cameras}",
+        "file": "../drive.yaml", "wheels.count": 4, "text": "4", "from_argument": "${args.cameras}",
         "kept": "2",
         "mixed": [1, 2.5],
     }  # fmt: skip
@@ -472,6 +472,20 @@ def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_n
     wanted = [number for number, line in enumerate(PUBLISHERS.splitlines(), start=1)
               if any(word in line for word in ("p::Bogus", "p::Moves", "nameless", "p::Alone", "p::Lost"))]  # fmt: skip
     assert set(places(printed_errors(capsys), "TF020")) == {f"a.launch.xml:{line}" for line in wanted}
+
+
+def test_a_parameter_file_lies_over_the_parameters_before_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    over = "/**: {ros__parameters: {a: {b: 5}}}\n/elsewhere: {ros__parameters: {d: 1}}\n"
+    (tmp_path / "over.yaml").write_text(over, encoding="utf-8")
+    text = f"""<launch><node pkg="p" exec="e" name="n">
+      <param name="a"><param name="b" value="1"/><param name="c" value="2"/></param><param name="d" value="3"/>
+      <param from="{tmp_path}/over.yaml"/><param name="e" value="4"/></node>
+      <node pkg="p" exec="e" name="m"><param name="a" value="1"/><param from="{tmp_path}/none.yaml"/></node></launch>"""
+    _, data = import_of(source(tmp_path, "a.launch.xml", text), code=None)
+    assert data["processes"]["n"]["params"] == {"file": "over.yaml", "a.c": 2, "d": 3, "e": 4}
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.xml:4"]
 
 
 #: As in bringups of MoveIt, TurtleBot 4 and Nav2.

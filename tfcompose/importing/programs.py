@@ -20,7 +20,7 @@ from tfcompose.numbers import number
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.files import Target
     from tfcompose.findings import Span
@@ -271,7 +271,7 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
         notes.append(f"the source does not name the node: it is called {name} here")
     if program.namespace and program.namespace.strip("/"):
         keys["namespace"] = program.namespace.strip("/")
-    params, left = _params(program.params, target)
+    params, left = _params(program.params, target, program.name or name)
     keys |= {"params": params} if params else {}
     keys |= {"remap": remappings(program.remap)} if program.remap else {}
     keys |= {"env": dict(program.env)} if program.env else {}
@@ -328,22 +328,10 @@ def _container_keys(program: Program) -> dict[str, Any]:
 
 def _named_in_files(params: Sequence[Mapping[str, Any] | str]) -> str | None:
     """Return the node that parameter files are written for, where that is one alone; None where none is named."""
-    names: set[str] = set()
-    for file in params:
-        if isinstance(file, str) and Path(file).is_file():
-            try:
-                data = yaml.load(Path(file).read_text("utf-8"), Loader=yaml.CSafeLoader)
-            except (OSError, UnicodeDecodeError, yaml.YAMLError):
-                continue
-            names |= (
-                {str(key).rpartition("/")[2] for key in data if "*" not in str(key)} if _is_of_nodes(data) else set()
-            )
+    keys = [key for file in params if isinstance(file, str) for key in _nodes_in(file) or ()]
+    names = {key.rpartition("/")[2] for key in keys if "*" not in key}
     name = names.pop() if len(names) == 1 else ""
     return name if _NODE.fullmatch(name) else None
-
-
-def _is_of_nodes(data: Any) -> bool:
-    return isinstance(data, dict) and all(isinstance(one, dict) and "ros__parameters" in one for one in data.values())
 
 
 def _usual_name(package: str) -> str | None:
@@ -388,8 +376,11 @@ def _plain(program: Program) -> str:
     return posixpath.basename(script).removesuffix(".py") if script and plain.startswith("python") else plain
 
 
-def _params(given: Sequence[Mapping[str, Any] | str], target: Target) -> tuple[dict[str, Any], list[str]]:
-    """Return the parameters as a robot file has them, files first, and what cannot be said of them."""
+def _params(given: Sequence[Mapping[str, Any] | str], target: Target, node: str) -> tuple[dict[str, Any], list[str]]:
+    """Return the parameters as a robot file has them, files first, and what cannot be said of them.
+
+    What a file lays over the parameters before it is left to the file.
+    """
     files: list[str] = []
     own: dict[str, Any] = {}
     left = []
@@ -400,7 +391,40 @@ def _params(given: Sequence[Mapping[str, Any] | str], target: Target) -> tuple[d
             left.append(f"the parameters of {one}: the package is not found here")
         else:
             files.append(target.from_folder(one))
-            if own:
+            known = _parameters_in(one, node) if own else set()
+            if known is None:
                 left.append(f"{one} is laid over the parameters before it: here they are laid over the file")
+            own = {key: value for key, value in own.items() if key not in (known or ())}
     named: dict[str, Any] = {"file": files[0] if len(files) == 1 else files} if files else {}
     return named | {key: parameter(value) for key, value in own.items()}, left
+
+
+def _parameters_in(file: str, node: str) -> set[str] | None:
+    """Return the full names of a node's parameters in a file, or None where it cannot be read."""
+    data = _nodes_in(file)
+    if data is None:
+        return None
+    several = (one["ros__parameters"] for key, one in data.items() if key.rpartition("/")[2] in {"*", "**", node})
+    return {name for params in several for name in _full_names(params, "")}
+
+
+def _full_names(params: Any, above: str) -> Iterator[str]:
+    for key, value in params.items() if isinstance(params, dict) else ():
+        if isinstance(value, dict):
+            yield from _full_names(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}"
+
+
+def _nodes_in(file: str) -> dict[str, Any] | None:
+    """Return what a parameter file has by its nodes, or None where it is not there, or none."""
+    try:
+        data = yaml.load(Path(file).read_text("utf-8"), Loader=yaml.CSafeLoader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError):
+        return None
+    of_nodes = isinstance(data, dict) and all(
+        isinstance(one, dict) and "ros__parameters" in one for one in data.values()
+    )
+    if not of_nodes:
+        return None
+    return {str(key): one for key, one in data.items()}

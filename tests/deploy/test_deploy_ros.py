@@ -185,7 +185,7 @@ def test_clocks_that_are_apart_are_found_before_the_start(computers: Computers) 
     shifted.mkdir()
     (shifted / "sitecustomize.py").write_text(SHIFTED)
     python = shifted / "python"
-    python.write_text(f'#!/bin/sh\nPYTHONPATH="{shifted}:$PYTHONPATH" exec {sys.executable} "$@"\n')
+    python.write_text(f'#!/bin/sh\necho welcome\nPYTHONPATH="{shifted}:$PYTHONPATH" exec {sys.executable} "$@"\n')
     python.chmod(0o755)
     ahead = MOVED.replace("10.77.0.4, port: 2222", f"10.77.0.4, port: 2222, python: {python}")
     done = deploy(computers, ahead)

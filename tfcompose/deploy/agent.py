@@ -77,6 +77,7 @@ class Agent:
         self.lock: int | None = None
         self.trial: dict[str, Any] | None = None
         self.running: Path | None = None
+        self.restarts = 0
         self.archive: io.BufferedRandom | None = None
         runtime = Path(f"/run/user/{os.getuid()}")
         if "XDG_RUNTIME_DIR" not in os.environ and runtime.is_dir():
@@ -128,7 +129,8 @@ class Agent:
         """Return what is there: the releases, the current one's files by their digests, the unit, and what runs."""
         release = self._release("current")
         shown = self._shown()
-        status = self.status()
+        self.restarts = _restarts(shown)
+        status = self._status(shown)
         launcher = status["robot"]["launcher"] if status["robot"] else None
         return {
             "release": release,
@@ -230,6 +232,7 @@ class Agent:
             _write(self.runtime / self.unit, unit)
         self._must("daemon-reload")
         self._systemctl("reset-failed", self.unit)
+        self.restarts = 0
         self._must("start", self.unit)
 
     def wait(self, seconds: float) -> dict[str, Any]:
@@ -238,31 +241,32 @@ class Agent:
         while not self.gone.is_set():
             left = end - time.monotonic()
             shown = self._shown()
-            failed = shown.get("ActiveState") in {"failed", "inactive"} or int(shown.get("NRestarts") or 0) > 0
-            if left <= 0 or failed:
+            if left <= 0 or shown.get("ActiveState") == "inactive" or self._has_failed(shown):
                 break
             words = ["wait", "--ready", "--timeout", f"{left:.1f}", "--robot", self.name]
             begun = time.monotonic()
             if self._tfcompose(words, left + PROGRAM_S).returncode == 0:
                 break
             self.gone.wait(min(0.3, max(left, 0)) if time.monotonic() - begun < left else 0)
-        return self.status()
+        return self._status(self._shown())
 
-    def status(self) -> dict[str, Any]:
+    def _status(self, shown: dict[str, str]) -> dict[str, Any]:
         """Return what the launcher says, None where none answers, and, where the unit has failed, its last lines."""
         done = self._tfcompose(["ps", "--format", "json", "--robot", self.name], PROGRAM_S)
         try:
             robots = json.loads(done.stdout)
         except ValueError:
             robots = []
-        shown = self._shown()
-        restarts = int(shown.get("NRestarts") or 0)
-        failed = shown.get("ActiveState") == "failed" or restarts > 0
+        failed = self._has_failed(shown)
         return {
             "robot": robots[0] if robots else None,
             "failed": failed,
             "lines": self._journal() if failed or (not robots and shown.get("ActiveState") == "inactive") else [],
         }
+
+    def _has_failed(self, shown: dict[str, str]) -> bool:
+        """Whether the unit has ended by itself since it was examined, or started here."""
+        return shown.get("ActiveState") == "failed" or _restarts(shown) > self.restarts
 
     def commit(self, release: str) -> None:
         """Keep the release on trial: ``current`` leads to it from now on."""
@@ -415,6 +419,10 @@ def _run(words: list[str], seconds: float, env: dict[str, str]) -> subprocess.Co
         return subprocess.CompletedProcess(words, 124, "", f"{words[0]} does not end within {seconds:g} s")
 
 
+def _restarts(shown: Mapping[str, str]) -> int:
+    return int(shown.get("NRestarts") or 0)
+
+
 def _last_line(text: str) -> str:
     return next((line.strip() for line in reversed(text.splitlines()) if line.strip()), "")
 
@@ -452,7 +460,7 @@ def _link(link: Path, target: str) -> None:
 #: What may be asked.
 _REQUESTS = (
     "probe", "clock", "state", "texts", "take_lock", "chunk", "unpack", "rehearse", "discard", "stop", "start", "wait",
-    "status", "commit", "settle", "back", "execute",
+    "commit", "settle", "back", "execute",
 )  # fmt: skip
 
 

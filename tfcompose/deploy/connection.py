@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import shlex
 import time
@@ -30,8 +31,6 @@ _START = (
     "sys.exit('Python %d.%d is older than 3.10' % sys.version_info[:2]) if sys.version_info < (3, 10) else "
     "exec(compile(i.read(int(i.readline())), 'tfcompose agent', 'exec'), {'__name__': '__main__'})"
 )
-#: The longest line that an agent answers with: texts that are compared, and what the launcher says.
-_LONGEST = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,17 +84,29 @@ class Host:
         async with self._order:
             try:
                 self._process.stdin.write(f"{json.dumps([request, arguments])}\n".encode())
-                line = await asyncio.wait_for(self._process.stdout.readline(), timeout_s)
+                answer = await asyncio.wait_for(self._answer(), timeout_s)
             except asyncio.TimeoutError:
                 raise LostError(f"does not answer within {timeout_s:g} s") from None
             except (OSError, asyncssh.Error, ValueError) as error:
                 raise LostError(f"is lost: {error}") from None
-        if not line:
+        if answer is None:
             raise LostError("is lost: the connection has ended")
-        answer = json.loads(line)
         if "error" in answer:
             raise RefusedError(answer["error"])
         return answer["answer"]
+
+    async def _answer(self) -> dict[str, Any] | None:
+        """Return the next answer, None at the end; what the login prints before is none."""
+        line = b""
+        while part := await self._process.stdout.readline():  # a part of a line that is longer than the window
+            line += part
+            if line.endswith(b"\n"):
+                with contextlib.suppress(ValueError):
+                    answer = json.loads(line)
+                    if isinstance(answer, dict) and not {"answer", "error"}.isdisjoint(answer):
+                        return answer
+                line = b""
+        return None
 
     async def clock_offset_s(self) -> float:
         """Return by how much the host's clock is ahead of this one, in seconds: that of the quickest answer."""

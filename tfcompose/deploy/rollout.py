@@ -79,6 +79,13 @@ class Share:
         assert self.release is not None, "it is made before anything is compared"  # noqa: S101
         return self.release
 
+    def described(self) -> str:
+        """Return what the host has, in words."""
+        probe = self.probe
+        version = f"tfcompose {probe['tfcompose']}" if probe["tfcompose"] else "no tfcompose"
+        logout = "" if probe["lingers"] else ", ends at logout (loginctl enable-linger lets it stay)"
+        return f"Python {probe['python']}, {version}{logout}"
+
     def changes(self) -> list[str]:
         """Return what is to change on the host, one line each; nothing if it runs the release as it is."""
         if self.release is None:
@@ -113,9 +120,7 @@ class Rollout:
         found += _clocks_apart(offsets, self.target)
         found += _settings_apart(self.shares, self.target)
         for share in self.shares:
-            probe = share.probe
-            ahead = f"clock {offsets[share.name] * 1000:+.1f} ms"
-            self.report(f"{share.name}: Python {probe['python']}, tfcompose {probe['tfcompose']}, {ahead}")
+            self.report(f"{share.name}: {share.described()}, clock {offsets[share.name] * 1000:+.1f} ms")
         return found
 
     def _unfit(self, share: Share) -> Iterable[Finding]:
@@ -245,8 +250,16 @@ class Rollout:
         except BaseException:
             await self._back(changing)
             raise
-        await self._all(lambda one: self._ask(one, "settle"), changing)
+        await self._all(self._settle, changing)
         return f"{live} after {duration(time.monotonic() - begun)}"
+
+    async def _settle(self, share: Share) -> None:
+        try:
+            await self._ask(share, "settle")
+        except RejectedError as error:
+            notes = (Note("everything was live, and the other hosts keep the release"),)
+            advice = "deploy again once it is back: it may have returned to the release before"
+            raise RejectedError([replace(error.findings[0], notes=notes, help=advice)]) from None
 
     async def _until_live(self, begun: float) -> str:
         end = begun + self.target.timeout_s
@@ -368,6 +381,14 @@ class Rollout:
         return {share.name: answer for share, answer in zip(self.shares, answers, strict=True)}
 
 
+async def _probed(host: Host) -> dict[str, Any]:
+    try:
+        probe: dict[str, Any] = await host.ask("probe")
+    except (LostError, RefusedError) as error:
+        raise RejectedError([finding("TF913", f"{host.name} {error}", host.at)]) from None
+    return probe
+
+
 def target_of(plan: Plan, names: Sequence[str], places: Mapping[str, Span], **options: Any) -> Target:
     """Return what is deployed to: all hosts that have processes, or the named ones; ``options`` are a ``Target``'s.
 
@@ -456,8 +477,7 @@ async def reached(target: Target, has_wheels: bool, report: Callable[[str], None
         if found := [one for one in done if isinstance(one, Finding)]:
             raise RejectedError(found)
         rollout = Rollout(target, [], report)
-        for there in hosts:
-            probe = await there.ask("probe")
+        for there, probe in zip(hosts, await asyncio.gather(*(_probed(host) for host in hosts)), strict=True):
             unit = Unit(
                 f"{plan.robot}.{there.name}",
                 plan.robot,

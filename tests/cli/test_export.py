@@ -71,6 +71,19 @@ def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
 STRICT = ["--set", "guard.mode=strict"]
 
 
+def test_units_of_a_declared_host_have_its_python_and_setup_unless_others_are_given(robot: Path) -> None:
+    declared = "hosts: {jetson: {python: /opt/py, setup: [/opt/a.bash, /opt/b.bash]}, main: {}}\n"
+    (robot / "two.yaml").write_text(
+        ON_TWO_HOSTS.replace("processes:", f"{declared}processes:\n  static: {{host: main}}")
+    )
+    unit = robot / "build" / "rover" / "systemd" / "rover-arm_drive.service"
+    assert main(["export", "systemd", "two.yaml", "--host", "jetson"]) == 0
+    assert "/opt/a.bash /opt/b.bash" in unit.read_text("utf-8")
+    assert "/opt/py -m tfcompose" in unit.read_text("utf-8")
+    assert main(["export", "systemd", "two.yaml", "--host", "jetson", "--python", "/usr/bin/py"]) == 0
+    assert "/usr/bin/py -m tfcompose" in unit.read_text("utf-8")
+
+
 def test_a_strict_plan_has_no_launch_file_because_there_is_no_guard_in_it(
     robot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_file, add_variant, positive
-from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, printable, reject
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -100,8 +100,9 @@ async def _deploy(target: Target, release: Release | None, arguments: Namespace)
         if found := rollout.strangers():
             print_findings(found, sys.stderr)
             return FAILED
-        if arguments.diff:
-            print("\n".join(await rollout.difference()))
+        if arguments.diff and release is not None:
+            for line in await rollout.difference():
+                print(printable(line))
         changes = rollout.changes()
         if not changes:
             return _unchanged(rollout)
@@ -115,7 +116,7 @@ async def _deploy(target: Target, release: Release | None, arguments: Namespace)
 
 
 def _report(line: str) -> None:
-    print(line, flush=True)
+    print(printable(line), flush=True)
 
 
 def _unchanged(rollout: Rollout) -> int:

@@ -474,6 +474,35 @@ def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_n
     assert set(places(printed_errors(capsys), "TF020")) == {f"a.launch.xml:{line}" for line in wanted}
 
 
+ODD = """
+from launch import LaunchDescription
+from launch_ros.actions import ComposableNodeContainer, LoadComposableNodes, Node
+from launch_ros.descriptions import ComposableNode
+def generate_launch_description():
+    return LaunchDescription([
+        ComposableNodeContainer(name=None, package="a", executable="b", composable_node_descriptions=[None, 3]),
+        LoadComposableNodes(target_container=None, composable_node_descriptions=None),
+        Node(package="a", executable="b", output={"both": 3}),
+        Node(package="a", executable="b", output="bogus"),
+        Node(package="a", executable="b", arguments=3, parameters=[7], remappings=[1]),
+        LoadComposableNodes(target_container="", composable_node_descriptions=[ComposableNode(package="a", plugin="")]),
+        Node(package="a", executable="c", name="sound", sigkill_timeout="-1", respawn=True, respawn_delay=float("nan")),
+        ComposableNodeContainer(name="box", namespace="", package="a", executable="b", composable_node_descriptions=[
+            ComposableNode(package="a", plugin="a::B::", name="odd")]),
+    ])
+"""
+
+
+def test_an_action_that_is_given_nonsense_does_not_end_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data = import_of(source(tmp_path, "odd.launch.py", ODD), code=None)
+    assert data["processes"]["sound"] == {"run": {"package": "a", "executable": "c"}, "restart": "always"}
+    assert data["processes"]["odd"] == {"component": "a/a::B::", "container": "box"}
+    found = places(printed_errors(capsys), "TF020")
+    assert {f"odd.launch.py:{line}" for line in (9, 10, 11, 12, 13)} <= set(found)
+
+
 def test_a_parameter_file_lies_over_the_parameters_before_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -539,7 +568,8 @@ def test_bringups_of_moveit_and_turtlebots_are_read(tmp_path: Path, capsys: pyte
         "robot_description_kinematics.arm.kinematics_solver_timeout": 0.05, "moveit_manage_controllers": True,
         "trajectory.names": ["a", "b"], "planning_pipelines": ["ompl"], "default_planning_pipeline": "ompl",
         "ompl.planner": "ompl", "publish_planning_scene": True, "publish_geometry_updates": True,
-        "publish_state_updates": True, "publish_transforms_updates": True,
+        "publish_state_updates": True, "publish_transforms_updates": True, "publish_robot_description": False,
+        "publish_robot_description_semantic": False,
         "robot_description_planning.default_scaling": 0.1, "loud": True,
     }  # fmt: skip
     assert processes["analyzers"]["run"] == {"package": "diagnostic_aggregator", "executable": "aggregator_node"}

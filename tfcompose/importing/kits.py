@@ -109,8 +109,12 @@ def add_vehicles(
         for (parent, child), several in _calibrated(draft, sources).items():
             keys: dict[str, Any] = {"calibration": path}
             if len(several) < len(vehicles):
-                keys["when"] = Expression(" or ".join(f"args.vehicle_id == '{one}'" for one in several))
+                keys["when"] = Expression(" or ".join(f"args.vehicle_id == {_quoted(one)}" for one in several))
             draft.frame(parent, child, keys, sources[several[0]].at_key((parent, child)))
+
+
+def _quoted(word: str) -> str:
+    return f'"{word}"' if "'" in word else f"'{word}'"
 
 
 def _calibrated(draft: Draft, sources: Mapping[str, Source]) -> dict[tuple[str, str], list[str]]:

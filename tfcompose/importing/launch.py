@@ -509,7 +509,10 @@ def _stop(record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
         try:
             times[key] = float(record.get(key, _LAUNCH_STOP_S))
         except ValueError:
+            times[key] = math.nan
+        if not (math.isfinite(times[key]) and times[key] >= 0):
             todo.append(f"{key} {record[key]}")
+            del times[key]
     if len(times) < 2 or set(times.values()) == {_LAUNCH_STOP_S}:  # noqa: PLR2004 (both are known)
         return {}
     timeout_s, kill_s = times["sigterm_timeout"], times["sigkill_timeout"]
@@ -523,6 +526,7 @@ def _restarts(record: dict[str, Any]) -> dict[str, Any]:
     retries = record.get("respawn_max_retries", -1)
     if retries >= 0:
         keys["max_restarts"] = int(retries)
-    if record.get("respawn_delay") not in (None, 0.0, _FIRST_DELAY_S):
-        keys["restart_delay"] = _seconds(float(record["respawn_delay"]))
+    delay_s = record.get("respawn_delay", 0.0)
+    if math.isfinite(delay_s) and delay_s > 0 and delay_s != _FIRST_DELAY_S:
+        keys["restart_delay"] = _seconds(delay_s)
     return keys

@@ -76,6 +76,8 @@ class Action:
             self.execute(context)
         except FailedError as error:
             context.todo(self.at, f"{self.described(context)}: {error}")
+        except (TypeError, ValueError, AttributeError, LookupError) as error:  # what it was given is of another kind
+            context.todo(self.at, f"{self.described(context)}: {type(error).__name__}: {error}")
 
     def execute(self, context: Context) -> None:
         """Do what it does.
@@ -683,6 +685,8 @@ class LoadComposableNodes(Action):
     def execute(self, context: Context) -> None:
         container = self.container
         target = str(id(container)) if isinstance(container, Node) else f"/{text_of(container, context).strip('/')}"
+        if target == "/":
+            raise FailedError("it names no container")
         _visit_components(self.components, target, context)
 
     def described(self, context: Context) -> str:

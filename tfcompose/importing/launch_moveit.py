@@ -23,13 +23,15 @@ _FILES = {
     "joint_limits": ("config/joint_limits.yaml", "robot_description_planning"),
     "pilz_cartesian_limits": ("config/pilz_cartesian_limits.yaml", "robot_description_planning"),
     "moveit_cpp": ("config/moveit_cpp.yaml", ""),
-    "sensors_3d": ("config/sensors_3d.yaml", ""),
-    "trajectory_execution": ("config/moveit_controllers.yaml", ""),
 }
 #: What MoveIt's configuration has even if nobody asks for it.
 _USUAL = ("robot_description", "robot_description_semantic", "robot_description_kinematics", "planning_pipelines",
-          "trajectory_execution", "planning_scene_monitor", "joint_limits")  # fmt: skip
-_MONITOR = ("publish_planning_scene", "publish_geometry_updates", "publish_state_updates", "publish_transforms_updates")
+          "trajectory_execution", "planning_scene_monitor", "sensors_3d", "joint_limits")  # fmt: skip
+#: What the monitor of the scene publishes unless it is told, by the parameters that say so, in the builder's order.
+_MONITOR = {
+    "publish_planning_scene": True, "publish_geometry_updates": True, "publish_state_updates": True,
+    "publish_transforms_updates": True, "publish_robot_description": False, "publish_robot_description_semantic": False,
+}  # fmt: skip
 
 
 class MoveItConfigs:
@@ -94,20 +96,40 @@ class MoveItConfigsBuilder:
 
     def planning_scene_monitor(self, *given: Any, **more: Any) -> MoveItConfigsBuilder:
         """Take what the monitor of the scene publishes."""
-        values = {**dict.fromkeys(_MONITOR, True), **dict(zip(_MONITOR, given, strict=False)), **more}
-        self._parts["planning_scene_monitor"] = {
-            key: value for key, value in values.items() if not key.startswith("publish_robot") or value
-        }
+        self._parts["planning_scene_monitor"] = {**_MONITOR, **dict(zip(_MONITOR, given, strict=False)), **more}
         return self
+
+    def trajectory_execution(
+        self, file_path: Any = None, moveit_manage_controllers: Any = None, **_more: Any
+    ) -> MoveItConfigsBuilder:
+        """Take the controllers; without a file, those of a file that is named as such."""
+        names = [file.name.removesuffix("_controllers.yaml") for file in self._config("*_controllers.yaml")]
+        first = names if len(names) == 1 else [name for name in ("moveit", "moveit2", self._name) if name in names]
+        file = file_path or (f"config/{first[0]}_controllers.yaml" if first else None)
+        values = {"moveit_manage_controllers": moveit_manage_controllers is not False}
+        self._parts["trajectory_execution"] = values | (self._read(str(file)) if file else {})
+        return self
+
+    def sensors_3d(self, file_path: Any = None, **_more: Any) -> MoveItConfigsBuilder:
+        """Take sensors of the scene, if there is a file that has some."""
+        known = self._config("sensors_3d.yaml")
+        values = self._read(str(file_path or known[0])) if file_path or known else {}
+        several = values.get("sensors")
+        self._parts["sensors_3d"] = values if several and isinstance(several, list) and several[0] else {}
+        return self
+
+    def _config(self, pattern: str) -> list[Path]:
+        """Return the package's files of that pattern, in order."""
+        return sorted(Path(self._folder, "config").glob(pattern)) if Path(self._folder).is_dir() else []
 
     def planning_pipelines(
         self, default_planning_pipeline: Any = None, pipelines: Any = None, **_more: Any
     ) -> MoveItConfigsBuilder:
         """Take the planners; without names, those that have a file in the package."""
         names = list(pipelines or ())
-        if not names and Path(self._folder).is_dir():
-            files = Path(self._folder).glob("config/*_planning.yaml")
-            names = sorted(file.name.removesuffix("_planning.yaml") for file in files)
+        if not names:
+            names = [file.name.removesuffix("_planning.yaml") for file in self._config("*_planning.yaml")]
+            self._context.todo(place(), "planning pipelines that are MoveIt's own, beside the package's")
         names = names or ["ompl"]
         first = default_planning_pipeline or ("ompl" if "ompl" in names else names[0])
         values: dict[str, Any] = {"planning_pipelines": names, "default_planning_pipeline": first}
@@ -119,6 +141,9 @@ class MoveItConfigsBuilder:
         for name in _USUAL:
             if name not in self._parts:
                 getattr(self, name)()
+        has_pilz = "pilz_industrial_motion_planner" in self._parts["planning_pipelines"]
+        if has_pilz and "pilz_cartesian_limits" not in self._parts:
+            self.pilz_cartesian_limits()
         return MoveItConfigs(self._folder, self._parts)
 
     def to_dict(self, **_more: Any) -> dict[str, Any]:

@@ -34,6 +34,8 @@ _FROM_TOPIC = (
 )
 #: The package of the stock containers of components.
 CONTAINERS = "rclcpp_components"
+#: A component's package and class, which YAML needs no quotes for.
+_PLUGIN = re.compile(r"[A-Za-z]\w*/[A-Za-z_]\w*(::\w+)*", re.ASCII)
 _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 #: Between the words of a class's name.
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
@@ -297,7 +299,8 @@ def remappings(rules: Sequence[tuple[str, str]]) -> dict[str, str]:
 def _way(program: Program) -> dict[str, Any]:
     """Return the keys that say how the program runs."""
     if program.plugin:
-        return {"component": Bare(f"{program.package}/{program.plugin}"), "container": ""}
+        name = f"{program.package}/{program.plugin}"
+        return {"component": Bare(name) if _PLUGIN.fullmatch(name) else name, "container": ""}
     if program.loads:
         return _container_keys(program)
     return {"run": _run(program)} | ({"shell": True} if program.shell else {})

@@ -82,3 +82,19 @@ def test_between_two_trees_there_is_no_pose(robot: str, command: str, capsys: py
     assert (output.out, words_of(output.err) >= {"mast", "corner"}) == ("", True)
     assert main([command, robot, "mast", "conrer"]) == 1
     assert " corner?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["pose {} a", "pose --format text a {}", "pose a --set vars.x=1 {}", "explain a {}"])
+def test_two_frames_alone_are_those_of_the_robot_file_here(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = "tfcompose: 1\nrobot: r\nvars: {x: 2}\nframes: {a: {}, b: {parent: a, xyz: ['${x}', 0, 0]}}\n"
+    (tmp_path / "robot.yaml").write_text(text)
+    (tmp_path / "other.yaml").write_text(text.replace("x: 2", "x: 7"))
+    monkeypatch.chdir(tmp_path)
+    assert main(words.format("b").split()) == 0
+    here = capsys.readouterr().out
+    assert "xyz 7" not in here
+    assert "7, 0, 0" not in here
+    assert main(["pose", "other.yaml", "--format", "json", "a", "b"]) == 0
+    assert json.loads(capsys.readouterr().out)["xyz"] == [7, 0, 0]

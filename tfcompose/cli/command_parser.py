@@ -33,12 +33,19 @@ class Parser(ArgumentParser):
         words = list(args or ())
         takes_given = any(action.dest == "given" for action in self._actions)
         given = [word for word in words if _GIVEN.match(word)] if takes_given else []
-        arguments = super().parse_args([word for word in words if word not in given], namespace)
+        rest = [word for word in words if word not in given]
+        parse = super().parse_intermixed_args if self._may_lack_the_first() else super().parse_args
+        arguments = parse(rest, namespace)
         if takes_given:
             from tfcompose.cli.options import pairs
 
             arguments.given = pairs([*given, *arguments.given], ":=")
         return arguments
+
+    def _may_lack_the_first(self) -> bool:
+        """Return whether required words follow an optional one: options must not part them then."""
+        positional = [action for action in self._actions if not action.option_strings]
+        return len(positional) > 1 and positional[0].nargs == "?" and positional[1].nargs is None
 
 
 #: A word that gives an argument of a robot, xacro or launch file its value.

@@ -64,7 +64,7 @@ def _frames(before: Sequence[str]) -> list[str]:
     from tfcompose.load import load
 
     file = next((word for word in before if word.endswith(YAML)), None)
-    if file is None and before[0] in {"pose", "explain"}:
+    if file is None and before[0] == "explain":
         return []
     try:
         robot = compile_source(

@@ -1,7 +1,7 @@
 """Explain a code, or the chain between two frames.
 
-Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, given FILE A B, show the chain
-from A to B: each edge with its owner and pose, where each of its values comes from, and what it replaced.
+Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, given two frames of FILE, show
+the chain from A to B: each edge with its owner and pose, where each of its values comes from, and what it replaced.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
@@ -26,7 +26,10 @@ def arguments(parser: ArgumentParser) -> None:
     from tfcompose.catalogue import FAMILIES
 
     parser.add_argument(
-        "what", nargs="*", metavar="CODE|FILE A B", help="a code, a rule's name, or a file and two frames"
+        "what",
+        nargs="*",
+        metavar="CODE|[FILE] A B",
+        help="a code, a rule's name, or two frames of FILE, by default robot.yaml",
     )
     parser.add_argument(
         "--table",
@@ -47,14 +50,20 @@ def run(arguments: Namespace) -> int:
             sys.stdout.write(table(None if arguments.table == "all" else arguments.table))
         case [word]:
             _explain_code(word)
+        case [a, b] if not a.endswith((".yaml", ".yml")):
+            _explain_frames(DEFAULT_FILE, a, b, arguments)
         case [file, a, b]:
-            from tfcompose.cli.compiling import compiled_without_errors
-
-            robot, compiled = compiled_without_errors(file, arguments)
-            _explain_chain(robot, compiled.sources, a, b)
+            _explain_frames(file, a, b, arguments)
         case _:
-            fail("explain takes a code, or FILE A B", UNREADABLE)
+            fail("explain takes a code, or [FILE] A B", UNREADABLE)
     return 0
+
+
+def _explain_frames(file: str, a: str, b: str, arguments: Namespace) -> None:
+    from tfcompose.cli.compiling import compiled_without_errors
+
+    robot, compiled = compiled_without_errors(file, arguments)
+    _explain_chain(robot, compiled.sources, a, b)
 
 
 def _explain_code(word: str) -> None:

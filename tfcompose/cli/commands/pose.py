@@ -9,8 +9,8 @@ import sys
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_format, add_frames, add_variant
-from tfcompose.cli.terminal import fail
+from tfcompose.cli.options import add_file, add_format, add_frames, add_variant
+from tfcompose.cli.terminal import UNREADABLE, fail
 from tfcompose.geometry import Pose
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", metavar="FILE", help="the robot file")
+    add_file(parser)
     add_frames(parser)
     add_variant(parser)
     add_format(parser)
@@ -33,6 +33,8 @@ def run(arguments: Namespace) -> int:
     from tfcompose.numbers import clean
     from tfcompose.render.pose import pose_json, pose_text
 
+    if arguments.a.endswith((".yaml", ".yml")):
+        fail("pose takes [FILE] A B: a second frame is missing", UNREADABLE)
     rising, falling = edges_between(compiled_robot(arguments.file, arguments), arguments.a, arguments.b)
     unknown = next((edge for edge in [*rising, *reversed(falling)] if not edge.pose_known), None)
     if unknown:

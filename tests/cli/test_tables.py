@@ -1,10 +1,17 @@
 """Tables: whole into a pipe, fitted and coloured on a terminal."""
 
+from pathlib import Path
+
 import pytest
 
+from tfcompose.cli.compiling import library
 from tfcompose.cli.tables import Table, shortened
 from tfcompose.cli.terminal import plain
+from tfcompose.compile import compile_robot
 from tfcompose.render.text import RED
+from tfcompose.render.tree import tree
+
+ROBOTS = Path(__file__).parents[2] / "robots"
 
 ROWS = [
     ("edge", "kind", "rate", "remark"),
@@ -54,3 +61,15 @@ def test_colours_take_no_room() -> None:
     plain_lines, coloured_lines = TABLE.lines(ROWS, 60), TABLE.lines(ROWS, 60, coloured=True)
     assert [plain(line) for line in coloured_lines] == plain_lines
     assert [RED in line for line in coloured_lines] == [True, False, True, False]
+
+
+def test_a_tree_too_wide_for_a_terminal_drops_the_gaps_not_the_poses() -> None:
+    text = (ROBOTS / "autonomous_robot.yaml").read_text("utf-8")
+    robot = compile_robot(text, "autonomous_robot.yaml", library()).robot
+    assert robot
+    assert tree(robot, 200) == tree(robot)
+    narrow = tree(robot, 119).splitlines()
+    assert max(map(len, narrow)) <= 119 < max(map(len, tree(robot).splitlines()))
+    mount = "camera_bottom_screw_frame  static  xyz 0.186526 -0.0175 0.090669  rpy 0 15 0 deg"
+    assert any(line.endswith(mount) for line in narrow)
+    assert [line.split()[-1] for line in narrow] == [line.split()[-1] for line in tree(robot).splitlines()]

@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
 
 
-def tree(robot: Robot) -> str:
-    """Return the tree, one frame a line: kind, owner, rate; position in metres and rpy in degrees where not zero."""
+def tree(robot: Robot, columns: int | None = None) -> str:
+    """Return the tree, one frame a line: kind, owner, rate; position in metres and rpy in degrees where not zero.
+
+    Where that is wider than ``columns``, the facts follow each name at once, without the kinds that owners imply.
+    """
     children = robot.children()
     rows: list[tuple[str, Edge | None]] = []
     for root in robot.roots():
@@ -26,7 +29,10 @@ def tree(robot: Robot) -> str:
         rows += [(lines + edge.child, edge) for lines, edge in drawn(children, root, lambda edge: edge.child)]
     width = max((len(name) for name, _ in rows), default=0)
     owners = max((len(edge.owner) for _, edge in rows if edge), default=0)
-    return "".join(f"{_row(name, edge, width, owners)}\n" for name, edge in rows)
+    lines = [_row(name, edge, width, owners) for name, edge in rows]
+    if columns is not None and max(map(len, lines), default=0) > columns:
+        lines = [_tight(name, edge) for name, edge in rows]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
@@ -35,6 +41,15 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
     rest = "  ".join(fact for fact in (pose_text(edge), _switched(edge)) if fact)
     return f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {rate:<6}  {rest}".rstrip()
+
+
+def _tight(name: str, edge: Edge | None) -> str:
+    if edge is None:
+        return name
+    kind = "" if edge.owner in {STATIC, JOINTS} else edge.kind
+    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
+    facts = (name, kind, edge.owner, rate, pose_text(edge), _switched(edge))
+    return "  ".join(fact for fact in facts if fact)
 
 
 def pose_text(edge: Edge) -> str:

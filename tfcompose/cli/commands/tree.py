@@ -57,7 +57,9 @@ def run(arguments: Namespace) -> int:
     from tfcompose.render.tree import tree
 
     robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments).with_final_names()
-    sys.stdout.write(_planned_json(robot) if arguments.format == "json" else _fitted(tree(robot)))
+    columns = table_width(sys.stdout)
+    text = _fitted(tree(robot, columns and columns - 1)) if arguments.format == "text" else _planned_json(robot)
+    sys.stdout.write(text)
     return 0
 
 

@@ -95,3 +95,32 @@ def test_a_bag_becomes_a_robot_that_verify_finds_in_it(tmp_path: Path, capsys: p
     assert data["frames"]["base_link"] == {"parent": "odom", "owner": "recorded", "rate": "20 Hz"}
     capsys.readouterr()
     assert main(["verify", str(out), "--bag", str(bag)]) == 0, capsys.readouterr().out
+
+
+SENSED = """
+tfcompose: 1
+robot: r
+links: {base_link: {}}
+sensors:
+  front: {preset: realsense/d435i, parent: base_link, xyz: [0.1, 0, 0.2], driver: none, options: {imu: true}}
+"""
+
+
+def test_sensors_of_a_recording_have_their_presets(tmp_path: Path) -> None:
+    robot = compiled(SENSED, tmp_path).robot
+    assert robot
+    edges = [("/tf_static", 0.0, edge.parent, edge.child, 0.0, edge.pose.xyz, edge.pose.quat_xyzw)
+             for edge in robot.edges]  # fmt: skip
+    bag, out = write_bag(tmp_path / "bag", edges), tmp_path / "robot.yaml"
+    assert main(["import", "--bag", str(bag), "-o", str(out)]) == 0
+    data = load(out.read_text("utf-8"), str(out)).data
+    assert data["sensors"] == {
+        "front": {
+            "preset": "realsense/d435i", "parent": "base_link", "xyz": [0.1, 0, 0.2], "options": {"imu": True},
+            "driver": "none",
+        },
+    }  # fmt: skip
+    assert data["frames"] == {"base_link": {}}
+    assert main(["verify", str(out), "--bag", str(bag)]) == 0
+    assert main(["import", "--bag", str(bag), "-o", str(out), "--force", "--no-sensors"]) == 0
+    assert "front_depth_frame" in load(out.read_text("utf-8"), str(out)).data["frames"]

@@ -21,14 +21,14 @@ _SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--ena
 
 
 @contextmanager
-def page_of(address: str) -> Iterator[Page]:
+def page_of(address: str, width: int = 1000, height: int = 700) -> Iterator[Page]:
     """Open the address in a browser; the test is skipped where there is none."""
     if CHROMIUM is None:
         pytest.skip("there is no Chromium: apt install chromium")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=_SOFTWARE)
         try:
-            page = browser.new_page(viewport={"width": 1000, "height": 700})
+            page = browser.new_page(viewport={"width": width, "height": height})
             page.set_default_timeout(TIMEOUT_MS)
             page.goto(address, wait_until="load")
             yield page

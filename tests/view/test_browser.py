@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import viser
@@ -133,7 +134,7 @@ def tick(page: Page, label: str) -> None:
     page.locator("label").get_by_text(label, exact=True).locator(control).locator("input").last.click(force=True)
 
 
-def test_a_click_selects_a_body_whose_subtree_can_be_hidden(rover: Path, server: viser.ViserServer) -> None:
+def test_a_click_selects_a_body_and_subtrees_and_owners_can_be_hidden(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
         page.get_by_text("odom is a root").wait_for()
@@ -144,6 +145,10 @@ def test_a_click_selects_a_body_whose_subtree_can_be_hidden(rover: Path, server:
         assert not panel.scene.is_shown("base_link")
         tick(page, "hide it and what is below")
         until(lambda: panel.scene.is_shown("front_left_wheel_link"))
+        lines: Any = server.scene.get_handle_by_name("/edges/1")
+        assert lines.visible
+        tick(page, "joints")
+        until(lambda: not lines.visible)
 
 
 def clicked_body(page: Page, panel: Panel) -> str:

@@ -44,9 +44,9 @@ def test_each_robot_fills_its_picture(file: Path, server: viser.ViserServer, fol
 
     session = Session({str(file): file.read_text("utf-8")}, compiled, lambda *_: None)
     Panel(server, session, edit=False)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(f"http://127.0.0.1:{server.get_port()}", 1400, 900) as page:
         page.get_by_text("Frame", exact=True).wait_for()
-        page.wait_for_timeout(2500)  # a picture tells nobody that it is drawn
+        page.wait_for_timeout(4000)  # a picture tells nobody that it is drawn
         picture = page.screenshot(path=folder / f"{file.stem}.png")
     with Image.open(io.BytesIO(picture)) as image:
         scene = image.convert("HSV").crop((0, 0, image.width * 6 // 10, image.height))

@@ -262,6 +262,17 @@ links:
 """
 
 
+@pytest.mark.parametrize(("side_m", "scale"), [(0.25, 0.5), (1.0, 1.0), (4.0, 2.0)])
+def test_axes_and_fields_of_view_grow_with_the_robot(server: viser.ViserServer, side_m: float, scale: float) -> None:
+    text = f"tfcompose: 1\nrobot: r\nlinks: {{base_link: {{visual: {{box: [{side_m}, 0.1, 0.1]}}}}}}\n"
+    robot = compile_robot(text, "r.yaml", library()).robot
+    assert robot
+    scene = RobotScene(server.scene, robot)
+    scene.update(robot, poses_in_roots(robot, {}))
+    assert server.scene.get_handle_by_name("/frames").axes_length == pytest.approx(0.08 * scale)  # type: ignore[union-attr]
+    assert (scene.scale, scene.fields.reach) == (scale, 0.5 * scale)
+
+
 def test_a_mesh_has_few_triangles_and_visual_ones_come_after_collision_shapes(
     tmp_path: Path, server: viser.ViserServer
 ) -> None:

@@ -24,8 +24,8 @@ _OPACITY = 0.1
 #: How finely arcs are drawn, in radians, and how many points a cone's rim has.
 _ARC_RAD = math.radians(3)
 _RIM = 48
-#: A field of view is drawn so far, in metres, unless the stream sees less far.
-REACH_M = 0.5
+#: A field of view is drawn so far, in metres, at a scale of 1, unless the stream sees less far.
+_REACH_M = 0.5
 
 
 def rims(optics: Optics) -> list[Any]:
@@ -111,9 +111,12 @@ def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
 
 
 class FieldsOfView:
-    """The fields of view in a scene, hidden at first but for those of cameras; ``update`` moves them."""
+    """The fields of view in a scene, hidden at first but for those of cameras; ``update`` moves them.
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+    They are drawn as far as ``reach``, in metres, which begins at a ``scale``.
+    """
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, scale: float = 1.0) -> None:
         self._scene = scene
         self._streams = list(streams(robot))
         self._frames: list[Any] = []
@@ -125,10 +128,11 @@ class FieldsOfView:
         self.shown = {name: name in cameras for name in self.sensors}
         for index, (sensor, _) in enumerate(self._streams):
             self._frames.append(scene.add_frame(f"/fields/{index}", show_axes=False, visible=self.shown[sensor.name]))
-        self.draw(REACH_M)
+        self.draw(round(_REACH_M * scale, 2))
 
     def draw(self, reach: float) -> None:
         """Draw the fields of view as far as that, in metres."""
+        self.reach = reach
         for index, (_, optics) in enumerate(self._streams):
             colour = _COLOURS[optics.kind]
             self._scene.add_line_segments(

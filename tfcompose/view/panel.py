@@ -6,14 +6,12 @@ import math
 import threading
 import time
 from functools import partial
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.numbers import clean_rpy
 from tfcompose.provenance import values_of
 from tfcompose.view.edit import ImmovableError
-from tfcompose.view.fields import REACH_M
 from tfcompose.view.kinematics import poses_in_roots
 from tfcompose.view.scene import RobotScene, wxyz
 
@@ -28,8 +26,15 @@ if TYPE_CHECKING:
 #: How far a joint without limits can be moved, in radians or metres, and the step of the gizmo in millimetres, degrees.
 _UNLIMITED = math.pi
 _SNAP_MM, _SNAP_DEG = 1.0, 1.0
+#: The gizmo of a robot whose largest body is 1 m long, in metres.
+_GIZMO_M = 0.25
 #: The frame in which a pose is shown, unless another is chosen.
 _PARENT = "its parent"
+#: The colour of an owner, at the right of the line below it.
+_SWATCH = (
+    '<div style="position: relative; height: 0"><div style="position: absolute; right: 1em; top: 0.15em; width: 4em; '
+    'height: 0.8em; border-radius: 0.2em; background: {}"></div></div>'
+)
 #: How long a sweep of the joints takes, and the time between two of its steps, in seconds.
 _SWEEP_S, _SWEEP_STEP_S = 6.0, 0.05
 
@@ -168,9 +173,8 @@ class Panel:
     def _add_owners(self) -> None:
         with self._gui.add_folder("Owners"):
             for owner, (red, green, blue) in self.scene.colours.items():
-                swatch = f'<span style="color: rgb({red}, {green}, {blue})">&#9632;</span>'
-                self._gui.add_html(f'<div style="padding: 0 0.7em">{swatch} {escape(owner)}</div>')
-                box = self._gui.add_checkbox("shown", initial_value=True)
+                self._gui.add_html(_SWATCH.format(f"rgb({red}, {green}, {blue})"))
+                box = self._gui.add_checkbox(owner, initial_value=True)
                 box.on_update(partial(self._show_owner, owner, box))
 
     def _show_owner(self, owner: str, box: Any, _event: Any) -> None:
@@ -183,7 +187,7 @@ class Panel:
             for sensor in fields.sensors:
                 box = self._gui.add_checkbox(sensor, initial_value=fields.shown[sensor])
                 box.on_update(partial(self._show_field, sensor, box))
-            reach = self._gui.add_number("drawn to (m)", REACH_M, min=0.05, max=300.0, step=0.05)
+            reach = self._gui.add_number("drawn to (m)", fields.reach, min=0.01, max=300.0, step=0.01)
             reach.on_update(lambda _: fields.draw(reach.value))
             self._blocked = self._gui.add_checkbox("blocked rays", initial_value=False)
             self._blocked.on_update(lambda _: self._show_blocked())
@@ -295,7 +299,8 @@ class Panel:
         self._given.content = f"pose of **{mount.place}** in **{mount.relative_to}**"
         self._fill(given)
         at = self.poses()[mount.place]
-        self._gizmo = self._server.scene.add_transform_controls("/gizmo", scale=0.25, wxyz=wxyz(at), position=at.xyz)
+        scale = _GIZMO_M * self.scene.scale
+        self._gizmo = self._server.scene.add_transform_controls("/gizmo", scale=scale, wxyz=wxyz(at), position=at.xyz)
         self._gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
 
     def _fill(self, given: Pose) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import itertools
+import math
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 _FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
 _NO_RED = 0.1
 _GREY = (105, 112, 122)
+#: The axes of a robot whose largest body is 1 m long, in metres.
 _AXES_M = 0.08
 _GHOST = (60, 120, 220)
 #: Where the camera begins, as a direction from the middle of the robot, and how many radii of it away.
@@ -105,7 +107,11 @@ class RobotScene:
             handles = self._add_shapes(frame, f"{name}/first", link.collisions if is_later else shapes)
             if is_later:
                 self._later.append((frame, f"{name}/visual", shapes, handles))
-        self.fields = FieldsOfView(scene, robot)
+        sides = (high - low for frame in self._corners for low, high in zip(*self.bounds(frame), strict=True))
+        #: How large axes and the like are drawn, against those of a robot whose largest body is 1 m long: as its root.
+        self.scale = math.sqrt(max(sides, default=1.0) or 1.0)
+        self._axes_m = _AXES_M * self.scale
+        self.fields = FieldsOfView(scene, robot, self.scale)
 
     def add_meshes(self) -> None:
         """Show visual meshes in the place of collision shapes; a mesh that cannot be read leaves them."""
@@ -154,7 +160,7 @@ class RobotScene:
         rotations, positions = rows[:, [6, 3, 4, 5]], rows[:, :3]
         if self._axes is None:
             self._axes = self._scene.add_batched_axes(
-                "/frames", rotations, positions, axes_length=_AXES_M, axes_radius=_AXES_M / 20,
+                "/frames", rotations, positions, axes_length=self._axes_m, axes_radius=self._axes_m / 20,
                 batched_scales=self._scales(robot),
             )  # fmt: skip
         else:
@@ -178,7 +184,7 @@ class RobotScene:
         bodies = [(poses[frame] @ Pose(xyz)).xyz for frame, corners in self._corners.items() for xyz in corners]
         points = np.array([pose.xyz for pose in poses.values()] + bodies).reshape(-1, 3)
         least, most = points.min(axis=0), points.max(axis=0)
-        middle, radius = (least + most) / 2, float(np.linalg.norm(most - least)) / 2 + _AXES_M
+        middle, radius = (least + most) / 2, float(np.linalg.norm(most - least)) / 2 + self._axes_m
         server.initial_camera.look_at = middle
         server.initial_camera.position = middle + _RADII * radius * _FROM
         self._scene.add_grid(

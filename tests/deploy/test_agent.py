@@ -2,6 +2,7 @@
 
 import base64
 import os
+import sys
 import threading
 import zipfile
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from tests.support import processes
 from tfcompose.deploy.agent import KEPT, UNIT, Agent, HostError
+from tfcompose.deploy.connection import START
 from tfcompose.deploy.release import Release
 from tfcompose.plan import Plan, RosSettings
 
@@ -83,6 +85,16 @@ def test_a_unit_that_was_restarted_long_ago_has_not_failed(agent: Agent, monkeyp
     shown["NRestarts"] = "4"
     status = agent.wait(10)
     assert (status["failed"], status["lines"]) == (True, ["last words"])
+
+
+@pytest.mark.parametrize("version", ["(3, 9)", "(3, 12)"])
+def test_a_python_that_is_too_old_says_so(version: str) -> None:
+    """The version is a stand-in's: tests have one Python."""
+    program = f"import sys; sys.version_info = {version}; {START}"
+    text = "print('runs')"
+    done = processes.run([sys.executable, "-c", program], stdin=f"{len(text)}\n{text}")
+    runs = version != "(3, 9)"
+    assert (done.stdout, "older than 3.10" in done.stderr) == ("runs\n" if runs else "", not runs), done
 
 
 def test_wheels_are_installed_into_a_python_of_the_release(agent: Agent, tmp_path: Path) -> None:

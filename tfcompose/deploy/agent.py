@@ -182,6 +182,8 @@ class Agent:
         with archive:
             archive.seek(0)
             with tarfile.open(fileobj=archive, mode="r:") as tar:
+                if hasattr(tarfile, "data_filter"):  # since Python 3.10.12
+                    tar.extraction_filter = tarfile.data_filter
                 tar.extractall(new)  # noqa: S202 (made by ``release.Release``)
         for path in new.rglob("*"):
             if path.is_file():

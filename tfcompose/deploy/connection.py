@@ -26,10 +26,11 @@ ALIVE_EVERY_S, ALIVE_MISSES = 2.0, 3
 #: The clock is read so often; the answer that came quickest is taken.
 CLOCK_READINGS = 5
 #: What Python is started with: it runs as much of its input as the first line says.
-_START = (
-    "import sys; i = sys.stdin.buffer; "
+START = (
+    "import sys; "
     "sys.exit('Python %d.%d is older than 3.10' % sys.version_info[:2]) if sys.version_info < (3, 10) else "
-    "exec(compile(i.read(int(i.readline())), 'tfcompose agent', 'exec'), {'__name__': '__main__'})"
+    "exec(compile(sys.stdin.buffer.read(int(sys.stdin.buffer.readline())), 'tfcompose agent', 'exec'), "
+    "{'__name__': '__main__'})"
 )
 
 
@@ -168,7 +169,7 @@ async def connected(name: str, host: PlanHost, settings: Settings, at: Span | No
     word = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
     try:
         process = await connection.create_process(
-            f"exec {word} -c {shlex.quote(_START)}", encoding=None, window=2**21, max_pktsize=2**15
+            f"exec {word} -c {shlex.quote(START)}", encoding=None, window=2**21, max_pktsize=2**15
         )
         process.stdin.write(f"{len(agent)}\n".encode() + agent + f"{json.dumps(asdict(settings))}\n".encode())
         there = Host(name, connection, process, at)

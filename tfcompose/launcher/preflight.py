@@ -250,7 +250,8 @@ def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[st
         )
         return NotFound(process.name, word, (_why_not(path),), advice=advice)
     path_variable = env.get("PATH", os.defpath)
-    return shutil.which(word, path=path_variable) or NotFound(process.name, word, (), path_variable)
+    advice = f"install {word}, or write its path; a node of a package is run: {{package: …, executable: {word}}}"
+    return shutil.which(word, path=path_variable) or NotFound(process.name, word, (), path_variable, advice)
 
 
 def _in_package(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> str | NotFound:

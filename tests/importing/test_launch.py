@@ -526,10 +526,12 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 from moveit_configs_utils import MoveItConfigsBuilder
-from nav2_common.launch import LaunchConfigAsBool
+from nav2_common.launch import HasNodeParams, LaunchConfigAsBool
 
 def generate_launch_description():
     simple = EnvironmentVariable("NO_SUCH_SETTING", default_value="1").perform(LaunchContext())
+    has_params = HasNodeParams(source_file=PathJoinSubstitution([
+        FindPackageShare("arm_moveit_config"), "config", "diagnostics.yaml"]), node_name="analyzers")
     moveit = (MoveItConfigsBuilder("arm").robot_description(mappings={"ros2_control": "true"})
               .trajectory_execution(file_path="config/controllers.yaml").planning_pipelines("ompl", ["ompl"])
               .to_moveit_configs())
@@ -542,7 +544,8 @@ def generate_launch_description():
              remappings=[("/tf", "tf"), ("/tf_static", "tf_static")]),
         Node(package="moveit_ros_move_group", executable="move_group", name="move_group", parameters=[
             moveit.robot_description_kinematics, moveit.trajectory_execution, moveit.planning_pipelines,
-            moveit.planning_scene_monitor, moveit.joint_limits, {"loud": LaunchConfigAsBool("loud")}]),
+            moveit.planning_scene_monitor, moveit.joint_limits, {"loud": LaunchConfigAsBool("loud")}],
+             condition=launch.conditions.IfCondition(has_params)),
         Node(package="diagnostic_aggregator", executable="aggregator_node",
              parameters=[PathJoinSubstitution([FindPackageShare("arm_moveit_config"), "config", "diagnostics.yaml"])]),
         stop,

@@ -24,6 +24,8 @@ import types
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from tfcompose.importing import launch_actions as actions
 from tfcompose.importing import launch_conditions as conditions
 from tfcompose.importing import launch_substitutions as substitutions
@@ -206,6 +208,19 @@ class _AsTruth(substitutions.Substitution):
         return str(text.strip().lower() in {"true", "1", "yes", "on", "y", "t"})
 
 
+class _HasNode(substitutions.Substitution):
+    """nav2_common's HasNodeParams: whether a parameter file has a node."""
+
+    def perform(self, context: Context) -> str:
+        file = substitutions.text_of(self.kwargs.get("source_file", ""), context)
+        node = substitutions.text_of(self.kwargs.get("node_name", ""), context)
+        try:
+            data = yaml.safe_load(Path(file).read_text("utf-8"))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise FailedError(f"{file} cannot be read: {error}") from None
+        return str(isinstance(data, dict) and node in data)
+
+
 class _Document:
     """What xacro makes of a file."""
 
@@ -242,7 +257,8 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
             vars(module).update(process_file=_Document, process=lambda file, **more: _Document(file, **more).text,
                                 parse=_Document, process_doc=lambda *_a, **_k: None)  # fmt: skip
         elif spec.name.startswith("nav2_common"):
-            vars(module).update(RewrittenYaml=_Rewritten, ReplaceString=_Rewritten, LaunchConfigAsBool=_AsTruth)
+            vars(module).update(RewrittenYaml=_Rewritten, ReplaceString=_Rewritten, LaunchConfigAsBool=_AsTruth,
+                                HasNodeParams=_HasNode)  # fmt: skip
         elif spec.name.startswith("moveit_configs_utils"):
             find, context = self.reader.share, self.reader.context
             vars(module)["MoveItConfigsBuilder"] = functools.partial(MoveItConfigsBuilder, find, context)

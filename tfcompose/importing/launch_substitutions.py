@@ -176,7 +176,7 @@ def plain(value: Any) -> str:
     """Return a value that may have substitutions in it, for people."""
     if isinstance(value, (list, tuple)):
         return " ".join(one.describe() if isinstance(one, Substitution) else plain(one) for one in value)
-    return str(value)
+    return str(getattr(value, "NAME", value))
 
 
 def text_of(value: Any, context: Context) -> str:

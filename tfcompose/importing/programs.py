@@ -420,14 +420,18 @@ def _full_names(params: Any, above: str) -> Iterator[str]:
 
 
 def _nodes_in(file: str) -> dict[str, Any] | None:
-    """Return what a parameter file has by its nodes, or None where it is not there, or none."""
+    """Return what a parameter file has by its nodes' full names, or None where it is not there, or has none."""
     try:
         data = yaml.load(Path(file).read_text("utf-8"), Loader=yaml.CSafeLoader)
+        return dict(_nodes_below(data, "")) or None
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError):
         return None
-    of_nodes = isinstance(data, dict) and all(
-        isinstance(one, dict) and "ros__parameters" in one for one in data.values()
-    )
-    if not of_nodes:
-        return None
-    return {str(key): one for key, one in data.items()}
+
+
+def _nodes_below(data: Any, above: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    for key, one in data.items() if isinstance(data, dict) else ():
+        name = f"{above}/{str(key).strip('/')}"
+        if isinstance(one, dict) and "ros__parameters" in one:
+            yield name, one
+        else:
+            yield from _nodes_below(one, name)

@@ -97,6 +97,24 @@ def test_a_mesh_that_is_changed_is_read_again(shown: ReloadedPanel, tmp_path: Pa
     assert not shown.reload()
 
 
+def test_a_preset_of_the_robot_that_is_changed_is_read_again(shown: ReloadedPanel, tmp_path: Path) -> None:
+    preset = tmp_path / "presets" / "own" / "eye.yaml"
+    preset.parent.mkdir(parents=True)
+    text = "preset: 1\nvendor: Own\nmodel: Eye\nkind: imu\nabout: an eye\nmount: '{name}'\n"
+    text += "frames: {'{name}_lens': {parent: '{name}', xyz: [%d, 0, 0]}}\n"
+    preset.write_text(text % 1, "utf-8")
+    sensor = "preset_path: presets\nsensors: {e: {preset: own/eye, parent: base_link, xyz: [1, 0, 0]}}\n"
+    replace(tmp_path / "r.yaml", TEXT + sensor)
+    assert shown.reload(), shown.found
+    for x in (2, 3):
+        replace(preset, text % x)
+        assert shown.reload(), shown.found
+        edge = shown.session.robot.parent_edge("e_lens")
+        assert edge
+        assert edge.pose.xyz == (x, 0, 0)
+    assert not shown.reload()
+
+
 def test_a_save_is_no_change_on_disk(shown: ReloadedPanel) -> None:
     shown.panel.frames.value = "tool"
     shown.panel.move(Pose((3, 0, 0)))

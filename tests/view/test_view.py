@@ -21,8 +21,10 @@ from websockets.typing import Origin, Subprotocol
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
+from tfcompose.cli.commands import view
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.fixing import ChangedError, rewrite
+from tfcompose.cli.parser import parser_of
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.geometry import Pose, offset_of, quat_from_rpy
 from tfcompose.plan.file import read_plan
@@ -422,3 +424,15 @@ def test_an_option_without_what_it_is_for_is_refused(words: list[str], tmp_path:
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"tfcompose: {words[0]} ")
     assert not (tmp_path / "r.html").exists()
+
+
+def test_ctrl_c_while_the_scene_is_made_ends_the_view_without_another_error(
+    monkeypatch: pytest.MonkeyPatch, rover: Path
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tfcompose.view.reload.ReloadedPanel", interrupted)
+    arguments = parser_of("view").parse_args([str(rover), "--port", "0"])
+    with pytest.raises(KeyboardInterrupt):
+        view.run(arguments)

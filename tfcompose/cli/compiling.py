@@ -41,14 +41,16 @@ PRESETS = Path(__file__).parents[1] / "presets"
 PRESET_GROUP = "tfcompose.presets"
 
 
-def library() -> Library:
+def library(read: Callable[[str], str] = read_text) -> Library:
     """Return the presets that are known without a robot file: tfcompose's own, then those of packages."""
-    return Library((str(PRESETS),), PresetFolders(), str(PRESETS))
+    return Library((str(PRESETS),), PresetFolders(read), str(PRESETS))
 
 
 @dataclass(frozen=True, slots=True)
 class PresetFolders:
-    """Presets in folders of this machine."""
+    """Presets in folders of this machine; ``open_text`` returns the text of a file or raises RejectedError."""
+
+    open_text: Callable[[str], str] = read_text
 
     def has(self, path: str) -> bool:
         """Return whether the file is there."""
@@ -60,7 +62,7 @@ class PresetFolders:
 
     def read(self, path: str) -> str:
         """Return its text; raises RejectedError."""
-        return read_text(path)
+        return self.open_text(path)
 
     def models(self, folder: str) -> list[str]:
         """Return the names, vendor/model, of the presets in the folder."""

@@ -46,7 +46,7 @@ def session_of(file: str, arguments: Namespace, files: Files) -> Session:
 
 def _robot_session(file: str, arguments: Namespace, files: Files) -> Session:
     texts = {one: files(one) for one in (file, *arguments.overlays)}
-    presets, packages = library(), replace(disk(), read=files)
+    presets, packages = library(files), replace(disk(), read=files)
 
     def compiled(now: Mapping[str, str]) -> Compiled:
         def read(one: str) -> str:
@@ -56,7 +56,7 @@ def _robot_session(file: str, arguments: Namespace, files: Files) -> Session:
         return compile_robot(
             now[file],
             file,
-            presets,
+            presets.over(()),  # reads them anew
             arguments.profiles,
             overlays=overlays,
             read=read,

@@ -111,6 +111,7 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
         set_up_ros(plan_of_session(session).ros)
     token = "" if arguments.host in _LOOPBACK else secrets.token_urlsafe(16)
     server = started(arguments.host, _free(arguments.host, arguments.port), session.robot.name, token)
+    shown = None
     try:
         joints = arguments.joints or not (arguments.live or arguments.bag)
         shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=joints)

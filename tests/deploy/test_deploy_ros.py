@@ -16,6 +16,7 @@ from tests.support.waiting import TIMEOUT_S, until
 
 pytestmark = [
     pytest.mark.ros,
+    pytest.mark.slow,
     pytest.mark.xdist_group("computers"),
     pytest.mark.skipif(bool(missing()), reason=missing() or "all is there"),
 ]

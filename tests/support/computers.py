@@ -43,7 +43,7 @@ mount -t tmpfs tmpfs /run
 mount -t tmpfs tmpfs /dev/shm
 mkdir -p /run/sshd
 ip link set lo up
-# Process numbers differ from boot to boot, and Fast DDS makes of them what it knows participants by.
+# As on a computer, process numbers differ from boot to boot: DDS participants are named by them.
 echo {number} > /proc/sys/kernel/ns_last_pid
 {more}
 echo ready

@@ -521,7 +521,7 @@ def test_a_parameter_file_lies_over_the_parameters_before_it(
 BRINGUP = """
 import launch
 from launch import LaunchContext, LaunchDescription
-from launch.substitutions import Command, EnvironmentVariable, LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import Command, EnvironmentVariable, PathJoinSubstitution, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
@@ -539,6 +539,7 @@ def generate_launch_description():
     stop = Node(package="stop", executable="stop", parameters=[{"level": simple}])
     return LaunchDescription([
         launch.actions.DeclareLaunchArgument("loud", default_value="Yes"),
+        launch.actions.DeclareLaunchArgument("quick", default_value="True"),
         Node(package="robot_state_publisher", executable="robot_state_publisher",
              parameters=[{"robot_description": ParameterValue(xacro, value_type=str)}],
              remappings=[("/tf", "tf"), ("/tf_static", "tf_static")]),
@@ -548,6 +549,8 @@ def generate_launch_description():
              condition=launch.conditions.IfCondition(has_params)),
         Node(package="diagnostic_aggregator", executable="aggregator_node",
              parameters=[PathJoinSubstitution([FindPackageShare("arm_moveit_config"), "config", "diagnostics.yaml"])]),
+        Node(package="shy", executable="shy", name="shy",
+             condition=launch.conditions.IfCondition(PythonExpression(["not ", LaunchConfigAsBool("quick")]))),
         stop,
         launch.actions.RegisterEventHandler(launch.event_handlers.OnProcessExit(
             target_action=stop, on_exit=[launch.actions.EmitEvent(event=launch.events.Shutdown())])),
@@ -583,6 +586,8 @@ def test_bringups_of_moveit_and_turtlebots_are_read(tmp_path: Path, capsys: pyte
     printed = printed_errors(capsys)
     assert "event handler" not in printed
     assert "remapped" not in printed
+    _, data = import_of(tmp_path / "arm.launch.py", "--all-branches", code=None)
+    assert data["processes"]["shy"]["when"] == "${not (args.quick)}"
 
 
 ROS1 = """<launch>

@@ -17,6 +17,7 @@ from tfcompose.importing.launch_substitutions import (
     AndSubstitution,
     Context,
     EqualsSubstitution,
+    LaunchConfigAsBool,
     LaunchConfiguration,
     NotEqualsSubstitution,
     NotSubstitution,
@@ -98,7 +99,7 @@ class LaunchConfigurationNotEquals(LaunchConfigurationEquals):
 def expression_of(value: Any, context: Context) -> str | None:
     """Return what is true or false as an expression of a robot file, or None where it cannot be one."""
     one = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
-    if isinstance(one, LaunchConfiguration):
+    if isinstance(one, (LaunchConfiguration, LaunchConfigAsBool)):
         name = plain([one.variable_name])
         return f"args.{name}" if context.declared.get(name) == "bool" else None
     if isinstance(one, NotSubstitution):
@@ -126,7 +127,7 @@ def _python_expression(given: PythonExpression, context: Context) -> str | None:
     pieces = given.expression if isinstance(given.expression, (list, tuple)) else [given.expression]
     text = ""
     for piece in pieces:
-        if isinstance(piece, LaunchConfiguration):
+        if isinstance(piece, (LaunchConfiguration, LaunchConfigAsBool)):
             text += f"{BEGIN}{plain([piece.variable_name])}{END}"
         elif isinstance(piece, (str, TextSubstitution)):
             text += piece if isinstance(piece, str) else str(piece.text)

@@ -200,14 +200,6 @@ class _Rewritten(substitutions.Substitution):
         return file
 
 
-class _AsTruth(substitutions.Substitution):
-    """nav2_common's LaunchConfigAsBool: an argument as True or False, however it is written."""
-
-    def perform(self, context: Context) -> str:
-        text = substitutions.LaunchConfiguration(self.args[0]).perform(context)
-        return str(text.strip().lower() in {"true", "1", "yes", "on", "y", "t"})
-
-
 class _HasNode(substitutions.Substitution):
     """nav2_common's HasNodeParams: whether a parameter file has a node."""
 
@@ -257,8 +249,8 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
             vars(module).update(process_file=_Document, process=lambda file, **more: _Document(file, **more).text,
                                 parse=_Document, process_doc=lambda *_a, **_k: None)  # fmt: skip
         elif spec.name.startswith("nav2_common"):
-            vars(module).update(RewrittenYaml=_Rewritten, ReplaceString=_Rewritten, LaunchConfigAsBool=_AsTruth,
-                                HasNodeParams=_HasNode)  # fmt: skip
+            vars(module).update(RewrittenYaml=_Rewritten, ReplaceString=_Rewritten, HasNodeParams=_HasNode,
+                                LaunchConfigAsBool=substitutions.LaunchConfigAsBool)  # fmt: skip
         elif spec.name.startswith("moveit_configs_utils"):
             find, context = self.reader.share, self.reader.context
             vars(module)["MoveItConfigsBuilder"] = functools.partial(MoveItConfigsBuilder, find, context)

@@ -248,6 +248,21 @@ class LaunchConfiguration(Substitution):
         return plain(self.variable_name)
 
 
+class LaunchConfigAsBool(Substitution):
+    """nav2_common's: an argument as True or False, however it is written."""
+
+    def __init__(self, name: Any) -> None:
+        super().__init__(name)
+        self.variable_name = name
+
+    def perform(self, context: Context) -> str:
+        text = LaunchConfiguration(self.variable_name).perform(context)
+        return str(text.strip().lower() in {"true", "1", "yes", "on", "y", "t"})
+
+    def describe(self) -> str:
+        return plain(self.variable_name)
+
+
 class EnvironmentVariable(Substitution):
     def __init__(self, name: Any, *, default_value: Any = None) -> None:
         super().__init__(name)

@@ -138,6 +138,16 @@ def test_what_is_not_taken_is_named_with_its_line(package: Path, capsys: pytest.
         assert f"rover.launch.py:{line}: " in text
 
 
+def test_arguments_that_nothing_reads_are_one_finding(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    unread = "".join(f'<arg name="unread_{number}" default="1"/>' for number in range(3))
+    text = f'<launch>{unread}<arg name="cameras" default="2"/><node pkg="a" exec="b" args="$(var cameras)"/></launch>'
+    _, data = import_of(source(package, "unread.launch.xml", text), code=None)
+    printed = printed_errors(capsys)
+    assert places(printed, "TF020") == ["unread.launch.xml:1"]
+    assert all(f"unread_{number}" in printed for number in range(3))
+    assert list(data["args"]) == ["cameras"]
+
+
 def test_arguments_are_given_and_conditions_passed_over(package: Path) -> None:
     file = source(package, "rover.launch.py", PYTHON)
     _, data = import_of(file, "cameras:=1", "rviz:=true", code=None)

@@ -199,6 +199,10 @@ class _Work:
     def _args(self, decided: list[str]) -> None:
         """Add the arguments that entries name, and say of the others which values they had."""
         used = arguments_in(self.draft.sections) | self._in_conditions()
+        unread = {name: span for name, (_, span) in self._arguments.items() if name not in used and name not in decided}
+        if unread:
+            several = f"the launch argument{'' if len(unread) == 1 else 's'} {', '.join(unread)}"
+            self.draft.todo(f"nothing that is imported reads {several}", next(iter(unread.values())))
         for name, (record, span) in self._arguments.items():
             value, at = record["value"], ("args", name)
             explained = f" ({record['description'].strip()})" if record["description"].strip() else ""
@@ -213,7 +217,7 @@ class _Work:
                 keys |= {"env": record["env"]} if record["env"] else {}
                 self.draft.sections["args"][name] = keys
                 self.draft.note(at, where(span))
-            if name in decided or name not in used:
+            if name in decided:
                 chosen = f"{value!r} here" if value != record["default"] else f"its default {value!r}"
                 message = f"the launch argument {name}{explained} has {chosen}"
                 more = " where its value decides what is started, or is computed with" if name in used else ""

@@ -43,7 +43,7 @@ def lost(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 def test_the_launcher_takes_an_interrupt_that_python_threw_away(lost: list[object]) -> None:
     with RememberedInterrupt():
         lose_an_interrupt()
-        assert lost == [KeyboardInterrupt]
+        assert not lost, "it would be printed"
         with Signals() as signals:
             assert os.read(signals.fd, 10)
             assert list(signals.taken()) == [signal.SIGINT]
@@ -57,7 +57,7 @@ def test_who_waits_in_ros_takes_it_once(lost: list[object]) -> None:
             assert stop.requested
         with Stop() as stop:
             assert not stop.requested
-    assert lost == [KeyboardInterrupt]
+    assert not lost, "it would be printed"
 
 
 @pytest.mark.parametrize("error", [RuntimeError("Error calling __set_name__"), BaseException("a panic of Rust")])

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from typing import TYPE_CHECKING, Protocol
 
@@ -38,6 +39,8 @@ class RememberedInterrupt:
 
     def __enter__(self) -> None:
         _remembered.clear()
+        self._unraisable = sys.unraisablehook
+        sys.unraisablehook = self._thrown_away
         self._is_set = signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._is_set:
             try:
@@ -48,8 +51,14 @@ class RememberedInterrupt:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        sys.unraisablehook = self._unraisable
         if self._is_set:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def _thrown_away(self, what: sys.UnraisableHookArgs) -> None:
+        """Let Python print what it throws away, but not an interrupt, which is remembered."""
+        if what.exc_type is not KeyboardInterrupt:
+            self._unraisable(what)
 
 
 def _interrupt(number: int, _frame: FrameType | None) -> None:

@@ -21,6 +21,7 @@ _HEAD = {
     "robot": "The language of robot files",
     "preset": "The language of sensor presets",
     "node": "The language of node presets",
+    "fleet": "The language of fleet files",
 }
 _VALUES = "A bare number is in SI units and radians; a string may carry a unit: `30 cm`, `15 deg`, `50 Hz`."
 _EXPRESSIONS = """\
@@ -29,7 +30,7 @@ _REQUIRED = "Keys without a default are required."
 
 
 def reference(language: str) -> str:
-    """Return the reference of ``robot``, ``preset`` or ``node``."""
+    """Return the reference of ``robot``, ``preset``, ``node`` or ``fleet``."""
     root = LANGUAGES[language]
     sections: dict[Any, list[str]] = {}
     for pattern, kind in walk(root):

@@ -536,6 +536,7 @@ def surroundings() -> Iterator[Finding]:
         zenoh = RosSettings(rmw="zenoh")
         yield environment.ros_trouble({"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, zenoh) or AN_EXAMPLE
         yield environment.other_middleware({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, zenoh) or AN_EXAMPLE
+        yield environment.other_distro({"ROS_DISTRO": "jazzy"}, RosSettings(distro="kilted")) or AN_EXAMPLE
         with mock.patch("ctypes.CDLL"):
             for name in ("rmw_cyclonedds_cpp", "rmw_zenoh_cpp"):
                 session = {"RMW_IMPLEMENTATION": name, "ZENOH_SESSION_CONFIG_URI": "/no/such.json5"}

@@ -1,4 +1,5 @@
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -10,7 +11,9 @@ from tfcompose.ros.environment import (
     FASTDDS_PROFILE,
     FASTDDS_PROFILE_LOCALHOST,
     child_environment,
+    installed_distro,
     missing_ros,
+    other_distro,
     other_middleware,
     ros_trouble,
 )
@@ -129,3 +132,35 @@ def test_an_environment_with_another_middleware_is_warned_of(here: str, *, warne
     if found:
         assert (found.code, found.severity) == ("TF909", "warning")
     assert other_middleware({"RMW_IMPLEMENTATION": here}, RosSettings()) is None
+
+
+@pytest.mark.parametrize(("here", "warned"), [("jazzy", True), ("kilted", False)])
+def test_another_release_of_ros_than_the_robots_is_warned_of(here: str, *, warned: bool) -> None:
+    found = other_distro({"ROS_DISTRO": here}, RosSettings(distro="kilted"))
+    assert (found is not None) == warned
+    if found:
+        assert (found.code, found.severity, "Jazzy" in found.message) == ("TF909", "warning", True)
+    assert other_distro({"ROS_DISTRO": here}, RosSettings()) is None
+
+
+def test_without_a_variable_the_release_is_that_of_rclpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    versions = {"ros-rclpy": "9.1.2"}
+
+    def version(name: str) -> str:
+        if name not in versions:
+            raise PackageNotFoundError
+        return versions[name]
+
+    monkeypatch.setattr("tfcompose.ros.environment.version", version)
+    assert installed_distro({}) == "kilted"
+    versions["rclpy"] = "7.1.6"
+    assert installed_distro({}) == "jazzy"
+    versions.clear()
+    assert installed_distro({}) is None
+
+
+def test_advice_names_the_packages_of_the_robots_release() -> None:
+    ros = RosSettings(rmw="zenoh", distro="kilted")
+    found = ros_trouble(child_environment({}, ros, own=True), ros)
+    assert found is not None
+    assert "ros-kilted-rmw-zenoh-cpp" in found.help

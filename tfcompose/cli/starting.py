@@ -48,7 +48,7 @@ from tfcompose.launcher.output import Logs, NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
 from tfcompose.launcher.supervisor import ENDING, Session, supervise
-from tfcompose.ros.environment import child_environment, other_middleware, ros_trouble
+from tfcompose.ros.environment import child_environment, other_distro, other_middleware, ros_trouble
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -108,8 +108,8 @@ def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
     found = [trouble] if trouble else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
     if found:
         reject([_with_profiles(one, arguments) for one in found])
-    if other := other_middleware(os.environ, plan.ros):
-        print_findings([other], sys.stderr)
+    odd = (other_middleware(os.environ, plan.ros), other_distro(os.environ, plan.ros))
+    print_findings([one for one in odd if one], sys.stderr)
 
 
 def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOutput, duration_s: float | None) -> int:

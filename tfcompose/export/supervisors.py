@@ -119,7 +119,7 @@ def gaps_of(plan: Plan) -> list[str]:
 
 
 #: A probe does not come through the image's entry point, which sources the setup file for the process itself.
-_SOURCED = 'setup=/opt/ros/${ROS_DISTRO:-jazzy}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
+_SOURCED = 'setup=/opt/ros/${ROS_DISTRO:-RELEASE}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
 
 
 def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
@@ -130,7 +130,8 @@ def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
     edge = plan.edges_of(process.name)[0]
     words = ["python3", "-m", "tfcompose", "echo", edge.parent, edge.child, "--once", "--timeout", "5"]
     namespace = process.topics[0].removesuffix("/tf")
-    return ["sh", "-c", _SOURCED, "sh", *words, *(["--namespace", namespace] if namespace else [])]
+    sourced = _SOURCED.replace("RELEASE", plan.ros.distro or "jazzy")
+    return ["sh", "-c", sourced, "sh", *words, *(["--namespace", namespace] if namespace else [])]
 
 
 def outside_of(plan: Plan, folder: str) -> list[str]:

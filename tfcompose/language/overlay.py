@@ -237,7 +237,7 @@ def _only(source: Source, key: str) -> Source:
 
 
 #: What all processes of a plan share; a part cannot have its own.
-_SHARED_SETTINGS = ("clock", "domain_id", "discovery", "rmw", "router")
+_SHARED_SETTINGS = ("clock", "domain_id", "discovery", "rmw", "distro", "router")
 
 
 def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the other)

@@ -48,6 +48,8 @@ Clock = Literal["wall", "sim"]
 Discovery = Literal["localhost", "subnet", "off"]
 #: The middleware that all processes use.
 Rmw = Literal["fastdds", "cyclonedds", "zenoh"]
+#: The release of ROS that all processes are from.
+Distro = Literal["jazzy", "kilted"]
 #: What keeps several robots in one domain apart: topics below their namespaces, or frames with a prefix.
 Isolation = Literal["none", "topics", "frames", "both"]
 #: Who publishes what is ours below the base.
@@ -346,6 +348,9 @@ class RosSettings:
     discovery: Discovery | None = documented(None, "how far discovery reaches; default: the environment's")
     rmw: Rmw | None = documented(
         None, "the middleware of all processes; default: the environment's", "zenoh", **OMITTED
+    )
+    distro: Distro | None = documented(
+        None, "the release of ROS that they are from; default: the environment's", "kilted", **OMITTED
     )
     router: str | None = documented(
         None,

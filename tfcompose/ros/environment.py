@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import ctypes
 import os
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +20,7 @@ from tfcompose.plan.middleware import IMPLEMENTATIONS, ZENOH_FILES, middleware_v
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.plan import RosSettings
+    from tfcompose.plan import Distro, RosSettings
 
 #: The profile of tfcompose's own processes, and the one for this machine alone; the files say what for.
 FASTDDS_PROFILE = Path(__file__).with_name("fastdds.xml")
@@ -28,6 +30,10 @@ FASTDDS_PROFILE_LOCALHOST = Path(__file__).with_name("fastdds_localhost.xml")
 PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 
 DOMAIN, RANGE, RMW = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "RMW_IMPLEMENTATION"
+DISTRO = "ROS_DISTRO"
+#: The release of ROS, by the major version of its rclpy, which is a package of that name, or a wheel with another.
+_RELEASES: Mapping[str, Distro] = {"7": "jazzy", "9": "kilted"}
+_RCLPY = ("rclpy", "ros-rclpy")
 #: A port number holds no more domains (RTPS: 7400 + 250 times the domain, below 65536).
 LAST_DOMAIN = 232
 
@@ -74,6 +80,26 @@ def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) 
     """Return what keeps a process with this environment from starting a node, or None; ``ros`` are the plan's words."""
     named = environment.get(RMW, "")
     return no_ros() or _domain(environment.get(DOMAIN, "")) or _middleware(named, ros) or _configuration(environment)
+
+
+def installed_distro(environment: Mapping[str, str]) -> str | None:
+    """Return the release of ROS that is set up here, by its variable or its rclpy, such as ``jazzy``; or None."""
+    if found := environment.get(DISTRO):
+        return found
+    for name in _RCLPY:
+        with suppress(PackageNotFoundError):
+            return _RELEASES.get(version(name).partition(".")[0])
+    return None
+
+
+def other_distro(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
+    """Return a warning where another release of ROS is set up than the plan names, or None."""
+    here = installed_distro(environment)
+    if ros.distro is None or here in {None, ros.distro}:
+        return None
+    message = f"the robot has ros: {{distro: {ros.distro}}}, and ROS 2 {str(here).capitalize()} is set up here"
+    advice = f"source /opt/ros/{ros.distro}/setup.bash, or change distro"
+    return finding("TF909", message, None, severity="warning", help=advice)
 
 
 def reads_zenoh_alone(environment: Mapping[str, str]) -> bool:
@@ -127,7 +153,7 @@ def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
     except OSError:
         found = {file.stem.removeprefix("lib") for folder in _folders() for file in folder.glob("librmw_*_cpp.so")}
         here = sorted(name for name in found if "_shared_" not in name and "__" not in name)
-        package = f"ros-jazzy-{name.replace('_', '-')}"
+        package = f"ros-{_release(ros)}-{name.replace('_', '-')}"
         advice, message = f"unset {RMW}, or install {package}", f"{RMW}={name}, which is not installed"
         if ros and ros.rmw:
             advice, message = (
@@ -137,9 +163,14 @@ def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
         advice += f"; here is {', '.join(here)}" if here else ""
         return finding("TF909", message, None, help=advice)
     if not is_fastdds({RMW: name}) and find_spec("tf2_msgs") is None:
-        advice = f"install ros-jazzy-tf2-msgs, or use {IMPLEMENTATIONS['fastdds']}"
+        advice = f"install ros-{_release(ros)}-tf2-msgs, or use {IMPLEMENTATIONS['fastdds']}"
         return finding("TF901", f"with {name} the package tf2_msgs is needed, and is not installed", None, help=advice)
     return None
+
+
+def _release(ros: RosSettings | None) -> str:
+    """Return the release of ROS whose packages are named in advice."""
+    return (ros and ros.distro) or os.environ.get(DISTRO) or "jazzy"
 
 
 def _configuration(environment: Mapping[str, str]) -> Finding | None:

@@ -42,7 +42,14 @@ def run(arguments: Namespace) -> int:
     """Look and print the findings; exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use."""
     from tfcompose.findings import finding
     from tfcompose.plan import RosSettings
-    from tfcompose.ros.environment import RosError, child_environment, no_ros, other_middleware, ros_trouble
+    from tfcompose.ros.environment import (
+        RosError,
+        child_environment,
+        no_ros,
+        other_distro,
+        other_middleware,
+        ros_trouble,
+    )
     from tfcompose.signals import Stop
 
     missing = no_ros()
@@ -50,7 +57,7 @@ def run(arguments: Namespace) -> int:
         return _print([missing], arguments.format)
     plan = _plan(arguments)
     ros = plan.ros if plan else RosSettings()
-    other = other_middleware(os.environ, ros)
+    odd = (other_middleware(os.environ, ros), other_distro(os.environ, ros))
     os.environ.update(child_environment(os.environ, ros, own=True))
     trouble = ros_trouble(os.environ, ros)
     if trouble:
@@ -67,7 +74,7 @@ def run(arguments: Namespace) -> int:
             return _print([finding("TF901", str(error), None)], arguments.format)
         if stop.requested:
             check_early_end(found.seconds, arguments.duration, heard=bool(found.edges))
-    findings = [*([other] if other else []), *found.findings]
+    findings = [*(one for one in odd if one), *found.findings]
     code = _print(findings, arguments.format)
     if arguments.format == "text":
         observed = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"

@@ -13,9 +13,11 @@ from tests.support import processes
 from tfcompose.deploy.agent import KEPT, UNIT, Agent, HostError
 from tfcompose.deploy.connection import START
 from tfcompose.deploy.release import Release
+from tfcompose.export.supervisors import SOURCING
 from tfcompose.plan import Plan, RosSettings
 
-SETTINGS = {"name": "rover.brain", "unit": "tfcompose-rover.brain.service", "python": "python3", "setup": []}
+SETTINGS = {"name": "rover.brain", "unit": "tfcompose-rover.brain.service", "python": "python3", "setup": [],
+            "sourcing": SOURCING}  # fmt: skip
 
 
 @pytest.fixture

@@ -85,6 +85,11 @@ def is_complete(computers: Computers) -> bool:
     return all(runs(computers, name).get("ready") for name in NAMES)
 
 
+def is_on_trial(computers: Computers, name: str) -> bool:
+    units = Path("/proc", str(computers.computers[name].inside()), "root/run", name, "systemd/user")
+    return any(units.glob("*.d/trial.conf"))
+
+
 def journals(computers: Computers) -> str:
     """Return what the units printed, for a test that fails."""
     return "".join(
@@ -152,8 +157,7 @@ def test_a_host_that_loses_power_in_the_middle_takes_all_back(computers: Compute
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
     process = deploying(computers, SILENT)
-    trial = Path(f"/proc/{computers.computers['rear'].inside()}/root/run/rear/systemd/user")
-    assert until(lambda: list(trial.glob("*.d/trial.conf")))
+    assert until(lambda: is_on_trial(computers, "rear"))
     computers.computers["rear"].lose_power()
     try:
         _, errors = process.communicate(timeout=2 * TIMEOUT_S)
@@ -170,11 +174,10 @@ def test_whoever_deploys_may_be_killed(computers: Computers) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
     process = deploying(computers, SILENT)
-    trial = Path(f"/proc/{computers.computers['rear'].inside()}/root/run/rear/systemd/user")
-    assert until(lambda: list(trial.glob("*.d/trial.conf")))
+    assert until(lambda: is_on_trial(computers, "rear"))
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    assert until(lambda: not list(trial.glob("*.d/trial.conf")))
+    assert until(lambda: not is_on_trial(computers, "rear"))
     assert until(lambda: is_complete(computers)), journals(computers)
     assert current(computers) == before
 
@@ -213,8 +216,7 @@ def test_of_two_at_once_the_second_says_who_holds_the_hosts(computers: Computers
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
     first = deploying(computers, SILENT, "--timeout", "12")
-    trial = Path(f"/proc/{computers.computers['rear'].inside()}/root/run/rear/systemd/user")
-    assert until(lambda: list(trial.glob("*.d/trial.conf")))
+    assert until(lambda: is_on_trial(computers, "rear"))
     second = deploy(computers, MOVED)
     assert (second.returncode, "TF915" in second.stderr, f"pid {first.pid}" in second.stderr) == (1, True, True), second
     first.communicate(timeout=2 * TIMEOUT_S)

@@ -132,6 +132,9 @@ def test_the_command_lists_robots_prints_poses_and_says_what_is_wrong(two: Two, 
     code, output = fleet("echo", "r1/base_link", "r2/base_link", "--once", "--format", "json")
     assert code == 0, output
     assert json.loads(output)["xyz"] == pytest.approx([1.0, 0.0, 0.0])
+    code, output = fleet("echo", "r1/base_link", "r2/nothing", "--for", "1")
+    assert code == 1
+    assert "r2/nothing" in output, "it says why there is no pose, however soon it ends"
     assert fleet("doctor", str(file), "--for", "2")[0] == 0
     two.link.break_()
     code, output = fleet("doctor")

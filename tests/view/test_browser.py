@@ -1,7 +1,6 @@
 """What a person does in the browser reaches the robot, and its file."""
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +14,8 @@ from tests.support.waiting import until
 from tests.view.test_view import ROVER, session_of
 from tfcompose.geometry import Pose, offset_of, quat_from_rpy
 from tfcompose.view.panel import Panel
-from tfcompose.view.server import started, stop
 
 pytestmark = pytest.mark.xdist_group("browser")
-
-
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    one = started("127.0.0.1", 0, "field_rover")
-    yield one
-    stop(one)
-
-
-@pytest.fixture
-def rover(tmp_path: Path) -> Path:
-    file = tmp_path / "field_rover.yaml"
-    file.write_bytes(ROVER.read_bytes())
-    return file
 
 
 def enter(page: Page, label: str, value: str) -> None:
@@ -43,13 +27,18 @@ def enter(page: Page, label: str, value: str) -> None:
     field.blur()
 
 
+def select_front_link(page: Page, panel: Panel) -> None:
+    """Select a mount that stands in the robot's file."""
+    enter(page, "search", "front_link")
+    until(lambda: panel.frames.value == "front_link")
+    page.get_by_text("pose of front_link in base_link").wait_for()
+
+
 def test_a_mount_that_is_moved_in_the_browser_is_saved_as_one_line(rover: Path, server: viser.ViserServer) -> None:
     session = session_of(rover)
     panel = Panel(server, session, edit=True)
     with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
-        enter(page, "search", "front_link")
-        until(lambda: panel.frames.value == "front_link")
-        page.get_by_text("pose of front_link in base_link").wait_for()
+        select_front_link(page, panel)
         enter(page, "x (mm)", "512.5")
         until(lambda: bool(session.moved))
         page.get_by_role("button", name="save").click()
@@ -68,9 +57,7 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(rover: Path,
     session = session_of(rover)
     panel = Panel(server, session, edit=True)
     with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
-        enter(page, "search", "front_link")
-        until(lambda: panel.frames.value == "front_link")
-        page.get_by_text("pose of front_link in base_link").wait_for()
+        select_front_link(page, panel)
         before = session.mount("front_link").given(session.mount("front_link").edge.pose)
 
         def is_dragged() -> bool:

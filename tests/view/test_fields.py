@@ -7,7 +7,7 @@ import pytest
 import viser
 
 from tests.support.tables import for_each
-from tests.view.test_view import PRESETS, server  # noqa: F401 (a fixture)
+from tests.view.test_view import PRESETS
 from tfcompose.compile import compile_robot
 from tfcompose.geometry import Pose
 from tfcompose.model import Robot
@@ -64,7 +64,7 @@ WALL = """  wall:
 """
 
 
-def test_what_is_blocked_is_what_the_rule_says(server: viser.ViserServer) -> None:  # noqa: F811
+def test_what_is_blocked_is_what_the_rule_says(server: viser.ViserServer) -> None:
     text = HEAD.replace("links: {base_link: {}}\n", f"links:\n  base_link: {{}}\n{WALL}")
     text += "sensors: {s: {preset: realsense/d455, parent: base_link, xyz: [0.1, 0, 0.3], driver: none}}\n"
     text += "rules: {TF641: {limit: 1 %}}\n"
@@ -81,7 +81,7 @@ def test_what_is_blocked_is_what_the_rule_says(server: viser.ViserServer) -> Non
     assert fields.show_blocked(done.robot) == []
 
 
-def test_a_field_of_view_is_where_its_frame_is(server: viser.ViserServer) -> None:  # noqa: F811
+def test_a_field_of_view_is_where_its_frame_is(server: viser.ViserServer) -> None:
     robot = robot_of("preset: generic/camera, xyz: [1, 2, 3], optics: {image: {horizontal: 60 deg, vertical: 40 deg}}")
     fields = FieldsOfView(server.scene, robot)
     poses = poses_in_roots(robot, {})

@@ -2,7 +2,6 @@
 
 import io
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,19 +13,11 @@ from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.view.panel import Panel
-from tfcompose.view.server import started, stop
 from tfcompose.view.session import Session
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("browser")]
 
 ROBOTS = sorted((Path(__file__).parents[2] / "robots").glob("*.yaml"))
-
-
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    one = started("127.0.0.1", 0, "robot")
-    yield one
-    stop(one)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -33,7 +33,6 @@ from tfcompose.view.kinematics import poses_in_roots
 from tfcompose.view.panel import Panel
 from tfcompose.view.plan_robot import robot_of_plan
 from tfcompose.view.scene import RobotScene, colours_of
-from tfcompose.view.server import started, stop
 from tfcompose.view.session import Session
 from tfcompose.view.shapes import MOST_TRIANGLES
 
@@ -46,20 +45,6 @@ def session_of(file: Path) -> Session:
         return compile_robot(texts[str(file)], str(file), PRESETS)
 
     return Session({str(file): file.read_text("utf-8")}, compiled, lambda path, old, new: rewrite(Path(path), old, new))
-
-
-@pytest.fixture
-def rover(tmp_path: Path) -> Path:
-    file = tmp_path / "field_rover.yaml"
-    file.write_bytes(ROVER.read_bytes())
-    return file
-
-
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    one = started("127.0.0.1", 0, "test")
-    yield one
-    stop(one)
 
 
 @pytest.mark.parametrize("origin", ["http://localhost:{port}", "http://127.0.0.1:{port}", None])

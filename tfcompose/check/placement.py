@@ -251,8 +251,9 @@ def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
         if one is other or of_one.kind != of_other.kind or (one.name, other.name) in reported:
             continue
         far = _distance_in_sight(robot, (one, of_one), (other, of_other), poses[of_one.frame])
-        back = _distance_in_sight(robot, (other, of_other), (one, of_one), poses[of_other.frame]) if far else None
-        if far is not None and far <= limit and back is not None:
+        if far is None or far > limit:
+            continue
+        if _distance_in_sight(robot, (other, of_other), (one, of_one), poses[of_other.frame]) is not None:
             reported.add((one.name, other.name))
             message = f"{one.name} and {other.name} look into each other, {far:.2g} m apart; the limit is {limit:g} m"
             notes = [Note(f"{one.name} is defined here", one.at)]

@@ -100,6 +100,24 @@ async def _printed(host: Host, words: list[str], printer: _Printer) -> int:
     return process.exit_status if process.exit_status is not None else FAILED
 
 
+def _object(line: str) -> dict[str, Any]:
+    """Return the object that a line is, empty for a line that is none."""
+    try:
+        found = json.loads(line)
+    except ValueError:
+        found = None
+    return found if isinstance(found, dict) else {}
+
+
+def _robots(text: str) -> list[Any]:
+    """Return the robots that a host lists, none where it prints something else."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        found = None
+    return found if isinstance(found, list) else []
+
+
 class _Printer:
     """What hosts print, as lines; a robot's table is printed at the end, in one piece."""
 
@@ -113,8 +131,8 @@ class _Printer:
         """Print a line, or keep it."""
         if self._is_table:
             self._kept.setdefault(host, []).append(line)
-        elif self._is_json:
-            self._put(json.dumps({"host": host} | json.loads(line), ensure_ascii=False))
+        elif self._is_json and (event := _object(line)):
+            self._put(json.dumps({"host": host} | event, ensure_ascii=False))
         else:
             self._put(f"{host.ljust(self.width)} | {printable(line)}")
 
@@ -122,7 +140,7 @@ class _Printer:
         """Print what was kept, host by host."""
         lines = [self._kept.get(host, []) for host in hosts]
         if self._is_table and self._is_json:
-            robots: list[Any] = [robot for some in lines if some for robot in json.loads("\n".join(some))]
+            robots = [robot for some in lines for robot in _robots("\n".join(some))]
             self._put(json.dumps(robots, indent=1))
         elif any(lines):
             self._put("\n".join(printable(line) for some in lines for line in some))

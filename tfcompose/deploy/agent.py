@@ -41,8 +41,6 @@ KEPT = 5
 UNIT = "unit"
 #: Larger files are not sent back to be compared.
 MOST_TEXT = 200_000
-#: Sources the files of its first argument, then becomes the command; bash, because ROS's setup files are bash's.
-SOURCING = 'for file in $0; do . "$file"; done; exec "$@"'
 #: Prints what the host's Python has, with the setup files sourced.
 _PROBE = """
 import json, os, sys
@@ -73,6 +71,7 @@ class Agent:
         self.unit: str = settings["unit"]
         self.python: str = settings["python"]
         self.setup: list[str] = settings["setup"]
+        self.sourcing: str = settings["sourcing"]
         self.gone = gone
         self.lock: int | None = None
         self.trial: dict[str, Any] | None = None
@@ -352,7 +351,7 @@ class Agent:
 
     def _command(self, words: list[str]) -> list[str]:
         files = " ".join(str(Path(file).expanduser()) for file in self.setup)
-        return ["/bin/bash", "-c", SOURCING, files, *words] if self.setup else words
+        return ["/bin/bash", "-c", self.sourcing, files, *words] if self.setup else words
 
     def _program(self, words: list[str], seconds: float = PROGRAM_S) -> subprocess.CompletedProcess[str]:
         return _run(self._command(words), seconds, self._environment())

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import asyncssh
 
+from tfcompose.export.supervisors import SOURCING
 from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
@@ -36,13 +37,17 @@ START = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the agent is given first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name."""
+    """What the agent is given first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name.
+
+    ``sourcing`` is the line of bash that sources the files of its first argument, and becomes the command.
+    """
 
     name: str
     unit: str
     python: str = "python3"
     setup: tuple[str, ...] = ()
     system: bool = False
+    sourcing: str = SOURCING
 
 
 def settings_of(robot: str, name: str, host: PlanHost, *, system: bool = False) -> Settings:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tfcompose.deploy.agent import SOURCING
-from tfcompose.export.supervisors import quoted
+from tfcompose.export.supervisors import SOURCING, quoted
 
 #: How long everything on a host has to end: the launcher ends processes one after the other.
 STOP_S = 90

@@ -176,7 +176,7 @@ def yaml_text(value: Mapping[str, Any]) -> str:
 
 
 #: Sources files, then becomes the command; bash, because ROS's setup files are bash's.
-_SOURCING = 'for file in $0; do . "$file"; done; exec "$@"'
+SOURCING = 'for file in $0; do . "$file"; done; exec "$@"'
 
 
 def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
@@ -266,7 +266,7 @@ def _logs(plan: Plan, machine: Machine) -> list[str]:
 def _exec(process: PlanProcess, machine: Machine) -> str:
     words = command_of(process, machine.python, f"{machine.folder}/plan.json")
     if machine.setup:
-        words = ["/bin/bash", "-c", _SOURCING, " ".join(machine.setup), *words]
+        words = ["/bin/bash", "-c", SOURCING, " ".join(machine.setup), *words]
     return " ".join(quoted(word).replace("$", "$$") for word in words)
 
 

@@ -36,7 +36,9 @@ _HEAD = ("ROBOT", "STATE", "AGE", "EDGES", "ROUTER")
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("action", choices=_ACTIONS, help="what to do, as above")
-    parser.add_argument("words", nargs="*", metavar="NAME|FILE", help="ROBOT for share, A and B for echo; fleet.yaml")
+    parser.add_argument(
+        "words", nargs="*", default=[], metavar="NAME|FILE", help="ROBOT for share, A and B for echo; fleet.yaml"
+    )
     add_for(parser, "ps and doctor: listen for S seconds; default: until all is known, at most 3; echo: end after S")
     parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="echo: poses per second; default: 1")
     parser.add_argument("--once", action="store_true", help="echo: print one pose and exit")
@@ -170,29 +172,33 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
 
     begun = time.monotonic()
     shown = False
-    trouble, due = "", 0.0
-    while (now := time.monotonic()) - begun < (arguments.duration or float("inf")):
-        wrong = _trouble(observer, target, source)
-        try:
-            pose, stamp_ns = observer.buffer.latest(target, source)
-        except TransformException as error:
-            wrong = wrong or str(error)
-        waiting = not shown and now - begun < _OBSERVE_S
-        if wrong != trouble and not (wrong and waiting):
-            warn(wrong or "the links are live again")
-            trouble = wrong
-        if not wrong and now >= due:
-            due, shown = now + 1 / arguments.rate, True
-            age_s = None if stamp_ns is None else (time.time_ns() - stamp_ns) / 1e9
-            if arguments.format == "json":
-                sys.stdout.write(pose_json(target, source, clean(pose), stamp_ns=stamp_ns, age_s=age_s))
-            else:
-                when = ", fixed" if age_s is None else f", {age_s:.2f} s ago"
-                sys.stdout.write(pose_text(target, source, clean(pose), when))
-            sys.stdout.flush()
-        if (arguments.once and shown) or (arguments.once and not waiting):
-            break
-        time.sleep(0.05)
+    wrong, trouble, due = "", "", 0.0
+    try:
+        while (now := time.monotonic()) - begun < (arguments.duration or float("inf")):
+            wrong = _trouble(observer, target, source)
+            try:
+                pose, stamp_ns = observer.buffer.latest(target, source)
+            except TransformException as error:
+                wrong = wrong or str(error)
+            waiting = not shown and now - begun < _OBSERVE_S
+            if wrong != trouble and not (wrong and waiting):
+                warn(wrong or "the links are live again")
+                trouble = wrong
+            if not wrong and now >= due:
+                due, shown = now + 1 / arguments.rate, True
+                age_s = None if stamp_ns is None else (time.time_ns() - stamp_ns) / 1e9
+                if arguments.format == "json":
+                    sys.stdout.write(pose_json(target, source, clean(pose), stamp_ns=stamp_ns, age_s=age_s))
+                else:
+                    when = ", fixed" if age_s is None else f", {age_s:.2f} s ago"
+                    sys.stdout.write(pose_text(target, source, clean(pose), when))
+                sys.stdout.flush()
+            if arguments.once and (shown or not waiting):
+                break
+            time.sleep(0.05)
+    finally:
+        if not shown and wrong != trouble:  # also where it ended before it was sure
+            warn(wrong)
     return 0 if shown else FAILED
 
 

@@ -18,6 +18,8 @@ from tests.support.bringups import compiled, import_of, places, printed_errors
 from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
 from tfcompose.importing import launch
+from tfcompose.importing import launch_actions as actions
+from tfcompose.importing.launch_substitutions import Context
 from tfcompose.load import load
 
 PYTHON = """
@@ -82,6 +84,7 @@ def generate_launch_description():
 @pytest.fixture(autouse=True)
 def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiling, "library", lambda: PRESETS)
+    monkeypatch.setattr(launch, "has_launch", lambda: False)  # test_real_launch claims the same of ROS's own
 
 
 @pytest.fixture
@@ -625,6 +628,31 @@ def test_launch_files_of_ros_1_are_read(tmp_path: Path) -> None:
     assert robot
 
 
+ROS1_DESCRIBED = """<launch>
+  <param name="robot_description"
+    command="$(find xacro)/xacro '$(find rover)/rover.xacro' wheels:=4"/>
+  <param name="rate" value="20"/>
+  <node pkg="robot_state_publisher" type="robot_state_publisher" name="robot_state_publisher"/>
+  <node pkg="rviz" type="rviz" name="rviz" args="-d '$(find rover)/rviz/a b.rviz' --fullscreen"/>
+</launch>
+"""
+
+
+def test_a_description_and_quotes_of_ros_1_are_read(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (package.parent / "rover.xacro").write_text(
+        '<robot name="rover" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arg name="wheels" default="2"/>'
+        '<link name="base_link"/></robot>',
+        encoding="utf-8",
+    )
+    _, data = import_of(source(package, "rover.launch", ROS1_DESCRIBED))
+    (part,) = data["parts"].values()
+    assert part["args"] == {"wheels": "4"}
+    assert part["xacro"].endswith("rover.xacro")
+    assert data["processes"]["rviz"]["run"]["args"] == ["-d", f"{package.parent}/rviz/a b.rviz", "--fullscreen"]
+    assert data["processes"]["rviz"]["params"] == {"rate": 20}
+    assert places(printed_errors(capsys), "TF020") == ["rover.launch:5", "rover.launch:2"]  # rate, xacro
+
+
 def test_a_launch_file_comes_from_standard_input(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -925,6 +953,63 @@ COMPOSED_XML = """<launch>
     <composable_node pkg="image_proc" plugin="image_proc::CropNode" name="crop"/>
   </load_composable_node>
 </launch>
+"""
+
+
+def test_records_tell_containers_apart_though_the_earlier_ones_are_gone() -> None:
+    """Python gives the ``id`` of an object that is gone to another one: components were in a wrong container then."""
+    context = Context()
+    for count in range(50):
+        inside = [actions.ComposableNode(package="p", plugin="p::C", name=f"in_{count}")]
+        container = {"package": "p", "executable": "e", "name": f"box_{count}", "namespace": ""}
+        actions.ComposableNodeContainer(**container, composable_node_descriptions=inside).visit(context)
+    boxes, components = context.records[::2], context.records[1::2]
+    assert [one["container"] for one in components] == [str(one["id"]) for one in boxes]
+    assert len({one["id"] for one in context.records}) == 100
+
+
+def test_an_argument_that_a_command_makes_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "rover.xacro").write_text('<robot name="rover"/>', encoding="utf-8")
+    text, data = import_of(source(tmp_path, "a.launch.py", SPAWNED))
+    file = f"{tmp_path}/rover.xacro"
+    assert data["processes"]["create"]["run"]["args"] == ["-string", file, f"-file={file}"]
+    assert data["processes"]["a"]["run"] == {"launch": "gone/a.launch.py", "args": {"text": file}}
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:8", "a.launch.py:11", "a.launch.py:11"]
+    assert "U000" not in text
+
+
+SPAWNED = """import os
+from launch import LaunchDescription
+from launch.actions import IncludeLaunchDescription
+from launch.substitutions import Command
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
+def generate_launch_description():
+    return LaunchDescription([Node(package="ros_gz_sim", executable="create", arguments=[
+        "-string", Command(["xacro ", os.path.join(os.path.dirname(__file__), "rover.xacro")]),
+        ["-file=", os.path.join(os.path.dirname(__file__), "rover.xacro")]]),
+        IncludeLaunchDescription([FindPackageShare("gone"), "/a.launch.py"], launch_arguments={
+            "text": Command(["xacro ", os.path.join(os.path.dirname(__file__), "rover.xacro")])}.items())])
+"""
+
+
+def test_a_condition_and_a_list_that_are_given_by_keyword_count(tmp_path: Path) -> None:
+    file = source(tmp_path, "a.launch.py", BY_KEYWORD)
+    _, data = import_of(file)
+    assert set(data["processes"]) == {"kept"}
+    assert data["processes"]["kept"]["params"] == {"names": ["a", "b"]}
+
+
+BY_KEYWORD = """
+from launch import LaunchDescription
+from launch.conditions import IfCondition
+from launch_ros.actions import Node
+from launch_ros.descriptions import ParameterValue
+def generate_launch_description():
+    return LaunchDescription([
+        Node(package="p", executable="e", name="gone", condition=IfCondition(predicate_expression="false")),
+        Node(package="p", executable="e", name="kept", parameters=[{"names": ParameterValue(["a", "b"])}]),
+    ])
 """
 
 

@@ -13,9 +13,10 @@ import pytest
 import yaml
 
 from tests.importing.test_exported import ARGUED, COMBINATIONS
-from tests.importing.test_launch import BOXES_IN, COMPOSED, COMPOSED_XML, MORE, WITH_ARGUMENTS, XML, YAML
-from tests.support.bringups import compiled, exported, flat, import_of, started_with
+from tests.importing.test_launch import BOXES_IN, COMPOSED, COMPOSED_XML, MORE, PYTHON, WITH_ARGUMENTS, XML, YAML
+from tests.support.bringups import compiled, exported, flat, import_of, places, printed_errors, started_with
 from tests.support.composition import can_build, composition_interfaces
+from tfcompose.importing import launch as importing
 from tfcompose.model import Robot
 
 pytestmark = pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch is not installed")
@@ -95,6 +96,7 @@ def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     return share
 
 
+@pytest.mark.parametrize("has_launch", [True, False], ids=["launch", "stand-in"])
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
@@ -106,9 +108,10 @@ def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
         *((name, text, ()) for name, text in BOXES_IN.items()),
     ],
 )
-def test_each_process_is_started_as_launch_would(
-    name: str, text: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_each_process_is_started_as_launch_would(  # noqa: PLR0913 (fixtures, and cases)
+    name: str, text: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, has_launch: bool
 ) -> None:
+    monkeypatch.setattr(importing, "has_launch", lambda: has_launch)
     share = installed("rover", tmp_path, monkeypatch)
     (share / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
     (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
@@ -121,6 +124,121 @@ def test_each_process_is_started_as_launch_would(
     assert found.keys() == expected.keys()
     for key, one in expected.items():
         assert found[key] == one, key
+
+
+@pytest.mark.parametrize("words", [(), ("--all-branches",)], ids=["defaults", "all branches"])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("rover.launch.py", PYTHON.replace(", autostart=True", "")),
+        ("rover.launch.xml", SOUND_XML),
+        ("rover.launch.yaml", SOUND_YAML),
+        ("a.launch.py", WITH_ARGUMENTS),
+        ("composed.launch.py", COMPOSED),
+        ("composed.launch.xml", COMPOSED_XML),
+        *BOXES_IN.items(),
+    ],
+)
+def test_launch_and_the_stand_in_give_the_same_robot_file(
+    name: str, text: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    share = installed("rover", tmp_path, monkeypatch)
+    (share / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
+    (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
+    file = tmp_path / name
+    file.write_text(text, encoding="utf-8")
+    by_launch, _ = import_of(file, *words, code=None)
+    monkeypatch.setattr(importing, "has_launch", lambda: False)
+    by_stand_in, _ = import_of(file, *words, code=None)
+    assert by_launch.splitlines()[0] == f"# imported from {name} by tfcompose, read by ROS's launch"
+    assert by_launch.splitlines()[1:] == by_stand_in.splitlines()[1:]
+
+
+def test_what_launch_refuses_the_stand_in_reads_and_a_finding_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "a.launch.xml"
+    file.write_text('<launch>\n<bogus/>\n<node pkg="p" exec="e" name="n"/>\n</launch>\n', encoding="utf-8")
+    text, data = import_of(file)
+    assert set(data["processes"]) == {"n"}
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.xml:1", "a.launch.xml:2"]
+    assert "read by ROS's launch" not in text.splitlines()[0]
+
+
+def test_actions_and_substitutions_of_other_packages_do_what_they_do(tmp_path: Path) -> None:
+    file = tmp_path / "a.launch.py"
+    file.write_text(OTHERS, encoding="utf-8")
+    _, data = import_of(file)
+    assert data["processes"]["made"]["params"] == {"speed": 6}
+    assert data["processes"]["made"]["namespace"] == "outer/left"
+    assert data["processes"]["own"]["run"] == {"package": "camera", "executable": "camera", "args": ["--fast"]}
+    assert data["args"] == {"half": {"default": 3, "description": "of the speed"}}
+    assert data["processes"]["kept"]["params"] == {"half": "${args.half}"}
+
+
+OTHERS = """
+from launch import Action, LaunchDescription, Substitution
+from launch.actions import DeclareLaunchArgument, GroupAction, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node, PushRosNamespace
+class Twice(Substitution):
+    def __init__(self, value):
+        super().__init__()
+        self.value = value
+    def perform(self, context):
+        return str(2 * int(context.perform_substitution(self.value)))
+class Made(Action):
+    def __init__(self, side, **kwargs):
+        super().__init__(**kwargs)
+        self.side = side
+    def execute(self, context):
+        return [Node(package="p", executable="e", name="made", namespace=self.side,
+                     parameters=[{"speed": Twice(LaunchConfiguration("half"))}])]
+def kept(context, params):
+    return [Node(package="p", executable="e", name="kept", parameters=[params])]
+class Camera(Node):
+    def __init__(self, label):
+        super().__init__(package="camera", executable="camera", name=label, arguments=["--fast"])
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("half", default_value="3", description="of the speed"),
+        GroupAction([PushRosNamespace("outer"), Made("left")]),
+        Camera("own"),
+        OpaqueFunction(function=kept, kwargs={"params": {"half": LaunchConfiguration("half")}}),
+    ])
+"""
+
+
+def test_launch_starts_nothing_and_reaches_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "a.launch.py"
+    file.write_text(REACHING.replace("TOUCHED", str(tmp_path / "touched")), encoding="utf-8")
+    text, data = import_of(file)
+    assert text.splitlines()[0].endswith("read by ROS's launch")
+    assert set(data["processes"]) == {"n"}
+    assert not (tmp_path / "touched").exists()
+    assert places(printed_errors(capsys), "TF020") == [f"a.launch.py:{line}" for line in (5, 7, 11, 15)]
+
+
+REACHING = """import os, socket
+from launch import LaunchDescription
+from launch.actions import ExecuteProcess
+from launch_ros.actions import Node
+os.system("touch TOUCHED")
+try:
+    socket.create_connection(("127.0.0.1", 22))
+except OSError:
+    pass
+try:
+    open("TOUCHED", "w")
+except OSError:
+    pass
+try:
+    os.posix_spawn("/bin/touch", ["touch", "TOUCHED"], {})
+except OSError:
+    pass
+def generate_launch_description():
+    return LaunchDescription([Node(package="p", executable="e", name="n")])
+"""
 
 
 @pytest.mark.parametrize("given", COMBINATIONS, ids=lambda given: "-".join(given.values()))

@@ -12,12 +12,13 @@ import signal
 import subprocess
 import sys
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.importing.confinement import MOST_CPU_S
-from tfcompose.importing.launch_substitutions import marks, scalar_of
+from tfcompose.importing.launch_substitutions import marks, scalar_of, shown, without_marks
 from tfcompose.importing.programs import (
     CONTAINERS,
     JOINT_PUBLISHERS,
@@ -82,7 +83,8 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     Raises:
         RejectedError: if it is no launch file, or takes too long or too much memory.
     """
-    answer = _answered(launch)
+    answer = _read(draft, launch)
+    draft.head[-1] += ", a launch file of ROS 1" if _is_of_ros1(answer) else ""
     work = _Work(draft, launch, target, answer["records"])
     for record in answer["records"]:
         work.add(record)
@@ -95,11 +97,43 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     return work.descriptions
 
 
-def _answered(launch: Launch) -> dict[str, Any]:
+def _read(draft: Draft, launch: Launch) -> dict[str, Any]:
+    """Return what ROS's launch records of the file where it is installed, what the stand-in does elsewhere.
+
+    Raises:
+        RejectedError: if neither can read it.
+    """
+    if not has_launch():
+        return _answered(launch, with_launch=False)
+    try:
+        answer = _answered(launch, with_launch=True)
+        reason, line = answer["stopped"], answer["line"]
+    except RejectedError as error:
+        reason, line = error.findings[0].message, 0
+    if not reason:
+        draft.head[-1] += ", read by ROS's launch"
+        return answer
+    answer = _answered(launch, with_launch=False)
+    if not answer["stopped"] and not _is_of_ros1(answer):
+        draft.todo(f"ROS's launch does not read it, tfcompose's own reader does: {reason}", launch.span(line))
+    return answer
+
+
+def _is_of_ros1(answer: dict[str, Any]) -> bool:
+    return any(record.get("ros1") for record in answer["records"])
+
+
+def has_launch() -> bool:
+    """Return whether ROS's launch can be imported: folders of that name are often near launch files, and are not it."""
+    several = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
+    return all(spec is not None and spec.origin is not None for spec in several)
+
+
+def _answered(launch: Launch, *, with_launch: bool) -> dict[str, Any]:
     request = {
         "file": str(Path(launch.file).absolute()), "arguments": dict(launch.arguments),
         "packages": {name: str(Path(folder).absolute()) for name, folder in launch.packages.items()},
-        "prefixes": list(launch.prefixes), "every_branch": launch.every_branch,
+        "prefixes": list(launch.prefixes), "every_branch": launch.every_branch, "with_launch": with_launch,
     }  # fmt: skip
     program = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "  # a Ctrl-C is for who asked
@@ -218,7 +252,7 @@ class _Work:
                 self.draft.sections["args"][name] = keys
                 self.draft.note(at, where(span))
             if name in decided:
-                chosen = f"{value!r} here" if value != record["default"] else f"its default {value!r}"
+                chosen = f"{shown(value)!r} here" if value != record["default"] else f"its default {shown(value)!r}"
                 message = f"the launch argument {name}{explained} has {chosen}"
                 more = " where its value decides what is started, or is computed with" if name in used else ""
                 self.draft.todo(f"{message}{more}", span, at if name in used else ("", ""), f"import … {name}:=VALUE")
@@ -296,9 +330,12 @@ class _Work:
         argv = tuple(record.get("argv", ()))
         if record.get("executable") in _READ:
             argv = tuple(map(with_values, argv))
+        else:
+            argv = tuple(_without_texts(word, todo) for word in argv)
         reader = None if record["kind"] == "process" else "ros2"
         loads = record["kind"] == "container" or self._is_container(record)
         if record.get("ros1"):
+            description = description if record["executable"] == STATE_PUBLISHER else None  # it is one of all nodes'
             reader = "tf" if record["package"] == "tf" else "tf2_ros"
         return Program(
             span, record.get("package"), record.get("executable"), argv, bool(record.get("shell")),
@@ -392,8 +429,9 @@ class _Work:
         """Add a launch file of a package that is not found as one process."""
         package, _, file = record["file"].removeprefix(PACKAGE).partition("/")
         keys: dict[str, Any] = {"run": {"launch": f"{package}/{file.removeprefix('launch/')}"}}
+        todo: list[str] = []
         if record["args"]:
-            keys["run"]["args"] = record["args"]
+            keys["run"]["args"] = {key: _without_texts(value, todo) for key, value in record["args"].items()}
         namespace = (record.get("namespace") or "").strip("/")
         keys |= {"namespace": namespace} if namespace else {}
         env = self._env(record)
@@ -401,6 +439,8 @@ class _Work:
         name = posixpath.basename(file).partition(".")[0]
         name = self.draft.process(name, keys, where(span, "an included launch file, which runs as one process"))
         self._conditions(record, ("processes", name))
+        for one in todo:
+            self.draft.todo(one, span, ("processes", name))
         if record.get("after"):
             self._after.append((name, record["after"]))
         if record.get("period"):
@@ -453,6 +493,13 @@ def _full_name(program: Program) -> str:
 
 def _seconds(value: float) -> Bare:
     return Bare(f"{number(value)} s")
+
+
+def _without_texts(word: str, todo: list[str]) -> str:
+    """Return a word of a command in which files stand for what xacro makes of them, or for their texts."""
+    plain, files = without_marks(word)
+    todo += [f"an argument is what is made of {shown(file)}, or its text: here it is the file's name" for file in files]
+    return plain
 
 
 def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], Description | None]:

@@ -8,6 +8,7 @@ How each action behaves was read in those packages' sources.
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections.abc import Callable, Mapping
@@ -25,11 +26,15 @@ from tfcompose.importing.launch_substitutions import (
     place,
     plain,
     scalar_of,
+    shown,
     symbolic_text,
     text_of,
     truth,
     with_package,
 )
+
+#: What tells actions apart in records; Python's ``id`` is given again to another one once an action is gone.
+_IDS = itertools.count(1)
 
 
 class Action:
@@ -37,6 +42,7 @@ class Action:
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self.at = place()
+        self.id = next(_IDS)
         self.condition = kwargs.pop("condition", None)
         self.args, self.kwargs = args, kwargs
 
@@ -113,7 +119,7 @@ def visit_all(entities: Any, context: Context) -> None:
         if isinstance(one, (list, tuple)):
             visit_all(one, context)
         elif hasattr(one, "visit"):
-            one.visit(context)
+            visit_all(one.visit(context), context)  # launch's own descriptions return what is in them
         elif one is not None:
             context.todo([context.file, 1], f"{type(one).__name__} is no action that is known here")
 
@@ -140,7 +146,7 @@ class DeclareLaunchArgument(Action):
             if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
                 context.declared[name] = kinds[type(scalar_of(known))]
             context.record("argument", self.at, name=name, default=default, value=known, choices=choices,
-                           description=str(self.description or ""), env=self._variable(context))  # fmt: skip
+                           description=plain([self.description or ""]), env=self._variable(context))  # fmt: skip
 
     def _variable(self, context: Context) -> str:
         """Return the environment variable that is its default, or nothing."""
@@ -175,7 +181,7 @@ class SetEnvironmentVariable(Action):
         self.name, self.value = name, value
 
     def execute(self, context: Context) -> None:
-        context.environment[text_of(self.name, context)] = with_package(text_of(self.value, context))
+        context.variables[text_of(self.name, context)] = with_package(text_of(self.value, context))
 
 
 class UnsetEnvironmentVariable(Action):
@@ -185,7 +191,7 @@ class UnsetEnvironmentVariable(Action):
 
     def execute(self, context: Context) -> None:
         name = text_of(self.name, context)
-        if context.environment.pop(name, None) is None:
+        if context.variables.pop(name, None) is None:
             context.todo(self.at, f"the environment variable {name} is unset")
 
 
@@ -197,12 +203,12 @@ class AppendEnvironmentVariable(SetEnvironmentVariable):
 
     def execute(self, context: Context) -> None:
         name, value = text_of(self.name, context), with_package(text_of(self.value, context))
-        before = context.environment.get(name)
+        before = context.variables.get(name)
         if before is None:
-            context.todo(self.at, f"{value} is appended to the environment's {name}")
+            context.todo(self.at, f"{shown(value)} is appended to the environment's {name}")
             return
         first, second = (value, before) if self.prepend else (before, value)
-        context.environment[name] = f"{first}{text_of(self.separator, context)}{second}"
+        context.variables[name] = f"{first}{text_of(self.separator, context)}{second}"
 
 
 class GroupAction(Action):
@@ -218,7 +224,7 @@ class GroupAction(Action):
         scoped = self.scoped if isinstance(self.scoped, bool) else truth(self.scoped, context)
         if scoped and self.forwarding is False:
             context.configurations.clear()
-            context.environment, context.namespace, context.params, context.remaps = {}, None, [], []
+            context.variables, context.namespace, context.params, context.remaps = {}, None, [], []
         context.configurations |= own
         try:
             visit_all(list(self.actions), context)
@@ -300,7 +306,7 @@ class EmitEvent(Action):
         if isinstance(event, ChangeState):
             node = event.node
             if node is not None and event.transition in {1, 3}:
-                context.record("lifecycle", self.at, node=id(node), state=_STATES[event.transition])
+                context.record("lifecycle", self.at, node=node.id, state=_STATES[event.transition])
                 return
         context.todo(self.at, self.described(context))
 
@@ -414,10 +420,10 @@ class EventHandler:
         for one in several:
             ends = isinstance(one, Shutdown) or (isinstance(one, EmitEvent) and isinstance(one.event, ShutdownEvent))
             if ends and self.AFTER == "done":
-                context.record("required", at, node=id(self.target))
+                context.record("required", at, node=self.target.id)
             else:
                 before = dict(context.after)
-                context.after[str(id(self.target))] = self.AFTER
+                context.after[str(self.target.id)] = self.AFTER
                 try:
                     visit_all([one], context)
                 finally:
@@ -472,14 +478,15 @@ class IncludeLaunchDescription(Action):
         if path.startswith(PACKAGE):
             given = {text_of(name, context): symbolic_text(value, context) for name, value in self.launch_arguments}
             context.record("include", self.at, file=path, args=given, namespace=context.namespace,
-                           env=dict(context.environment), period=context.period_s,
+                           env=dict(context.variables), period=context.period_s,
                            after=dict(context.after))  # fmt: skip
             return
         include(path, context)
 
     def described(self, context: Context) -> str:
         location = self.source.location if isinstance(self.source, LaunchDescriptionSource) else self.source
-        return f"the included {plain([location])}"
+        several = location if isinstance(location, (list, tuple)) else [location]
+        return f"the included {shown(''.join(plain([one]) for one in several))}"
 
 
 #: Reads a launch file of any kind; ``launch_process`` puts it here.
@@ -520,9 +527,9 @@ class ExecuteProcess(Action):
     def common(self, context: Context) -> dict[str, Any]:
         """Return what any process can be told."""
         given = self.kwargs
-        env = {**context.environment, **_texts(given.get("additional_env"), context)}
+        env = {**context.variables, **_texts(given.get("additional_env"), context)}
         env |= _texts(given.get("env"), context)
-        what: dict[str, Any] = {"id": id(self), "env": env, "period": context.period_s, "after": dict(context.after)}
+        what: dict[str, Any] = {"id": self.id, "env": env, "period": context.period_s, "after": dict(context.after)}
         for key in ("cwd", "prefix", "sigterm_timeout", "sigkill_timeout"):
             if given.get(key) is not None:
                 what[key] = text_of(given[key], context)
@@ -646,7 +653,7 @@ class ComposableNode(Action):
             raise FailedError("no container loads it")
         extra = parameters_of(self.extra_arguments, context, self.at)
         context.record(
-            "component", self.at, id=id(self), container=context.container, package=text_of(self.package, context),
+            "component", self.at, id=self.id, container=context.container, package=text_of(self.package, context),
             plugin=text_of(self.plugin, context), name=_optional(self.name, context),
             namespace=below(context.namespace, _optional(self.namespace, context)),
             params=[*context.params, *parameters_of(self.parameters, context, self.at)],
@@ -674,7 +681,7 @@ class ComposableNodeContainer(Node):
 
     def execute(self, context: Context) -> None:
         self.record(context, "container")
-        _visit_components(self.components, str(id(self)), context)
+        _visit_components(self.components, str(self.id), context)
 
 
 class LoadComposableNodes(Action):
@@ -684,7 +691,7 @@ class LoadComposableNodes(Action):
 
     def execute(self, context: Context) -> None:
         container = self.container
-        target = str(id(container)) if isinstance(container, Node) else f"/{text_of(container, context).strip('/')}"
+        target = str(container.id) if isinstance(container, Node) else f"/{text_of(container, context).strip('/')}"
         if target == "/":
             raise FailedError("it names no container")
         _visit_components(self.components, target, context)

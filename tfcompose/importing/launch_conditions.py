@@ -50,11 +50,14 @@ class Condition:
 
 
 class IfCondition(Condition):
+    def __init__(self, predicate_expression: Any) -> None:
+        super().__init__(predicate_expression)
+
     def when(self, context: Context) -> str | None:
         return expression_of(self.predicate, context)
 
 
-class UnlessCondition(Condition):
+class UnlessCondition(IfCondition):
     def evaluate(self, context: Context) -> bool:
         return not truth(self.predicate, context)
 
@@ -98,7 +101,7 @@ class LaunchConfigurationNotEquals(LaunchConfigurationEquals):
 
 def expression_of(value: Any, context: Context) -> str | None:
     """Return what is true or false as an expression of a robot file, or None where it cannot be one."""
-    one = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
+    one = _alone(value)
     if isinstance(one, (LaunchConfiguration, LaunchConfigAsBool)):
         name = plain([one.variable_name])
         return f"args.{name}" if context.declared.get(name) == "bool" else None
@@ -109,10 +112,16 @@ def expression_of(value: Any, context: Context) -> str | None:
         several = [expression_of(arg, context) for arg in one.args]
         word = " and " if isinstance(one, AndSubstitution) else " or "
         return word.join(f"({inner})" for inner in several) if all(several) else None
-    if isinstance(one, EqualsSubstitution) and isinstance(one.args[0], LaunchConfiguration):
+    if isinstance(one, EqualsSubstitution) and isinstance(left := _alone(one.args[0]), LaunchConfiguration):
         word = "!=" if isinstance(one, NotEqualsSubstitution) else "=="
-        return _comparison(plain([one.args[0].variable_name]), word, one.args[1], context)
+        return _comparison(plain([left.variable_name]), word, one.args[1], context)
     return _python_expression(one, context) if isinstance(one, PythonExpression) else None
+
+
+def _alone(value: Any) -> Any:
+    """Return the only one of a list, as the frontends write a value; a text as such."""
+    one = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
+    return str(one.text) if isinstance(one, TextSubstitution) else one
 
 
 #: What stands for an argument in an expression: within quotes, and without.
@@ -175,7 +184,7 @@ def _python_comparison(left: ast.expr, sign: str, value: Any, context: Context) 
 
 
 def _comparison(name: str, word: str, expected: Any, context: Context) -> str | None:
-    kind = context.declared.get(name)
+    kind, expected = context.declared.get(name), _alone(expected)
     if kind is None or not isinstance(expected, str) or "'" in expected:
         return None
     if kind == "string":

@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import types
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -50,18 +51,23 @@ _REFUSED = frozenset({
     "ctypes.call_function", "ctypes.cdata", "ctypes.cdata/buffer", "ctypes.string_at", "ctypes.addressof",
 })  # fmt: skip
 #: Packages of ROS's that the stand-in is in the place of, and what xacro and the ament index are.
-_LAUNCH = ("launch", "launch_ros", "launch_xml", "launch_yaml", "nav2_common", "ament_index_python", "xacro",
-           "lifecycle_msgs", "launch_param_builder", "moveit_configs_utils", "launch_testing")  # fmt: skip
+_LAUNCH = frozenset({"launch", "launch_ros", "launch_xml", "launch_yaml", "nav2_common", "ament_index_python", "xacro",
+                     "lifecycle_msgs", "launch_param_builder", "moveit_configs_utils", "launch_testing"})  # fmt: skip
+#: Those that are themselves where launch is installed.
+_INSTALLED = frozenset({"launch", "launch_ros", "launch_xml", "launch_yaml", "lifecycle_msgs"})
 
 
 class Reader:
-    """Reads launch files; ``context`` has what came of it."""
+    """Reads launch files; ``context`` has what came of it, ``recorder`` is there where ROS's launch reads them."""
 
     def __init__(self, request: dict[str, Any]) -> None:
         self.packages: dict[str, str] = request["packages"]
         self.prefixes: list[str] = request["prefixes"]
-        self.context = Context(self.find, every_branch=request["every_branch"])
+        self.recorder = _recorder() if request["with_launch"] else None
+        kind = self.recorder.RecordingContext if self.recorder else Context
+        self.context: Context = kind(self.find, every_branch=request["every_branch"])
         self.context.configurations |= request["arguments"]
+        self.replaced = _LAUNCH - _INSTALLED if self.recorder else _LAUNCH
         self.missed: set[str] = set()
         self._known: dict[str, str | None] = {}
 
@@ -99,6 +105,8 @@ class Reader:
             FailedError: if it has none.
         """
         text, kind = texts.read(path)
+        if kind != "py" and self.recorder:
+            return self.recorder.parsed_text(path)
         if kind != "py":
             return texts.Actions(texts.of_xml(text, path) if kind == "xml" else texts.of_yaml(text, path))
         module: dict[str, Any] = {"__file__": path, "__name__": f"{substitutions.MODULE}{len(context.records)}"}
@@ -122,6 +130,21 @@ def _line(error: BaseException, path: str) -> int:
         line = trace.tb_lineno if trace.tb_frame.f_code.co_filename == path else line
         trace = trace.tb_next
     return line
+
+
+def _recorder() -> Any:
+    """Return the recorder for ROS's launch, which is attached to it.
+
+    Raises:
+        FailedError: if launch cannot be imported.
+    """
+    warnings.simplefilter("ignore")  # launch's advice is for whoever writes launch files
+    try:
+        recorder = importlib.import_module("tfcompose.importing.launch_recorder")
+        recorder.attach()
+    except Exception as error:  # noqa: BLE001 (a broken installation raises what it likes)
+        raise FailedError(f"{type(error).__name__}: {error}") from None
+    return recorder
 
 
 # What launch files import
@@ -234,7 +257,7 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
     def find_spec(self, fullname: str, _path: Any = None, _target: Any = None) -> Any:
         top = fullname.partition(".")[0]
-        mine = top in _LAUNCH
+        mine = top in self.reader.replaced
         if mine is self.last or (self.last and not _is_from_launch_file()):
             return None
         return importlib.machinery.ModuleSpec(fullname, self, is_package=True)
@@ -249,8 +272,9 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
             vars(module).update(process_file=_Document, process=lambda file, **more: _Document(file, **more).text,
                                 parse=_Document, process_doc=lambda *_a, **_k: None)  # fmt: skip
         elif spec.name.startswith("nav2_common"):
-            vars(module).update(RewrittenYaml=_Rewritten, ReplaceString=_Rewritten, HasNodeParams=_HasNode,
-                                LaunchConfigAsBool=substitutions.LaunchConfigAsBool)  # fmt: skip
+            of = self.reader.recorder.as_substitution if self.reader.recorder else lambda kind: kind
+            vars(module).update(RewrittenYaml=of(_Rewritten), ReplaceString=of(_Rewritten), HasNodeParams=of(_HasNode),
+                                LaunchConfigAsBool=of(substitutions.LaunchConfigAsBool))  # fmt: skip
         elif spec.name.startswith("moveit_configs_utils"):
             find, context = self.reader.share, self.reader.context
             vars(module)["MoveItConfigsBuilder"] = functools.partial(MoveItConfigsBuilder, find, context)
@@ -347,12 +371,15 @@ def _watch(context: Context, null: int) -> None:  # noqa: C901 (one hook after a
 
 def answer(request: dict[str, Any]) -> dict[str, Any]:
     """Return what came of reading a launch file: records, in order, and why and at which line it stopped if it did."""
-    reader = Reader(request)
+    try:
+        reader = Reader(request)
+    except FailedError as error:
+        return {"records": [], "stopped": error.reason, "line": 0, "decided": []}
     context = reader.context
     actions.LOADERS[:] = [reader.load]
     sys.meta_path.insert(0, _Finder(reader, last=False))
     sys.meta_path.append(_Finder(reader, last=True))
-    for name in [name for name in sys.modules if name.partition(".")[0] in _LAUNCH]:
+    for name in [name for name in sys.modules if name.partition(".")[0] in reader.replaced]:
         del sys.modules[name]
     sys.dont_write_bytecode = True
     tempfile.gettempdir()  # finds out now, by writing there, what is asked for later

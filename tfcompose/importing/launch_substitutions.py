@@ -85,7 +85,7 @@ class Context:
     ) -> None:
         self.find, self.every_branch = find, every_branch
         self.configurations: dict[str, str] = {}
-        self.environment: dict[str, str] = {}
+        self.variables: dict[str, str] = {}
         self.namespace: str | None = None
         self.params: list[Any] = []
         self.remaps: list[tuple[str, str]] = []
@@ -122,12 +122,12 @@ class Context:
     def scope(self) -> tuple[Any, ...]:
         """Return what a group restores at its end."""
         return (
-            dict(self.configurations), dict(self.environment), self.namespace, list(self.params), list(self.remaps)
+            dict(self.configurations), dict(self.variables), self.namespace, list(self.params), list(self.remaps)
         )  # fmt: skip
 
     def restore(self, scope: tuple[Any, ...]) -> None:
         """Take back what was changed in a group."""
-        self.configurations, self.environment, self.namespace, self.params, self.remaps = scope
+        self.configurations, self.variables, self.namespace, self.params, self.remaps = scope
 
     def record(self, kind: str, at: Any, **what: Any) -> None:
         """Keep what an action does."""
@@ -172,11 +172,25 @@ class Substitution:
         return f"{type(self).__name__}({', '.join(several)})"
 
 
+def _parts(value: Any) -> Any:
+    return value if isinstance(value, (list, tuple)) else [value]
+
+
 def plain(value: Any) -> str:
     """Return a value that may have substitutions in it, for people."""
     if isinstance(value, (list, tuple)):
         return " ".join(one.describe() if isinstance(one, Substitution) else plain(one) for one in value)
     return str(getattr(value, "NAME", value))
+
+
+def without_marks(text: str) -> tuple[str, list[str]]:
+    """Return a text with the names of files for what stands for their texts, and these names."""
+    return _MARK.sub(lambda found: str(json.loads(found[1])["file"]), text), [one["file"] for one in marks(text)]
+
+
+def shown(text: str) -> str:
+    """Return a text for people: the path of a file or folder from the folder that the import was called in."""
+    return os.path.relpath(text) if os.path.isabs(text) and os.path.exists(text) else text  # noqa: PTH110, PTH117
 
 
 def text_of(value: Any, context: Context) -> str:
@@ -221,6 +235,9 @@ class TextSubstitution(Substitution):
         self.text = text
 
     def perform(self, context: Context) -> str:
+        return str(self.text)
+
+    def describe(self) -> str:
         return str(self.text)
 
 
@@ -270,7 +287,7 @@ class EnvironmentVariable(Substitution):
 
     def perform(self, context: Context) -> str:
         name = text_of(self.name, context)
-        value = context.environment.get(name, os.environ.get(name))
+        value = context.variables.get(name, os.environ.get(name))
         if value is None and self.default_value is not None:
             value = text_of(self.default_value, context)
         if value is None:
@@ -288,6 +305,9 @@ class FindPackageShare(Substitution):
         return context.find(name, context.file) or f"{PACKAGE}{name}"
 
     find = perform
+
+    def describe(self) -> str:
+        return plain([self.package])
 
 
 class FindPackagePrefix(FindPackageShare):
@@ -314,6 +334,9 @@ class FindExecutable(Substitution):
 
 
 class PathJoinSubstitution(Substitution):
+    def describe(self) -> str:
+        return "/".join("".join(plain([part]) for part in _parts(one)) for one in self.args[0])
+
     def perform(self, context: Context) -> str:
         return os.path.join(*(text_of(one, context) for one in self.args[0]))  # noqa: PTH118 (as launch does)
 
@@ -346,6 +369,9 @@ class PythonExpression(Substitution):
     def __init__(self, expression: Any, python_modules: Any = ("math",)) -> None:
         super().__init__(expression)
         self.expression, self.modules = expression, python_modules
+
+    def describe(self) -> str:
+        return " ".join(plain([self.expression]).split())
 
     def perform(self, context: Context) -> str:
         text = text_of(self.expression, context)
@@ -416,6 +442,11 @@ class IfElseSubstitution(Substitution):
 
 
 class EqualsSubstitution(Substitution):
+    WORD = "=="
+
+    def describe(self) -> str:
+        return f" {self.WORD} ".join(plain([one]) or "''" for one in self.args)
+
     def perform(self, context: Context) -> str:
         left, right = (text_of(one, context) for one in self.args)
         return str(left == right or _same_number(left, right)).lower()
@@ -431,21 +462,32 @@ def _same_number(left: str, right: str) -> bool:
 
 
 class NotEqualsSubstitution(EqualsSubstitution):
+    WORD = "!="
+
     def perform(self, context: Context) -> str:
         return "false" if super().perform(context) == "true" else "true"
 
 
 class NotSubstitution(Substitution):
+    def describe(self) -> str:
+        return f"not {plain(self.args)}"
+
     def perform(self, context: Context) -> str:
         return str(not truth(self.args[0], context)).lower()
 
 
 class AndSubstitution(Substitution):
+    def describe(self) -> str:
+        return " and ".join(plain([one]) for one in self.args)
+
     def perform(self, context: Context) -> str:
         return str(all(truth(one, context) for one in self.args)).lower()
 
 
 class OrSubstitution(Substitution):
+    def describe(self) -> str:
+        return " or ".join(plain([one]) for one in self.args)
+
     def perform(self, context: Context) -> str:
         return str(any(truth(one, context) for one in self.args)).lower()
 
@@ -473,6 +515,10 @@ class ParameterValue:
         """Return the value with its type."""
         if isinstance(self.value, (int, float)) and self.value_type in (None, type(self.value)):
             return self.value
+        if isinstance(self.value, list) and not any(isinstance(one, Substitution) for one in self.value):
+            kind = (*getattr(self.value_type, "__args__", ()), None)[0]  # the values of a list, one by one
+            return [ParameterValue(one, value_type=str if isinstance(one, str) else kind).perform(context)
+                    for one in self.value]  # fmt: skip
         if self.value_type is None:
             return _typed_or_symbolic(self.value, context)
         if (symbolic := self._symbolic(context)) is not None:

@@ -15,7 +15,7 @@ from tfcompose.findings import RejectedError
 from tfcompose.importing import launch_actions as actions
 from tfcompose.importing import launch_conditions as conditions
 from tfcompose.importing import launch_substitutions as substitutions
-from tfcompose.importing.launch_substitutions import Context, FailedError, text_of
+from tfcompose.importing.launch_substitutions import BEGIN, END, Context, FailedError, text_of
 from tfcompose.load import load
 from tfcompose.urdf.read import read_xml
 
@@ -212,22 +212,26 @@ def _several(words: list[Any]) -> list[Any]:
 
 
 def command_line(text: Any) -> list[Any]:
-    """Return a command line's words: it is split where it has spaces, and not where a substitution's value has."""
+    """Return a command line's words: it is split where it has spaces, and not where a substitution's value has.
+
+    Quotes around a substitution, as ROS 1 has them, are taken off.
+    """
     parts = substituted(text)
+    parts = parts if isinstance(parts, list) else [parts]
+    try:
+        split = [shlex.split(part) if isinstance(part, str) else None for part in parts]
+    except ValueError:
+        return _quoted_words(parts)
     words: list[list[Any]] = []
     is_open = False
-    for part in parts if isinstance(parts, list) else [parts]:
-        if not isinstance(part, str):
+    for part, tokens in zip(parts, split, strict=True):
+        if tokens is None:
             if is_open:
                 words[-1].append(part)
             else:
                 words.append([part])
             is_open = True
             continue
-        try:
-            tokens = shlex.split(part)
-        except ValueError:
-            tokens = part.split()
         for index, token in enumerate(tokens):
             if index == 0 and is_open and not part[0].isspace():
                 words[-1].append(token)
@@ -235,6 +239,22 @@ def command_line(text: Any) -> list[Any]:
                 words.append([token])
         is_open = bool(tokens) and not part[-1].isspace()
     return words
+
+
+def _quoted_words(parts: list[Any]) -> list[Any]:
+    """Return the words of a command line in which quotes go around substitutions."""
+    text = "".join(part if isinstance(part, str) else f"{BEGIN}{index}{END}" for index, part in enumerate(parts))
+    try:
+        tokens = shlex.split(text)
+    except ValueError:
+        tokens = text.split()
+    return [
+        [
+            parts[int(piece)] if index % 2 else piece
+            for index, piece in enumerate(re.split(f"{BEGIN}(\\d+){END}", token))
+        ]
+        for token in tokens
+    ]
 
 
 # Actions
@@ -338,8 +358,8 @@ def _parameter(one: Entity) -> tuple[Any, Any]:
     inner = one.all("param")
     if inner:
         return name, dict(_parameter(child) for child in inner)
-    if one.get("command") is not None:  # of ROS 1
-        return name, substitutions.Command(substituted(one.get("command")))
+    if (made := _made_by_ros1(one)) is not None:
+        return name, made
     value, kind = one.get("value"), one.get("type")
     separator = one.get("value-sep")
     if isinstance(value, str) and separator:
@@ -347,6 +367,18 @@ def _parameter(one: Entity) -> tuple[Any, Any]:
     if isinstance(value, list):
         return name, [substitutions.ParameterValue(substituted(part)) for part in value]
     return name, substitutions.ParameterValue(substituted(value), value_type=str if kind in {"str", "string"} else None)
+
+
+def _made_by_ros1(one: Entity) -> Any:
+    """Return what a parameter of ROS 1 is the output of, or the text of; None where it has a value."""
+    if one.get("command") is not None:
+        return substitutions.Command(substituted(one.get("command")))
+    return None if one.get("textfile") is None else substitutions.FileContent(substituted(one.get("textfile")))
+
+
+def _global_parameter(one: Entity, _context: Context) -> list[Any]:
+    made = _made_by_ros1(one)
+    return [actions.SetParameter(_need(one, "name"), made or substitutions.ParameterValue(_need(one, "value")))]
 
 
 def _common(entity: Entity) -> dict[str, Any]:
@@ -482,9 +514,7 @@ _MAKERS: dict[str, Callable[[Entity, Context], list[Any]]] = {
     "set_parameter": lambda one, _: [
         actions.SetParameter(_need(one, "name"), substitutions.ParameterValue(_need(one, "value")))
     ],
-    "param": lambda one, _: [
-        actions.SetParameter(_need(one, "name"), substitutions.ParameterValue(_need(one, "value")))
-    ],
+    "param": _global_parameter,
     "set_parameters_from_file": lambda one, _: [actions.SetParametersFromFile(_need(one, "filename"))],
     "set_remap": lambda one, _: [actions.SetRemap(_need(one, "from"), _need(one, "to"))],
     "remap": lambda one, _: [actions.SetRemap(_need(one, "from"), _need(one, "to"))],

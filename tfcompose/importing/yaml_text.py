@@ -62,7 +62,7 @@ def entry(key: str, value: Any, depth: int = 0) -> list[str]:
 
 def _splits(value: Any) -> bool:
     """Whether the value can be split into lines: a list of numbers and ``{}`` cannot."""
-    return bool(value) if isinstance(value, dict) else any(isinstance(item, dict) for item in value)
+    return bool(value) if isinstance(value, dict) else any(isinstance(item, (dict, str)) for item in value)
 
 
 def _item(value: Any, depth: int) -> list[str]:

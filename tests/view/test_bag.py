@@ -114,6 +114,9 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         for at_s in (8.0, 3.0):
             shown.slider.value = at_s
             assert panel.scene.body_pose("base_link").xyz[0] == pytest.approx(at_s)
+        shown.fixed.value = "mast"
+        later = Panel(server, session, edit=False, joints=False, choices=panel.choices)
+        assert BagPanel(server, later, tree, recorded.length_s).fixed.value == "mast", "it outlives a reload"
     finally:
         stop(server)
 

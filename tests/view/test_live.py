@@ -157,6 +157,21 @@ def test_a_stolen_edge_is_red_until_the_thief_has_left() -> None:
     assert not picture.wrong
 
 
+def test_a_frame_stays_a_ghost_where_a_thief_that_has_left_put_it_until_its_owner_sends_again() -> None:
+    live = Live()
+    live.run()
+    live.send(ROGUE, 4.1, ("base_link", "mast", Pose((2, 0, 0))))
+    live.observe(4.3, live.publishers - {ROGUE})
+    judgement = live.tree.judge(4.3)
+    assert (judgement.found, set(judgement.off)) == ((), {"mast"})
+    assert "mast" in judgement.summary
+    picture = live.tree.moved()
+    assert picture
+    assert (picture.poses["mast"].xyz, picture.ghosts["mast"].xyz) == ((3, 0, 0), (1, 0, 0.5))
+    live.send(STATIC, 4.4, ("base_link", "mast", Pose((0, 0, 0.5))), static=True)
+    assert not live.tree.judge(4.4).off
+
+
 def test_a_silent_edge_is_red() -> None:
     live = Live()
     live.run()

@@ -49,14 +49,39 @@ def replace(path: Path, text: str) -> None:
 
 
 def test_a_changed_file_is_shown_and_what_the_user_chose_stays(shown: ReloadedPanel, tmp_path: Path) -> None:
-    shown.panel.frames.value = "tool"
+    shown.panel.tree.select("tool")
     shown.panel.set_joint("j", 0.5)
     replace(tmp_path / "r.yaml", TEXT.replace("[1, 0, 0]}}", "[1, 0, 0]}, hook: {parent: tool, xyz: [0, 0, 1]}}"))
     assert shown.reload()
     assert "hook" in shown.panel.poses()
-    assert shown.panel.frames.value == "tool"
+    assert shown.panel.selected == "tool"
     assert shown.panel.positions == {"j": 0.5}
     assert not shown.reload()
+
+
+def test_what_was_hidden_opened_and_chosen_outlives_reloads_where_it_still_exists(
+    shown: ReloadedPanel, tmp_path: Path
+) -> None:
+    for owner in ("joints", "nobody"):
+        shown.panel.choices.owners[owner] = False
+    shown.panel.choices.is_open["arm"] = False
+    shown.panel.choices.base = "mast"
+    shown.panel.tree.show("arm", shown=False)
+    shown.panel.tree.select("mast")
+    shown.panel.tree.search("a")
+    replace(tmp_path / "r.yaml", TEXT.replace("tool:", "hook: {parent: arm, xyz: [0, 1, 0]}, tool:"))
+    assert shown.reload()
+    assert shown.panel.tree.hidden == {"arm", "tool", "hook"}
+    assert shown.panel.selected == "mast"
+    assert shown.panel.choices.base == "mast"
+    assert shown.panel.choices.search == "a"
+    assert not shown.panel.tree.tree.is_open("arm", shown.panel.choices.is_open)
+    assert not shown.panel.scene.is_owner_shown("joints")
+    assert shown.panel.scene.is_owner_shown("static")
+    (tmp_path / "more.yaml").write_text("{}\n", "utf-8")
+    assert shown.reload()
+    assert shown.panel.selected == "base_link"
+    assert shown.panel.tree.hidden == {"arm", "tool", "hook"}
 
 
 def test_an_included_file_is_one_of_the_robots(shown: ReloadedPanel, tmp_path: Path) -> None:
@@ -116,7 +141,7 @@ def test_a_preset_of_the_robot_that_is_changed_is_read_again(shown: ReloadedPane
 
 
 def test_a_save_is_no_change_on_disk(shown: ReloadedPanel) -> None:
-    shown.panel.frames.value = "tool"
+    shown.panel.tree.select("tool")
     shown.panel.move(Pose((3, 0, 0)))
     shown.panel.save()
     assert "saved" in shown.panel.report.content

@@ -1,6 +1,7 @@
 """The view: joints and mounts move, saving changes one line, one HTML file holds the scene, and the server ends."""
 
 import http
+import json
 import math
 import signal
 import socket
@@ -19,6 +20,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
 from tests.support import processes
+from tests.support.browser import page_of
 from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
 from tfcompose.cli.commands import view
@@ -78,7 +80,7 @@ def test_a_moved_mount_is_saved_as_one_line_and_its_comment_stays(rover: Path, s
     before = rover.read_text("utf-8").splitlines()
     session = session_of(rover)
     panel = Panel(server, session, edit=True)
-    panel.frames.value = "front_link"
+    panel.tree.select("front_link")
     mount = session.mount("front_link")
     given = mount.given(mount.edge.pose)
     panel.move(Pose((0.5, *given.xyz[1:]), given.quat_xyzw))
@@ -110,6 +112,41 @@ def test_undo_and_redo_lead_back_and_forth(rover: Path) -> None:
     assert session.redo()
     assert session.mount("front_link").edge.pose == Pose((2, 0, 0))
     assert not session.redo()
+
+
+def test_the_gizmo_is_where_a_typed_pose_puts_the_mount(rover: Path, server: viser.ViserServer) -> None:
+    panel = Panel(server, session_of(rover), edit=True)
+    panel.tree.select("front_link")
+    given = panel.session.mount("front_link").given(panel.session.mount("front_link").edge.pose)
+    panel.move(Pose((0.5, 0.1, 0.7), given.quat_xyzw))
+    assert panel.gizmo.position == pytest.approx(panel.poses()["front_link"].xyz)
+    assert panel.poses()["front_link"].xyz == pytest.approx((0.5, 0.1, 0.7))
+
+
+def test_undo_and_redo_lead_over_a_save(rover: Path) -> None:
+    session, text = session_of(rover), rover.read_text("utf-8")
+    child, other = (session.mount(frame).edge.child for frame in ("front_link", "rear_link"))
+    first, second = (session.mount(frame).edge.pose for frame in (child, other))
+    session.move(child, Pose((1, 0, 0)))
+    session.move(other, Pose((2, 0, 0)))
+    assert session.save().diff
+    session.move(other, Pose((3, 0, 0)))
+    for pose, at in ((Pose((1, 0, 0)), Pose((2, 0, 0))), (Pose((1, 0, 0)), second), (first, second)):
+        assert session.undo()
+        assert close(session.mount(child).edge.pose, pose)
+        assert close(session.mount(other).edge.pose, at)
+    assert not session.undo()
+    assert session.save().diff
+    assert rover.read_text("utf-8").replace("0.3]", "0.30]") == text
+    for _ in range(3):
+        assert session.redo()
+    assert close(session.mount(child).edge.pose, Pose((1, 0, 0)))
+    assert close(session.mount(other).edge.pose, Pose((3, 0, 0)))
+
+
+def close(one: Pose, other: Pose) -> bool:
+    """Return whether two poses are the same to a micrometre and a microradian."""
+    return max(offset_of(one, other)) < 1e-6
 
 
 def test_what_a_variable_gives_is_not_saved_and_an_overlay_is_offered(rover: Path) -> None:
@@ -177,6 +214,23 @@ def test_html_is_one_small_file(rover: Path) -> None:
     page = (rover.parent / "rover.html").read_text("utf-8")
     assert "__VISER_EMBED_DATA__" in page
     assert len(page) < 3_000_000
+    assert "<title>field_rover</title>" in page
+    assert "odom is a root (field_rover.yaml:34:3)" in page
+    assert "100, 0, 797.5 mm" in page
+
+
+def test_names_in_a_page_are_text_and_its_frames_open_in_a_browser(tmp_path: Path) -> None:
+    name = "<b onclick='x()'>&\""
+    text = f"tfcompose: 1\nrobot: r\nframes: {{base: {{}}, {json.dumps(name)}: {{parent: base, xyz: [0.25, 0, 0]}}}}\n"
+    (tmp_path / "r.yaml").write_text(text, "utf-8")
+    assert tfcompose_in(tmp_path, "view", "r.yaml", "--html", "r.html").returncode == 0
+    with page_of((tmp_path / "r.html").as_uri()) as page:
+        requests: list[str] = []
+        page.on("request", lambda request: requests.append(request.url))
+        page.get_by_text(name, exact=True).click()
+        page.get_by_text("250, 0, 0 mm").wait_for()
+        page.locator("canvas").first.wait_for()
+        assert not [url for url in requests if url.startswith("http")]
 
 
 @pytest.mark.parametrize("words", [("--html", "none/r.html"), ("--html", "."), ("--html", "./field_rover.yaml")])
@@ -212,7 +266,7 @@ def test_a_wrong_robot_is_shown_and_its_mounts_move(name: str, tmp_path: Path, s
     session = session_of(file)
     assert session.state.errors
     panel = Panel(server, session, edit=True)
-    panel.frames.value = "arm"
+    panel.tree.select("arm")
     panel.move(Pose((3, 0, 0), quat_from_rpy(0, 0.5, 0)))
     panel.save()
     assert panel.report.content
@@ -398,8 +452,8 @@ def test_a_running_tree_takes_neither_edit_nor_html(rover: Path, option: tuple[s
 
 def test_without_ros_nothing_is_served_live(rover: Path) -> None:
     done = tfcompose_in(rover.parent, "view", rover.name, "--live", "--port", "0", RMW_IMPLEMENTATION="rmw_of_nobody")
-    assert (done.returncode, done.stdout) == (1, "")
-    assert "[TF909]" in done.stderr
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "[TF901]" in done.stderr
 
 
 @for_each([(["--at", "3"],), (["--at", "0"],), (["--html", "r.html", "--edit"],), (["--tolerance", "2mm"],)])

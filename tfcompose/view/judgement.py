@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.geometry import offset_of
 from tfcompose.plan.topics import parts_of
+from tfcompose.text import listed
 from tfcompose.verdict.publishers import flooded
 from tfcompose.verdict.tree import rejected_transforms
 from tfcompose.verdict.verify import differences, group_finding, grouped
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from tfcompose.findings import Finding, Span
     from tfcompose.geometry import Offset
+    from tfcompose.live.edges import EdgeState
     from tfcompose.live.state import TreeState
     from tfcompose.model import Robot
     from tfcompose.plan import Plan
@@ -39,6 +41,11 @@ class Judgement:
             frame for frame, found in self.of_frame.items() if any(one.severity == "error" for one in found)
         )
 
+    @property
+    def summary(self) -> str:
+        """What there is to say where nothing is found."""
+        return f"elsewhere than declared: {listed(sorted(self.off))}" if self.off else "all edges as expected"
+
     def about(self, frame: str) -> list[str]:
         """Return a line for each thing that is wrong with the edge above a frame."""
         off = [f"off by {self.off[frame].text}"] if frame in self.off else []
@@ -55,14 +62,23 @@ class Judge:
         self._names = {robot.final(frame): frame for frame in robot.frames}
         self._places: dict[str, Span] = {robot.final(edge.child): edge.at for edge in robot.edges}
 
-    def judge(self, states: Mapping[Topics, TreeState], counts: Callable[[Difference], bool]) -> Judgement:
-        """Return what is wrong with the states on the plan's topics, of the differences that count."""
+    def judge(
+        self,
+        states: Mapping[Topics, TreeState],
+        counts: Callable[[Difference], bool],
+        holds: Callable[[EdgeState], bool] = lambda _: False,
+    ) -> Judgement:
+        """Return what is wrong with the states on the plan's topics, of the differences that count.
+
+        Frames are also off where those are that do not count, if what was sent ``holds``: nothing came after it.
+        """
         found: list[Finding] = []
         of_frame: dict[str, list[Finding]] = {}
         off: dict[str, Offset] = {}
         for topics, part in self._parts.items():
             state = states[topics]
-            kept = [one for one in differences(state, part, self._tolerance) if counts(one)]
+            different = differences(state, part, self._tolerance)
+            kept = [one for one in different if counts(one)]
             about = [
                 ([edge.child], rejected)
                 for edge in state.edges
@@ -75,7 +91,8 @@ class Judge:
                 found.append(finding)
                 for child in dict.fromkeys(children):
                     of_frame.setdefault(self._names.get(child, child), []).append(finding)
-            off |= {self._names.get(child, child): far for one in kept for child, far in _off(one)}
+            left = [one for one in different if one.live is not None and holds(one.live)]
+            off |= {self._names.get(child, child): far for one in (*kept, *left) for child, far in _off(one)}
         return Judgement(tuple(found), {frame: tuple(some) for frame, some in of_frame.items()}, off)
 
     def _finding(self, group: Sequence[Difference], state: TreeState) -> Finding:

@@ -49,7 +49,10 @@ class LiveTree(ShownTree):
         self._states: dict[str, list[EdgeState]] = {}
 
     def _newest(self) -> dict[str, Row]:
-        """Return what came last of each frame, as tf2 has it: without what it does not take."""
+        return {child: stream.row for child, stream in self._streams().items()}
+
+    def _streams(self) -> dict[str, EdgeStream]:
+        """Return the stream from which came what is newest of each frame, as tf2 has it: without what it refuses."""
         newest: dict[str, EdgeStream] = {}
         for observer in self._observers.values():
             for stream in observer.streams:
@@ -58,7 +61,7 @@ class LiveTree(ShownTree):
                 other = newest.get(stream.child)
                 if other is None or stream.arrivals.last_ns >= other.arrivals.last_ns:
                     newest[stream.child] = stream
-        return {self._pictures.name(child): stream.row for child, stream in newest.items()}
+        return {self._pictures.name(child): stream for child, stream in newest.items()}
 
     def judge(self, listened_s: float) -> Judgement:
         """Judge what came, after so many seconds of listening, and return what is wrong."""
@@ -67,7 +70,12 @@ class LiveTree(ShownTree):
         for state in states.values():
             for edge in state.edges:
                 self._states.setdefault(self._pictures.name(edge.child), []).append(edge)
-        self.judgement = self._judge.judge(states, lambda one: _counts(one, listened_s))
+        streams = self._streams()
+        self.judgement = self._judge.judge(
+            states,
+            lambda one: _counts(one, listened_s),
+            lambda edge: streams.get(self._pictures.name(edge.child)) is edge.stream,
+        )
         return self.judgement
 
     def about(self, frame: str) -> list[str]:

@@ -37,18 +37,19 @@ class LivePanel:
         self._ghosts = Ghosts(server.scene, tree.robot)
         self._wrong = _Lines(server.scene, "/live/wrong", _RED)
         self._further: dict[str, Any] = {}
-        tree.fixed = tree.robot.base or tree.robot.roots()[0]  # what drives off stays in the picture
+        fixed = panel.choices.fixed or tree.robot.base  # what drives off stays in the picture
+        tree.fixed = fixed if fixed in tree.robot.frames else tree.robot.roots()[0]
         with server.gui.add_folder(title, order=-1):
             self.fixed: Any = server.gui.add_dropdown("fixed frame", tuple(tree.robot.frames), initial_value=tree.fixed)
             self._edge = server.gui.add_html("")
             self._found = server.gui.add_html("")
             self._joints = server.gui.add_html("")
             self._processes = server.gui.add_html("")
-        panel.frames.on_update(lambda _: self.show_text())
+        panel.tree.on_select(self.show_text)
         self.fixed.on_update(lambda _: self._fix())
 
     def _fix(self) -> None:
-        self.tree.fixed = self.fixed.value
+        self.tree.fixed = self._panel.choices.fixed = self.fixed.value
 
     def show(self) -> None:
         """Put the scene where the tree is now; nothing is sent for what stays."""
@@ -63,9 +64,10 @@ class LivePanel:
 
     def show_text(self) -> None:
         """Say what is wrong, and what is known of the selected frame."""
-        frame = self._panel.frames.value
+        frame = self._panel.selected
+        self._panel.tree.mark(self.tree.judgement.wrong)
         _set(self._edge, paragraphs([f"<b>{escape(frame)}</b>", *map(escape, self.tree.about(frame))]))
-        _set(self._found, findings_html(self.tree.judgement.found, "all edges as expected"))
+        _set(self._found, findings_html(self.tree.judgement.found, self.tree.judgement.summary))
 
     def show_joints(self, lines: Sequence[str]) -> None:
         """Say whether sliders publish joint states, or who does instead."""
@@ -98,7 +100,8 @@ class BagPanel:
                 "time (s)", 0.0, max(length_s, _STEP_S), _STEP_S, min(tree.at_s, length_s)
             )
         self._panel = LivePanel(server, panel, tree, "Tree")
-        for control in (self.slider, self._panel.fixed):
+        self.fixed = self._panel.fixed
+        for control in (self.slider, self.fixed):
             control.on_update(lambda _: self.show())
         self.show()
 

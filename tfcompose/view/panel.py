@@ -6,14 +6,18 @@ import math
 import threading
 import time
 from functools import partial
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.numbers import clean_rpy
-from tfcompose.provenance import values_of
+from tfcompose.view.choices import Choices
 from tfcompose.view.edit import ImmovableError
+from tfcompose.view.facts import facts_of, numbers
+from tfcompose.view.findings import paragraphs, saved_html
 from tfcompose.view.kinematics import poses_in_roots
 from tfcompose.view.scene import RobotScene, wxyz
+from tfcompose.view.tree_panel import TreePanel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,15 +39,10 @@ _SWATCH = (
     '<div style="position: relative; height: 0"><div style="position: absolute; right: 1em; top: 0.15em; width: 4em; '
     'height: 0.8em; border-radius: 0.2em; background: {}"></div></div>'
 )
+#: How wide the panel is, in the picture's pixels.
+_WIDTH_PX = 350
 #: How long a sweep of the joints takes, and the time between two of its steps, in seconds.
 _SWEEP_S, _SWEEP_STEP_S = 6.0, 0.05
-
-
-def numbers(pose: Pose) -> str:
-    """Return a pose as people read it, in mm and degrees."""
-    x, y, z = (f"{value * 1000:.4g}" for value in pose.xyz)
-    roll, pitch, yaw = (f"{math.degrees(angle):.4g}" for angle in clean_rpy(pose.quat_xyzw))
-    return f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg"
 
 
 def _snapped(pose: Pose, before: Pose) -> Pose:
@@ -67,7 +66,7 @@ def _phase(slider: Any) -> float:
 class Panel:
     """Shows a session on a server; with ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
 
-    ``positions`` are where joints begin, in rad or m.
+    ``choices`` are what somebody chose to see, which the panel changes.
     ``published`` are the poses of frames in their roots where something else than the session says where they are.
     """
 
@@ -78,15 +77,17 @@ class Panel:
         *,
         edit: bool,
         joints: bool = True,
-        positions: Mapping[str, float] | None = None,
+        choices: Choices | None = None,
     ) -> None:
         self.session = session
+        self.choices = choices or Choices()
         self._gui = server.gui
         self._server = server
-        self.positions: dict[str, float] = dict(positions or {})
+        self.positions = self.choices.positions
         self.published: Mapping[str, Pose] | None = None
         self.scene = RobotScene(server.scene, session.robot)
-        self._gizmo: Any = None
+        #: What the selected mount is dragged by, None where it cannot be moved.
+        self.gizmo: Any = None
         self._numbers: list[Any] = []
         self._showing = False
         self._blocked: Any = None
@@ -94,21 +95,21 @@ class Panel:
         self.is_sweeping = False
         #: Whether another panel has taken its place.
         self.is_gone = False
-        server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(_WIDTH_PX)
+        self.tree = TreePanel(server.gui, session.robot, self.scene.colours, self.choices)
+        bases = (_PARENT, *session.robot.frames)
+        base = self.choices.base if self.choices.base in bases else _PARENT
         with server.gui.add_folder("Frame"):
-            self._search: Any = server.gui.add_text("search", "")
-            self.frames: Any = server.gui.add_dropdown("frame", tuple(session.robot.frames))
-            self._base: Any = server.gui.add_dropdown("in", (_PARENT, *session.robot.frames))
-            self._about = server.gui.add_markdown("")
-            self._hide: Any = server.gui.add_checkbox("hide it and what is below", initial_value=False)
-            self._names = server.gui.add_checkbox("names of all frames", initial_value=False)
-        self._hidden: set[str] = set()
-        self._search.on_update(self._filter)
-        self.frames.on_update(lambda _: self._select())
-        self._base.on_update(lambda _: self._select())
-        self._hide.on_update(lambda _: self._hide_below())
-        self._names.on_update(lambda _: self.scene.label(self.poses(), visible=self._names.value))
-        self.scene.clicked = self.select
+            self._base: Any = server.gui.add_dropdown("in", bases, initial_value=base)
+            self._about = server.gui.add_html("")
+            self._names: Any = server.gui.add_checkbox("names of all frames", initial_value=self.choices.has_names)
+        self.tree.on_select(self._show_selected)
+        self.tree.on_show(lambda: self.scene.hide(self.tree.hidden))
+        self._base.on_update(lambda _: self._choose_base())
+        self._names.on_update(lambda _: self._show_names())
+        self.scene.clicked = self.tree.select
         if edit:
             self._add_editor()
         self._add_owners()
@@ -116,10 +117,20 @@ class Panel:
             self._add_sensors()
         if joints:
             self._add_joints(session.robot)
-        self.refresh()
+        self._begin()
         self.scene.frame_camera(server, poses_in_roots(session.robot, self.positions))
-        self._select()
         threading.Thread(target=self.scene.add_meshes, name="meshes", daemon=True).start()
+
+    def _begin(self) -> None:
+        """Show what was chosen."""
+        self.refresh()
+        self.tree.mark_moved(frozenset(self.session.moved))
+        self.scene.hide(self.tree.hidden)
+        for owner in self.scene.colours:
+            self.scene.show_owner(owner, visible=self.choices.owners.get(owner, True))
+        self._show_names()
+        self._show_selected()
+        self._show_blocked()
 
     def end(self) -> None:
         """Move nothing any more: another panel takes this one's place, or none."""
@@ -135,72 +146,78 @@ class Panel:
         """Return where each frame is shown, in the root of its tree."""
         return self.published or poses_in_roots(self.session.robot, self.positions)
 
-    def _filter(self, _event: Any) -> None:
-        names = [name for name in self.session.robot.frames if self._search.value.lower() in name.lower()]
-        if names:
-            self.frames.options = tuple(names)
+    @property
+    def selected(self) -> str:
+        """The selected frame."""
+        return self.choices.selected
 
-    def select(self, frame: str) -> None:
-        """Select a frame."""
-        self._search.value = ""
-        self.frames.options = tuple(self.session.robot.frames)
-        self.frames.value = frame
+    def _choose_base(self) -> None:
+        self.choices.base = "" if self._base.value == _PARENT else self._base.value
+        self._show_selected()
 
-    def _select(self) -> None:
-        robot, frame = self.session.robot, self.frames.value
-        self._hide.value = frame in self._hidden
-        edge = robot.parent_edge(frame)
-        lines = [f"**{frame}** is a root ({robot.frames[frame]})"]
-        if edge is not None:
-            lines = [f"**{frame}** in **{edge.parent}**, {edge.kind}, by **{edge.owner}**", numbers(edge.pose)]
-            values = values_of(edge, self.session.state.sources)
-            lines += [f"- {value}" for value in values] or [str(edge.at)]
-        base, poses = self._base.value, self.poses()
-        if base != _PARENT and {base, frame} <= poses.keys():
-            lines += [f"in **{base}**, as shown:", numbers(poses[base].inverse() @ poses[frame])]
-        self._about.content = "\n\n".join(lines)
+    def _show_names(self) -> None:
+        self.choices.has_names = self._names.value
+        self.scene.name_all(visible=self.choices.has_names)
+
+    def _show_selected(self) -> None:
+        robot, frame = self.session.robot, self.selected
+        self.scene.select(frame)
+        first, *further = facts_of(robot, self.session.state.sources, frame)
+        lines = [f"<b>{escape(first)}</b>", *map(escape, further)]
+        base, poses = self.choices.base, self.poses()
+        if {base, frame} <= poses.keys():
+            relative = numbers(poses[base].inverse() @ poses[frame])
+            lines += [f"in <b>{escape(base)}</b>, as shown:", relative]
+        self._about.content = paragraphs(lines)
         if self._numbers:
             self._show_mount()
-
-    def _hide_below(self) -> None:
-        """Hide the selected frame and all below it, or show them again."""
-        robot, frame = self.session.robot, self.frames.value
-        below = robot.below(frame)
-        self._hidden = self._hidden | below if self._hide.value else self._hidden - below
-        self.scene.hide(robot, self._hidden)
-        self.refresh()
 
     def _add_owners(self) -> None:
         with self._gui.add_folder("Owners"):
             for owner, (red, green, blue) in self.scene.colours.items():
                 self._gui.add_html(_SWATCH.format(f"rgb({red}, {green}, {blue})"))
-                box = self._gui.add_checkbox(owner, initial_value=True)
+                box = self._gui.add_checkbox(owner, initial_value=self.choices.owners.get(owner, True))
                 box.on_update(partial(self._show_owner, owner, box))
 
     def _show_owner(self, owner: str, box: Any, _event: Any) -> None:
+        self.choices.owners[owner] = box.value
         self.scene.show_owner(owner, visible=box.value)
 
     def _add_sensors(self) -> None:
         """Let the fields of view be shown, and the rays in them that the robot blocks."""
         fields = self.scene.fields
+        for sensor, is_shown in self.choices.sensors.items():
+            fields.show(sensor, visible=is_shown)
+        if self.choices.reach is not None:
+            fields.draw(self.choices.reach)
         with self._gui.add_folder("Fields of view"):
             for sensor in fields.sensors:
                 box = self._gui.add_checkbox(sensor, initial_value=fields.shown[sensor])
                 box.on_update(partial(self._show_field, sensor, box))
             reach = self._gui.add_number("drawn to (m)", fields.reach, min=0.01, max=300.0, step=0.01)
-            reach.on_update(lambda _: fields.draw(reach.value))
-            self._blocked = self._gui.add_checkbox("blocked rays", initial_value=False)
-            self._blocked.on_update(lambda _: self._show_blocked())
-            self.blocked = self._gui.add_markdown("")
+            reach.on_update(lambda _: self._draw_fields(reach.value))
+            self._blocked = self._gui.add_checkbox("blocked rays", initial_value=self.choices.has_blocked)
+            self._blocked.on_update(lambda _: self._choose_blocked())
+            self.blocked = self._gui.add_html("")
+
+    def _draw_fields(self, reach: float) -> None:
+        self.choices.reach = reach
+        self.scene.fields.draw(reach)
+
+    def _choose_blocked(self) -> None:
+        self.choices.has_blocked = self._blocked.value
+        self._show_blocked()
 
     def _show_field(self, sensor: str, box: Any, _event: Any) -> None:
+        self.choices.sensors[sensor] = box.value
         self.scene.fields.show(sensor, visible=box.value)
         self._show_blocked()
 
     def _show_blocked(self) -> None:
         """Draw the rays that are blocked, and say how many, if that is wanted."""
-        lines = self.scene.fields.show_blocked(self.session.robot if self._blocked.value else None)
-        self.blocked.content = "\n".join(f"- {line}" for line in lines)
+        if self._blocked is not None:
+            lines = self.scene.fields.show_blocked(self.session.robot if self._blocked.value else None)
+            self.blocked.content = paragraphs([escape(line) for line in lines])
 
     def _add_joints(self, robot: Robot) -> None:
         joints = [edge.joint for edge in robot.edges if edge.joint and edge.joint.mimic is None]
@@ -265,43 +282,49 @@ class Panel:
     def _add_editor(self) -> None:
         labels = ("x (mm)", "y (mm)", "z (mm)", "roll (deg)", "pitch (deg)", "yaw (deg)")
         with self._gui.add_folder("Mount"):
-            self._given = self._gui.add_markdown("")
+            self._given = self._gui.add_html("")
             self._numbers = [self._gui.add_number(label, 0.0, step=0.001) for label in labels]
-            self._snap = self._gui.add_checkbox("snap to mm and degrees", initial_value=True)
+            self._snap: Any = self._gui.add_checkbox("snap to mm and degrees", initial_value=self.choices.snaps)
+            self._snap.on_update(lambda _: self._choose_snap())
             self._gui.add_button("undo").on_click(lambda _: self._again(self.session.undo()))
             self._gui.add_button("redo").on_click(lambda _: self._again(self.session.redo()))
             self._gui.add_button("save").on_click(lambda _: self.save())
-            self.report = self._gui.add_markdown("")
+            self.report = self._gui.add_html("")
         for handle in self._numbers:
             handle.on_update(lambda _: self._typed())
+
+    def _choose_snap(self) -> None:
+        self.choices.snaps = self._snap.value
 
     def _again(self, has_moved: bool) -> None:  # noqa: FBT001 (what undo and redo return)
         if has_moved:
             self._show_moved()
-            self._select()
+            self._show_selected()
 
     def _show_moved(self) -> None:
+        self.tree.mark_moved(frozenset(self.session.moved))
         self.refresh()
-        if self._blocked is not None and self._blocked.value:
-            self._show_blocked()
+        self._show_blocked()
 
     def _show_mount(self) -> None:
         """Show the numbers that the file has for the selected frame, and a gizmo where they put it."""
-        if self._gizmo is not None:
-            self._gizmo.remove()
-            self._gizmo = None
+        if self.gizmo is not None:
+            self.gizmo.remove()
+            self.gizmo = None
         try:
-            mount = self.session.mount(self.frames.value)
+            mount = self.session.mount(self.selected)
         except ImmovableError as error:
-            self._given.content = str(error)
+            self._given.content = paragraphs([escape(str(error))])
             return
         given = mount.given(mount.edge.pose)
-        self._given.content = f"pose of **{mount.place}** in **{mount.relative_to}**"
+        self._given.content = paragraphs(
+            [f"pose of <b>{escape(mount.place)}</b> in <b>{escape(mount.relative_to)}</b>"]
+        )
         self._fill(given)
         at = self.poses()[mount.place]
         scale = _GIZMO_M * self.scene.scale
-        self._gizmo = self._server.scene.add_transform_controls("/gizmo", scale=scale, wxyz=wxyz(at), position=at.xyz)
-        self._gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
+        self.gizmo = self._server.scene.add_transform_controls("/gizmo", scale=scale, wxyz=wxyz(at), position=at.xyz)
+        self.gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
 
     def _fill(self, given: Pose) -> None:
         values = [value * 1000 for value in given.xyz] + [math.degrees(one) for one in clean_rpy(given.quat_xyzw)]
@@ -317,37 +340,34 @@ class Panel:
             self.move(Pose((x / 1000, y / 1000, z / 1000), quat_from_rpy(*angles)))
 
     def _dragged(self) -> None:
-        mount = self.session.mount(self.frames.value)
-        w, qx, qy, qz = (float(value) for value in self._gizmo.wxyz)
-        px, py, pz = (float(value) for value in self._gizmo.position)
+        mount = self.session.mount(self.selected)
+        w, qx, qy, qz = (float(value) for value in self.gizmo.wxyz)
+        px, py, pz = (float(value) for value in self.gizmo.position)
         base = self.poses()[mount.relative_to]
         given = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
-        self.move(_snapped(given, mount.given(mount.edge.pose)) if self._snap.value else given)
-        self._select()
+        self.move(_snapped(given, mount.given(mount.edge.pose)) if self.choices.snaps else given)
+        self._show_selected()
 
     def move(self, given: Pose) -> None:
         """Give the selected mount the pose that its file is to have."""
         try:
-            mount = self.session.mount(self.frames.value)
+            mount = self.session.mount(self.selected)
         except ImmovableError as error:
-            self.report.content = str(error)
+            self.report.content = paragraphs([escape(str(error))])
             return
         self.session.move(mount.edge.child, mount.of_edge(given))
         self._show_moved()
+        if self.gizmo is not None:
+            at = self.poses()[mount.place]
+            self.gizmo.wxyz, self.gizmo.position = wxyz(at), at.xyz
 
     def save(self) -> None:
         """Save what was moved, and report it."""
         try:
             saved = self.session.save()
         except OSError as error:
-            self.report.content = f"not saved: {error}"
+            self.report.content = paragraphs([escape(f"not saved: {error}")])
             return
-        lines = [f"- {one.code} {one.message}" for one in saved.refused]
-        text = "not saved, there would be errors:\n" if lines else "saved:\n" if saved.diff else "nothing to save\n"
-        text += f"```diff\n{saved.diff}```\n" if saved.diff else ""
-        lines += [f"- {one.code} {one.message}" for one in saved.found if saved.diff]
-        for one in saved.elsewhere:
-            offer = f"; in an overlay:\n```yaml\n{one.overlay('', '')}```" if one.entry else ""
-            lines.append(f"- {one.reason} ({one.at}){offer}")
-        self.report.content = text + "\n".join(lines)
-        self._select()
+        self.report.content = saved_html(saved)
+        self.tree.mark_moved(frozenset(self.session.moved))
+        self._show_selected()

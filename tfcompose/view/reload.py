@@ -161,11 +161,7 @@ class ReloadedPanel:
             self._server.gui.reset()
             self._server.scene.reset()
             self._broken = None
-            self.panel = Panel(
-                self._server, self.session, edit=self._edit, joints=self._joints, positions=before.positions
-            )
-            if before.frames.value in self.session.robot.frames:
-                self.panel.frames.value = before.frames.value
+            self.panel = Panel(self._server, self.session, edit=self._edit, joints=self._joints, choices=before.choices)
         if state.errors:
             self._show(state.found)
         return True

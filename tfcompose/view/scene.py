@@ -29,6 +29,8 @@ _NO_RED = 0.1
 _GREY = (105, 112, 122)
 #: The axes of a robot whose largest body is 1 m long, in metres.
 _AXES_M = 0.08
+#: How much larger the axes of the selected frame are.
+_SELECTED = 2.0
 _GHOST = (60, 120, 220)
 #: Where the camera begins, as a direction from the middle of the robot, and how many radii of it away.
 _FROM = np.array([0.62, 0.62, 0.48])
@@ -92,7 +94,10 @@ class RobotScene:
         self._lines: dict[str, Any] = {}
         self._labels: dict[str, Any] = {}
         self._at: Mapping[str, Pose] = {}
+        self._robot = robot
         self._hidden: frozenset[str] = frozenset()
+        self._selected = ""
+        self._names_all = False
         #: What is called with the frame of a body that is clicked.
         self.clicked: Callable[[str], None] = lambda _: None
         scene.set_up_direction("+z")
@@ -152,7 +157,7 @@ class RobotScene:
         for frame, label in self._labels.items():
             if poses[frame] != self._at.get(frame):
                 label.position = poses[frame].xyz
-        self._at = poses
+        self._robot, self._at = robot, poses
         self.fields.update(poses)
         rows = np.array([poses[frame].xyz + poses[frame].quat_xyzw for frame in robot.frames], np.float32).reshape(
             -1, 7
@@ -161,13 +166,16 @@ class RobotScene:
         if self._axes is None:
             self._axes = self._scene.add_batched_axes(
                 "/frames", rotations, positions, axes_length=self._axes_m, axes_radius=self._axes_m / 20,
-                batched_scales=self._scales(robot),
+                batched_scales=self._scales(),
             )  # fmt: skip
         else:
             self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
-        shown = poses.keys() - self._hidden
+        self._draw_edges()
+
+    def _draw_edges(self) -> None:
+        poses, shown = self._at, self._at.keys() - self._hidden
         ends: dict[str, list[tuple[Vector, Vector]]] = {owner: [] for owner in self.colours}
-        for edge in robot.edges:
+        for edge in self._robot.edges:
             if edge.parent in poses and edge.child in shown:
                 ends[edge.owner].append((poses[edge.parent].xyz, poses[edge.child].xyz))
         for index, (owner, colour) in enumerate(self.colours.items()):
@@ -198,30 +206,52 @@ class RobotScene:
             position=(0.0, 0.0, float(least[2])),
         )
 
-    def hide(self, robot: Robot, frames: Iterable[str]) -> None:
+    def hide(self, frames: Iterable[str]) -> None:
         """Hide these frames with their bodies, labels and the edges to them, and show all others again."""
         self._hidden = frozenset(frames)
         for frame, handle in (*self._bodies.items(), *self._labels.items()):
             handle.visible = frame not in self._hidden
-        self._axes.batched_scales = self._scales(robot)
+        self._axes.batched_scales = self._scales()
+        self._draw_edges()
         self.fields.hide(self._hidden)
 
-    def _scales(self, robot: Robot) -> Any:
-        return np.array([frame not in self._hidden for frame in robot.frames], np.float32)
+    def select(self, frame: str) -> None:
+        """Draw the axes of a frame larger than those of all others, with its name."""
+        self._selected = frame
+        self._axes.batched_scales = self._scales()
+        self._label()
 
-    def label(self, poses: Mapping[str, Pose], *, visible: bool) -> None:
-        """Write the names of the frames next to them, or take them away."""
-        for handle in self._labels.values():
-            handle.remove()
-        self._labels = {}
-        for index, (frame, pose) in enumerate(poses.items() if visible else ()):
-            self._labels[frame] = self._scene.add_label(
-                f"/labels/{index}", frame, position=pose.xyz, visible=frame not in self._hidden, anchor="bottom-left"
-            )
+    def _scales(self) -> Any:
+        sizes = (
+            (_SELECTED if frame == self._selected else 1) * (frame not in self._hidden) for frame in self._robot.frames
+        )
+        return np.fromiter(sizes, np.float32)
+
+    def name_all(self, *, visible: bool) -> None:
+        """Write the names of all frames next to them, or that of the selected one only."""
+        self._names_all = visible
+        self._label()
+
+    def _label(self) -> None:
+        for frame in [one for one in self._labels if not (self._names_all or one == self._selected)]:
+            self._labels.pop(frame).remove()
+        for index, (frame, pose) in enumerate(self._at.items()):
+            if frame not in self._labels and (self._names_all or frame == self._selected):
+                self._labels[frame] = self._scene.add_label(
+                    f"/labels/{index}",
+                    frame,
+                    position=pose.xyz,
+                    visible=frame not in self._hidden,
+                    anchor="bottom-left",
+                )
 
     def show_owner(self, owner: str, *, visible: bool) -> None:
         """Show or hide the edges of an owner."""
         self._lines[owner].visible = visible
+
+    def is_owner_shown(self, owner: str) -> bool:
+        """Return whether the scene shows the edges of an owner."""
+        return bool(self._lines[owner].visible)
 
     def bounds(self, frame: str) -> tuple[Vector, Vector]:
         """Return the least and the most of what the scene shows of a frame's body, in the frame and in metres."""

@@ -12,6 +12,7 @@ from tfcompose.view.edit import Change, Elsewhere, change_of, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from collections.abc import Set as AbstractSet
 
     from tfcompose.compile import Compiled
     from tfcompose.findings import Finding
@@ -132,11 +133,17 @@ class Session:
                 self.write(file, old, text)
                 lines = unified_diff(old.splitlines(keepends=True), text.splitlines(keepends=True), file, file)
                 diff += "".join(lines)
+        self._keep_undo(self.moved.keys() - elsewhere.keys())
         self.texts, self.state = texts, state
         self.moved = {child: pose for child, pose in self.moved.items() if child in elsewhere}
-        self._undo.clear()
-        self._redo.clear()
         return Saved(diff, state.found, elsewhere=tuple(elsewhere.values()))
+
+    def _keep_undo(self, saved: AbstractSet[str]) -> None:
+        """Have undo and redo lead to where these frames were before the save, which the files no longer say."""
+        edges = self.state.robot.edges if self.state.robot else ()
+        before = {edge.child: edge.pose for edge in reversed(edges) if edge.child in saved}
+        for step in (*self._undo, *self._redo):
+            step.update({child: pose for child, pose in before.items() if child not in step})
 
 
 def _with(texts: Mapping[str, str], change: Change) -> dict[str, str]:

@@ -148,6 +148,7 @@ def _write(session: Session, path: Path) -> None:
     """Write the scene as one file; ends where it cannot be written."""
     from tfcompose.cli.writing import replace_file
     from tfcompose.view.kinematics import poses_in_roots
+    from tfcompose.view.page import page_of
     from tfcompose.view.scene import RobotScene
     from tfcompose.view.server import started, stop
 
@@ -158,7 +159,8 @@ def _write(session: Session, path: Path) -> None:
         scene.add_meshes()
         scene.update(robot, poses)
         scene.frame_camera(server, poses)
-        replace_file(path, server.scene.as_html().encode())
+        page = page_of(server.scene.as_html(), robot, session.state.sources, scene.colours)
+        replace_file(path, page.encode())
     except OSError as error:
         fail(f"{path} cannot be written: {error.strerror}", UNREADABLE)
     finally:

@@ -2,6 +2,7 @@
 
 import base64
 import os
+import subprocess
 import sys
 import threading
 import zipfile
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tests.support.waiting import until
 from tfcompose.deploy.agent import KEPT, UNIT, Agent, HostError
 from tfcompose.deploy.connection import START
 from tfcompose.deploy.release import Release
@@ -87,6 +89,33 @@ def test_a_unit_that_was_restarted_long_ago_has_not_failed(agent: Agent, monkeyp
     shown["NRestarts"] = "4"
     status = agent.wait(10)
     assert (status["failed"], status["lines"]) == (True, ["last words"])
+
+
+def test_a_trial_that_nobody_ended_is_reported_and_the_release_of_a_launcher_is_kept(
+    agent: Agent, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = {"ActiveState": "active"}
+    monkeypatch.setattr(agent, "_shown", lambda: shown)
+    monkeypatch.setattr(agent, "_must", lambda *_: None)
+    monkeypatch.setattr(agent, "_tfcompose", lambda words, _: subprocess.CompletedProcess(words, 0, "", ""))
+    names = []
+    for number in range(KEPT + 3):
+        made = release(str(number))
+        send(agent, made)
+        names.append(made.name)
+        if number == 0:
+            plan = agent.base / "releases" / made.name / "plan.json"
+            launcher = processes.start([sys.executable, "-c", "input()", str(plan)], stdin=subprocess.PIPE)
+            shown["MainPID"] = str(launcher.pid)
+            assert until(lambda: agent._launched_from() == plan.parent)  # noqa: B023 (at once)
+        assert agent.follow(made.name, "brain") == "nothing starts again"
+        assert agent.state()["unsettled"]
+        agent.commit(made.name)
+        agent.settle()
+        assert not agent.state()["unsettled"]
+    there = {folder.name for folder in (agent.base / "releases").iterdir()}
+    assert {names[0], names[-1], names[-2]} <= there, "processes use its files"
+    assert len(there) == KEPT
 
 
 @pytest.mark.parametrize("version", ["(3, 9)", "(3, 12)"])

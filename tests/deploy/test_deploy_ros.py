@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -45,6 +44,9 @@ MOVED = ROBOT.replace("[0, 0, 0.3]", "[0, 0, 0.4]")
 #: Its owner runs, and publishes nothing.
 SIMULATED = "simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: rear"
 SILENT = ROBOT.replace(SIMULATED, 'run: [sh, -c, "sleep 1000"], host: rear')
+#: The same, and a frame vanishes: nothing goes on.
+SILENT_ANEW = SILENT.replace("  lidar: {parent: base_link, xyz: [0, 0, 0.3]}\n", "")
+each_way = pytest.mark.parametrize("silent", [SILENT, SILENT_ANEW], ids=["followed", "started_anew"])
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +88,10 @@ def is_complete(computers: Computers) -> bool:
 
 
 def is_on_trial(computers: Computers, name: str) -> bool:
-    units = Path("/proc", str(computers.computers[name].inside()), "root/run", name, "systemd/user")
-    return any(units.glob("*.d/trial.conf"))
+    """Whether a computer runs another plan than that of its current release."""
+    done = computers.computers[name].run("python3", "-m", "tfcompose", "ps", "--format", "json")
+    plan = json.loads((computers.computers[name].base / f"rover.{name}/current/plan.json").read_text())
+    return any(robot["plan"] != plan["spec_digest"] for robot in json.loads(done.stdout or "[]"))
 
 
 def journals(computers: Computers) -> str:
@@ -128,16 +132,56 @@ def test_what_would_change_is_listed_and_shown_and_changes_nothing(computers: Co
     assert deploy(computers, ROBOT, "--check").returncode == 0
 
 
-def test_a_release_that_does_not_come_up_is_taken_back_everywhere(computers: Computers) -> None:
+@each_way
+def test_a_release_that_does_not_come_up_is_taken_back_everywhere(computers: Computers, silent: str) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
-    done = deploy(computers, SILENT, "--timeout", "8")
+    done = deploy(computers, silent, "--timeout", "8")
     assert (done.returncode, "TF917" in done.stderr, "base_link → rear_mount" in done.stderr) == (1, True, True), done
     for name in NAMES:
         assert f"{name} is back on release {before[name]}" in done.stderr
     assert current(computers) == before
     assert until(lambda: is_complete(computers)), journals(computers)
     assert deploy(computers, ROBOT, "--check").returncode == 0
+
+
+def children(computers: Computers, name: str) -> dict[str, int]:
+    """Return the processes that run on a computer, by name, with their numbers there."""
+    done = computers.computers[name].run(sys.executable, "-m", "tfcompose", "ps", "--format", "json")
+    (robot,) = json.loads(done.stdout)
+    return {one["name"]: one["pid"] for one in robot["processes"] if one["pid"]}
+
+
+def test_only_what_is_different_starts_again(computers: Computers) -> None:
+    assert deploy(computers, ROBOT).returncode == 0
+    launchers = {name: runs(computers, name) for name in NAMES}
+    before = {name: children(computers, name) for name in NAMES}
+    other = ROBOT.replace(
+        "rear_drive: {simulate: {fixed: {xyz: [0, 0, 1]}", "rear_drive: {simulate: {fixed: {xyz: [0, 0, 2]}"
+    )
+    done = deploy(computers, other)
+    assert done.returncode == 0, done
+    assert {"rear: restarted: rear_drive", "brain: nothing starts again", "arm: nothing starts again"} <= set(
+        done.stdout.splitlines()
+    ), done
+    after = {name: children(computers, name) for name in NAMES}
+    assert [(name, one) for name in NAMES for one in before[name] if before[name][one] != after[name][one]] == [
+        ("rear", "rear_drive")
+    ]
+    moved = deploy(computers, other.replace("[0, 0, 0.3]", "[0, 0, 0.4]"))
+    assert (moved.returncode, "arm: restarted: guard" in moved.stdout) == (0, True), moved
+    assert children(computers, "rear")["rear_drive"] == after["rear"]["rear_drive"]
+    assert {name: runs(computers, name) for name in NAMES} == launchers
+    assert is_complete(computers)
+    assert deploy(computers, other.replace("[0, 0, 0.3]", "[0, 0, 0.4]"), "--check").returncode == 0
+    named = computers.folder / "robot/meshes/wheel.stl"
+    named.write_bytes(b"\1" * 84)
+    try:
+        assert deploy(computers, other).returncode == 0
+    finally:
+        named.write_bytes(b"\0" * 84)
+    anew = {name for name in NAMES if runs(computers, name) != launchers[name]}
+    assert anew == {*NAMES}, "who reads a file is not known"
 
 
 def test_a_host_that_is_down_is_named_before_anything_changes(computers: Computers) -> None:
@@ -153,10 +197,11 @@ def test_a_host_that_is_down_is_named_before_anything_changes(computers: Compute
     assert until(lambda: is_complete(computers)), journals(computers)
 
 
-def test_a_host_that_loses_power_in_the_middle_takes_all_back(computers: Computers) -> None:
+@each_way
+def test_a_host_that_loses_power_in_the_middle_takes_all_back(computers: Computers, silent: str) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
-    process = deploying(computers, SILENT)
+    process = deploying(computers, silent)
     assert until(lambda: is_on_trial(computers, "rear"))
     computers.computers["rear"].lose_power()
     try:
@@ -170,10 +215,11 @@ def test_a_host_that_loses_power_in_the_middle_takes_all_back(computers: Compute
     assert until(lambda: is_complete(computers)), journals(computers)
 
 
-def test_whoever_deploys_may_be_killed(computers: Computers) -> None:
+@each_way
+def test_whoever_deploys_may_be_killed(computers: Computers, silent: str) -> None:
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
-    process = deploying(computers, SILENT)
+    process = deploying(computers, silent)
     assert until(lambda: is_on_trial(computers, "rear"))
     process.send_signal(signal.SIGKILL)
     process.communicate()
@@ -197,6 +243,36 @@ def test_clocks_that_are_apart_are_found_before_the_start(computers: Computers) 
     assert re.search(r"the clock of arm is (2|1\.9\d|2\.0\d) s ahead", done.stderr), done
     assert current(computers) == before
     assert deploy(computers, ahead, "--check", "--clock-limit", "3").returncode == 1
+
+
+@pytest.fixture
+def own_domains(computers: Computers) -> Iterator[None]:
+    """Give each computer a ROS domain of its own while the test runs."""
+
+    def boot_in(domains: dict[str, dict[str, str]]) -> None:
+        for name, one in computers.computers.items():
+            one.variables = domains[name]
+            one.lose_power()
+            computers.boot(name)
+
+    boot_in({name: {"ROS_DOMAIN_ID": str(number)} for number, name in enumerate(NAMES, 11)})
+    yield
+    boot_in({name: {} for name in NAMES})
+
+
+@pytest.mark.usefixtures("own_domains")
+def test_hosts_with_domains_of_their_own_need_one_of_the_robots(computers: Computers) -> None:
+    before = current(computers)
+    refused = deploy(computers, ROBOT)
+    assert (refused.returncode, "TF916" in refused.stderr) == (1, True), refused
+    assert "ROS_DOMAIN_ID is 11 on brain, 12 on rear, 13 on arm" in refused.stderr, refused
+    assert current(computers) == before
+    done = deploy(computers, ROBOT.replace("robot: rover", "robot: rover\nros: {domain_id: 21}"))
+    assert (done.returncode, "4 edges live on brain, rear, arm" in done.stdout) == (0, True), done
+    listed = computers.computers["arm"].run("python3", "-m", "tfcompose", "ps").stdout
+    assert "rover.arm@21" in listed, listed
+    again = deploy(computers, ROBOT.replace("robot: rover", "robot: rover\nros: {domain_id: 21}"))
+    assert "nothing to change" in again.stdout, again
 
 
 def test_rollback_returns_to_the_release_before(computers: Computers) -> None:
@@ -254,6 +330,18 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
     assert (following.returncode, ended) == (0, set(NAMES))
     assert on_all("ps").returncode == 1
     assert deploy(computers, ROBOT).returncode == 0, "what is down is started again"
+
+
+def test_a_robot_of_a_fleet_shares_its_edges_from_the_host_of_static(computers: Computers) -> None:
+    fleet = "fleet: 1\nshare: [base_link → lidar]\nrobots: {rover: {router: tcp/10.77.0.1:7447}}\n"
+    (computers.folder / "robot/fleet.yaml").write_text(fleet)
+    done = deploy(computers, ROBOT.replace("robot: rover", "robot: rover\nfleet: fleet.yaml"))
+    assert done.returncode == 0, done
+    assert ["fleet_share" in children(computers, name) for name in NAMES] == [True, False, False]
+    logs = computers.computers["brain"].run("python3", "-m", "tfcompose", "logs", "fleet_share").stdout
+    assert "no router at tcp/10.77.0.1:7447" in logs, logs
+    assert deploy(computers, ROBOT).returncode == 0
+    assert "fleet_share" not in children(computers, "brain")
 
 
 def test_one_host_alone_is_deployed_to_and_waited_for(computers: Computers) -> None:

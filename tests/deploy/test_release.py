@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tfcompose.cli.compiling import disk, library
+from tfcompose.cli.reading import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.deploy.agent import UNIT
 from tfcompose.deploy.release import Release, packed
@@ -51,7 +52,7 @@ def release(text: str = ROBOT, wheels: Path | None = None) -> Release:
 
 
 def robot(text: str = ROBOT) -> Robot:
-    compiled = compile_robot(text, "robot.yaml", library(), disk=disk())
+    compiled = compile_robot(text, "robot.yaml", library(), read=read_text, disk=disk())
     assert compiled.robot
     assert not compiled.errors, compiled.errors
     return compiled.robot
@@ -112,10 +113,22 @@ def test_wheels_bring_a_python_of_their_own(folder: Path) -> None:
 def test_the_unit_sources_setup_files_and_is_the_users_or_the_systems() -> None:
     unit = Unit("rover.brain", "rover", "brain", "/home/a b/x", "/usr/bin/python3", ("/opt/ros/jazzy/setup.bash",))
     text = unit.text()
-    assert "/opt/ros/jazzy/setup.bash /usr/bin/python3" in text
+    assert "/opt/ros/jazzy/setup.bash -- /usr/bin/python3" in text
     assert '"/home/a b/x/current/plan.json" --host brain' in text
-    assert "$$file" in text
+    assert "$$1" in text
     assert "WantedBy=default.target" in text
     system = Unit("rover.brain", "rover", "brain", "/var/lib/x", "/usr/bin/python3", system=True).text()
     assert "WantedBy=multi-user.target" in system
     assert "RuntimeDirectory=tfcompose/rover.brain" in system
+
+
+def test_the_fleet_of_a_robot_is_carried_with_it(folder: Path) -> None:
+    fleet = "fleet: 1\nshare: [base_link → lidar]\nrobots: {rover: {router: tcp/10.0.0.11:7447}}\n"
+    (folder / "fleets").mkdir()
+    (folder / "fleets/warehouse.yaml").write_text(fleet)
+    made = release(ROBOT.replace("robot: rover", "robot: rover\nfleet: ../fleets/warehouse.yaml"))
+    there = unpacked(made, folder / "there")
+    share = read_plan((there / "plan.json").read_text(), "plan.json").process("fleet_share")
+    file = share.argv[-1].replace("${build_dir}", str(there))
+    assert Path(file).read_text() == fleet
+    assert (share.host, share.argv[-2]) == ("brain", "rover")

@@ -6,17 +6,20 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from tests.support import processes
-from tests.support.fleets import Link, SimulatedRobot, fleet_of, fleet_text
-from tests.support.waiting import until
+from tests.support.fleets import Link, RobotProcesses, SimulatedRobot, fleet_of, fleet_text
+from tests.support.waiting import TIMEOUT_S, until
 from tests.support.zenoh_peers import free_port, session
-from tfcompose.fleet.observe import FleetObserver
+from tfcompose.fleet.observe import FleetObserver, StaleError
 from tfcompose.fleet.share import SharedEdges
 from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf2.exceptions import TransformException
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
@@ -63,7 +66,7 @@ def test_a_pose_between_two_robots_is_found(two: Two, observe: Callable[[dict[st
     assert pose.xyz == pytest.approx((1.0, 0.0, 0.0))
     assert stamp_ns is not None
     assert [(one.robot, one.state) for one in observer.status()] == [("r1", "live"), ("r2", "live")]
-    assert list(observer.findings()) == []
+    assert until(lambda: list(observer.findings()) == [])
 
 
 def test_a_broken_link_is_stale_within_3_s_and_live_again_when_it_is_mended(
@@ -83,6 +86,61 @@ def test_a_broken_link_is_stale_within_3_s_and_live_again_when_it_is_mended(
     assert {one.code for one in observer.findings()} <= {"TF882", "TF883"}
     two.link.mend()
     assert until(lambda: states()["r2"] == "live")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("broken_s", [5.0, 30.0])  # what is sent meanwhile comes late, or Zenoh has ended the session
+def test_no_pose_is_given_over_a_broken_link_and_new_ones_after(
+    two: Two, observe: Callable[[dict[str, str]], FleetObserver], broken_s: float
+) -> None:
+    observer = observe(two.routers)
+    assert observer.wait(60)
+    given: list[tuple[float, float]] = []
+
+    def pose() -> bool:
+        """Look the pose up as often as it can be; whether it was given, and how old it was then."""
+        try:
+            _, stamp_ns = observer.pose("r1/base_link", "r2/base_link")
+        except (StaleError, TransformException):
+            return False
+        given.append((time.monotonic(), time.time() - (stamp_ns or 0) / 1e9))
+        return True
+
+    assert until(pose)
+    two.link.break_()
+    broken = time.monotonic()
+    assert until(lambda: not pose())
+    assert time.monotonic() - broken < 3.0
+    before = len(given)
+    while time.monotonic() - broken < broken_s:
+        pose()
+        time.sleep(0.05)
+    assert len(given) == before, "none while it was broken"
+    two.link.mend()
+    assert until(pose)
+    assert until(lambda: pose() and given[-1][1] < 1.0)
+    assert max(age_s for _, age_s in given) < 3.0, "and none of those that the link had held back"
+    assert {one.state for one in observer.status()} == {"live"}
+
+
+def test_what_a_link_held_back_is_as_old_as_it_is(observe: Callable[[dict[str, str]], FleetObserver]) -> None:
+    router = f"tcp/127.0.0.1:{free_port()}"
+    with session("router", listen=[router]), session("client", connect=[router]) as robot:
+        observer = observe({"r1": router})
+        assert until(lambda: [one.state for one in observer.status()] == ["silent"])
+        before = datetime.fromtimestamp(time.time() - 30, timezone.utc)
+        sent = zenoh.Timestamp.parse_rfc3339(f"{before:%Y-%m-%dT%H:%M:%SZ}/{robot.zid()}")
+
+        def came() -> bool:
+            robot.put("tfcompose/fleet/tests/r1/tf", tf(("r1/odom", "r1/base_link")), timestamp=sent)
+            return observer.status()[0].state != "silent"
+
+        assert until(came)
+        (status,) = observer.status()
+        assert (status.state, status.edges[1].stale) == ("stale", True)
+        with pytest.raises(StaleError, match="r1"):
+            observer.pose("r1/odom", "r1/base_link")
+        assert [one.code for one in observer.findings()] == ["TF883"]
 
 
 def test_a_router_that_is_not_there_is_named_and_found_when_it_comes(
@@ -141,3 +199,41 @@ def test_the_command_lists_robots_prints_poses_and_says_what_is_wrong(two: Two, 
     assert code == 1
     assert "TF882" in output or "TF883" in output
     assert "r2" in output
+
+
+@pytest.mark.slow
+def test_of_twenty_robots_all_are_listed_and_the_one_that_dies_is_stale(tmp_path: Path) -> None:
+    with RobotProcesses(20, "5 Hz") as robots:
+        names = list(robots.fleet.robots)
+        (tmp_path / "fleet.yaml").write_text(robots.text, encoding="utf-8")
+        observer = FleetObserver(robots.fleet)
+        try:
+            assert observer.wait(2 * TIMEOUT_S)
+
+            def poses(pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
+                """Return the pairs between which there is no pose."""
+                missing = []
+                for one, other in pairs:
+                    try:
+                        observer.pose(f"{one}/base_link", f"{other}/base_link")
+                    except (StaleError, TransformException):
+                        missing.append((one, other))
+                return missing
+
+            pairs = [(one, other) for one in names for other in names]
+            assert until(lambda: not poses(pairs))
+            command = [sys.executable, "-m", "tfcompose", "fleet", "ps", "--format", "json"]
+
+            def listed() -> dict[str, str]:
+                done = processes.run([*command, "--for", "5"], cwd=tmp_path)
+                return {one["robot"]: one["state"] for one in json.loads(done.stdout)["robots"]}
+
+            assert listed() == dict.fromkeys(names, "live")
+            robots.kill("r7")
+            assert until(lambda: [one.code for one in observer.findings()] == ["TF883"])
+            assert [one.robot for one in observer.status() if one.state != "live"] == ["r7"]
+            assert until(lambda: not poses([pair for pair in pairs if "r7" not in pair]))
+            assert poses(pairs) == [pair for pair in pairs if "r7" in pair and pair != ("r7", "r7")]
+            assert listed() == dict.fromkeys(names, "live") | {"r7": "silent"}
+        finally:
+            observer.close()

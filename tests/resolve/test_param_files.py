@@ -122,9 +122,19 @@ def test_the_digest_of_the_plan_changes_with_the_file() -> None:
     ],
 )
 def test_what_is_no_parameter_of_the_node_is_a_finding(params: str, file: str, code: str, message: str) -> None:
-    errors = compiled(params, q=file).errors
-    assert [one.code for one in errors] == [code], [one.message for one in errors]
-    assert message in errors[0].message
+    found = compiled(params, q=file).found
+    assert [one.code for one in found] == [code], [one.message for one in found]
+    assert message in found[0].message
+
+
+def test_of_several_files_one_need_not_name_the_node_but_none_is_a_warning_for_each() -> None:
+    files = {"q": "planner: {ros__parameters: {a: 1}}", "common": "other: {ros__parameters: {a: 1}}"}
+    assert compiled("{file: [common.yaml, q.yaml]}", **files).found == ()
+    files["q"] = files["common"]
+    found = compiled("{file: [common.yaml, q.yaml]}", **files).found
+    assert [(one.code, one.severity) for one in found] == [("TF334", "warning")] * 2
+    first, second = (one.span.column for one in found if one.span)
+    assert second - first == len("common.yaml, ")
 
 
 def test_an_alias_bomb_is_refused() -> None:

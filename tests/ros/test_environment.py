@@ -99,7 +99,7 @@ def test_a_middleware_that_is_not_installed_is_named_as_the_robot_file_names_it(
     ros = RosSettings(rmw="zenoh")
     found = ros_trouble(child_environment({}, ros, own=True), ros)
     assert found is not None
-    assert (found.code, "rmw: zenoh" in found.message, "rmw_zenoh_cpp" in found.message) == ("TF909", True, True)
+    assert (found.code, "rmw: zenoh" in found.message, "rmw_zenoh_cpp" in found.message) == ("TF901", True, True)
     assert "ros-jazzy-rmw-zenoh-cpp" in found.help
 
 

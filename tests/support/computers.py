@@ -64,11 +64,15 @@ def missing() -> str:
 
 @dataclass
 class Computer:
-    """One of them; ``folder`` outlives a loss of power, what runs and the runtime directory do not."""
+    """One of them; ``folder`` outlives a loss of power, what runs and the runtime directory do not.
+
+    ``variables`` are in the environment of its user from the next boot on.
+    """
 
     name: str
     address: str
     folder: Path
+    variables: dict[str, str] = field(default_factory=dict)
     process: subprocess.Popen[str] | None = None
 
     @property
@@ -101,6 +105,7 @@ class Computer:
             "XDG_RUNTIME_DIR": f"/run/{self.name}",
             "PYTHONPATH": str(ROOT),
             "PYTHONPYCACHEPREFIX": os.environ.get("PYTHONPYCACHEPREFIX") or str(ROOT / ".pyc"),
+            **self.variables,
         }
 
     def lose_power(self) -> None:

@@ -37,11 +37,12 @@ PROBE: dict[str, Any] = {
 RUNNING: dict[str, Any] = {"missing": [], "silent": [], "processes": [], "launcher": 7}
 LATE: dict[str, Any] = {
     "name": "arm_drive", "kind": "simulate", "failed": False, "ready": False, "detail": "", "waits": "",
-    "state": "RUNNING",
+    "state": "running",
 }  # fmt: skip
 STATUS: dict[str, Any] = {"robot": RUNNING, "failed": False, "lines": []}
 STATE: dict[str, Any] = {
     "release": "before", "previous": None, "files": {}, "unit": None, "active": True, "enabled": True, "stranger": None,
+    "unsettled": False,
 }  # fmt: skip
 
 
@@ -60,7 +61,7 @@ class StandInHost:
         del timeout_s
         self.requests.append(request)
         usual: dict[str, Any] = {
-            "state": STATE | STATUS, "take_lock": {"holder": None}, "rehearse": [], "wait": STATUS,
+            "state": STATE | STATUS, "take_lock": {"holder": None}, "rehearse": [], "wait": STATUS, "texts": {},
             "back": {"release": "before", "active": True},
         }  # fmt: skip
         answer = self.answers.get(request, usual.get(request))

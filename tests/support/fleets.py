@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import sys
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING
 
+from typing_extensions import Self
+
+from tests.support.zenoh_peers import free_port, session
 from tfcompose.fleet.share import Sender
 from tfcompose.language.validate import validate_fleet
 from tfcompose.load import load
@@ -62,6 +67,54 @@ class SimulatedRobot:
             self.sender.on_message(encode([moving]), False)  # noqa: FBT003 (as the listener calls)
 
 
+class RobotProcesses:
+    """Robots r0, r1, … that are a process each, and one process of all their routers.
+
+    ``text`` is the fleet's file; ``processes`` are the robots' by name.
+    """
+
+    def __init__(self, count: int, rate: str) -> None:
+        ports = [str(free_port()) for _ in range(count)]
+        routers = {f"r{number}": f"tcp/127.0.0.1:{port}" for number, port in enumerate(ports)}
+        self.text = fleet_text(routers, rate)
+        self.fleet = fleet_of(routers, rate)
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        """Start them."""
+        with ExitStack() as stack:
+            self._started(stack, "", [one.router for one in self.fleet.robots.values()])
+            for name in self.fleet.robots:
+                self.processes[name] = self._started(stack, name, [self.text])
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End them; they end with their input."""
+        self._stack.close()
+
+    def kill(self, name: str) -> None:
+        """Kill a robot."""
+        self.processes[name].kill()
+
+    def _started(self, stack: ExitStack, name: str, words: list[str]) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "tests.support.fleets", name, *words]
+        return stack.enter_context(subprocess.Popen(command, stdin=subprocess.PIPE))
+
+
+def _be(name: str, *words: str) -> None:
+    """Be the robot of that name in the fleet of this text, or without a name these routers, until the input ends."""
+    with ExitStack() as stack:
+        if name:
+            robot = SimulatedRobot(validate_fleet(load(words[0], "fleet.yaml")), name, 1.0)
+            stack.callback(robot.close)
+        else:
+            for router in words:
+                stack.enter_context(session("router", listen=[router]))
+        sys.stdin.read()
+
+
 class Link:
     """A network link to a router, as a port that passes on what comes, until it breaks: then nothing passes."""
 
@@ -107,3 +160,7 @@ class Link:
         for one in (source, sink):
             with suppress(OSError):
                 one.shutdown(socket.SHUT_RDWR)
+
+
+if __name__ == "__main__":
+    _be(*sys.argv[1:])

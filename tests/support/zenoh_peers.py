@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import socket
+import time
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -83,7 +84,7 @@ class RosPeer:
         """Publish a message, with rmw_zenoh's attachment."""
         publisher, gid, _ = self._publishers[topic]
         self._sent += 1
-        fields = (ext.Int64(self._sent), ext.Int64(1_700_000_000_000_000_000 + self._sent), gid)
+        fields = (ext.Int64(self._sent), ext.Int64(time.time_ns()), gid)
         publisher.put(data, attachment=ext.z_serialize(fields) if attached else None)
 
     def gid(self, topic: str) -> bytes:

@@ -11,9 +11,11 @@ A release is a folder named by its content: what is there already is not sent ag
 nothing. It comes into effect in two phases. On trial it is started from the runtime directory, which no boot survives;
 only once every edge of every host is live does ``current`` lead to it. A host that loses its power meanwhile, or whose
 connection to whoever deploys is cut, is back on the release before without anybody's help. All hosts end what runs
-before any starts, because an edge may have moved from one host to another, and has no two publishers meanwhile.
+before any starts, because an edge may have moved from one host to another, and has no two publishers meanwhile; where
+nothing of that kind changes, launchers go on, follow the release, and start only what is different again.
 
 ``release`` makes the folder, ``unit`` what systemd starts, ``connection`` reaches the hosts, ``agent`` is what acts
-there, ``rehearse`` tells it whether the plan could start, ``rollout`` decides. Must not import ``load``, ``language``,
-``resolve``, ``guard``: it is given a right robot, and asks launchers and guards over ssh.
+there, ``rehearse`` tells it whether the plan could start, ``following`` whether the robot can go on meanwhile,
+``rollout`` decides. Must not import ``load``, ``language``, ``resolve``, ``guard``: it is given a right robot, and
+asks launchers and guards over ssh.
 """

@@ -125,7 +125,10 @@ class Agent:
         return time.time()
 
     def state(self) -> dict[str, Any]:
-        """Return what is there: the releases, the current one's files by their digests, the unit, and what runs."""
+        """Return what is there: the releases, the current one's files by their digests, the unit, and what runs.
+
+        ``unsettled`` says that somebody's trial was never ended: what runs is not the current release.
+        """
         release = self._release("current")
         shown = self._shown()
         self.restarts = _restarts(shown)
@@ -138,13 +141,14 @@ class Agent:
             "unit": _text(self.units / self.unit),
             "active": shown.get("ActiveState") in {"active", "activating", "reloading"},
             "enabled": shown.get("UnitFileState") == "enabled",
+            "unsettled": (self.runtime / self.unit).exists() or (self.runtime / f"{self.unit}.d").exists(),
             "stranger": launcher if launcher and str(launcher) != shown.get("MainPID") else None,
             **status,
         }
 
-    def texts(self, paths: list[str]) -> dict[str, str | None]:
-        """Return the texts of files of the current release; None for one that is absent, or no text."""
-        return {path: _text(self.base / "current" / path) for path in paths}
+    def texts(self, paths: list[str], *, any_size: bool = False) -> dict[str, str | None]:
+        """Return the texts of files of the current release; None for one that is absent, no text, or too large."""
+        return {path: _text(self.base / "current" / path, None if any_size else MOST_TEXT) for path in paths}
 
     def take_lock(self, who: str) -> dict[str, Any]:
         """Take this host's lock until this process ends; say who holds it, if somebody does."""
@@ -236,6 +240,36 @@ class Agent:
         self.restarts = 0
         self._must("start", self.unit)
 
+    def follow(self, release: str, host: str) -> str:
+        """Let what runs follow a release on trial, and return what its launcher says of that.
+
+        A launcher that cannot is ended, and the release started.
+        """
+        self.trial = {"active": True, "host": host}
+        _write(self.runtime / f"{self.unit}.d" / "trial.conf", f"# its launcher follows release {release}\n")
+        try:
+            return self._followed(release, host)
+        except HostError as error:
+            self.stop()
+            self.start(release)
+            return f"started anew: {error}"
+
+    def _followed(self, release: str, host: str) -> str:
+        """Let the launcher follow a release; files that are not built are the same, and where they were.
+
+        Raises:
+            HostError: if it does not.
+        """
+        folder = self._launched_from()
+        if folder is None:
+            raise HostError("its launcher is not a release's")
+        self.running = self.base / "releases" / release
+        words = ["up", str(self.running / "plan.json"), "--host", host, "--update", "--build-dir", str(folder)]
+        done = self._tfcompose(words, UNIT_S)
+        if done.returncode != 0:
+            raise HostError(_last_line(done.stderr) or "its launcher does not follow")
+        return done.stdout.strip().rpartition("; ")[2] or "nothing starts again"
+
     def wait(self, seconds: float) -> dict[str, Any]:
         """Return the status once the robot is ready, it has failed, or after so many seconds."""
         end = time.monotonic() + seconds
@@ -294,7 +328,8 @@ class Agent:
         trial, self.trial, self.running = self.trial, None, None
         if trial is None:
             return None
-        self._systemctl("stop", self.unit)
+        if "host" not in trial:
+            self._systemctl("stop", self.unit)
         if "before" in trial:
             if trial["before"]:
                 _link(self.base / "current", f"releases/{trial['before']}")
@@ -306,8 +341,19 @@ class Agent:
         self._end_trial()
         release = self._release("current")
         if release and trial["active"]:
-            self._must("start", self.unit)
+            self._return(release, trial.get("host"))
         return {"release": release, "active": bool(release and trial["active"])}
+
+    def _return(self, release: str, host: str | None) -> None:
+        """Run the current release again; a ``host`` whose launcher followed another goes on."""
+        if host is not None:
+            with contextlib.suppress(HostError):
+                self._followed(release, host)
+                self.running = None
+                return
+            self.running = None
+            self._systemctl("stop", self.unit)
+        self._must("start", self.unit)
 
     # Everything else.
 
@@ -350,8 +396,8 @@ class Agent:
         return str(own) if own.exists() else self._executable()
 
     def _command(self, words: list[str]) -> list[str]:
-        files = " ".join(str(Path(file).expanduser()) for file in self.setup)
-        return ["/bin/bash", "-c", self.sourcing, files, *words] if self.setup else words
+        files = [str(Path(file).expanduser()) for file in self.setup]
+        return ["/bin/bash", "-c", self.sourcing, "bash", *files, "--", *words] if files else words
 
     def _program(self, words: list[str], seconds: float = PROGRAM_S) -> subprocess.CompletedProcess[str]:
         return _run(self._command(words), seconds, self._environment())
@@ -402,8 +448,19 @@ class Agent:
         named = ((path.relative_to(folder).as_posix(), path) for path in files)
         return {name: digest_of(path.read_bytes()) for name, path in named if not name.startswith("venv/")}
 
+    def _launched_from(self) -> Path | None:
+        """Return the folder of the plan that the running launcher was started with: it is given files below it."""
+        pid = self._shown().get("MainPID") or "0"
+        try:
+            words = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            return None
+        plans = [Path(os.fsdecode(word)) for word in words if word.endswith(b"/plan.json")]
+        return plans[0].parent if plans and plans[0].is_relative_to(self.base) else None
+
     def _prune(self) -> None:
-        kept = {self._release("current"), self._release("previous")}
+        launched = self._launched_from()
+        kept = {self._release("current"), self._release("previous"), launched.name if launched else None} - {None}
         folders = sorted((self.base / "releases").iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
         for folder in [one for one in folders if one.name not in kept][max(KEPT - len(kept), 0) :]:
             shutil.rmtree(folder, ignore_errors=True)
@@ -434,10 +491,10 @@ def _read(file: str) -> str:
     return ""
 
 
-def _text(file: Path) -> str | None:
+def _text(file: Path, most: int | None = MOST_TEXT) -> str | None:
     try:
         data = file.read_bytes()
-        return data.decode() if len(data) <= MOST_TEXT else None
+        return data.decode() if most is None or len(data) <= most else None
     except (OSError, ValueError):
         return None
 
@@ -460,8 +517,8 @@ def _link(link: Path, target: str) -> None:
 
 #: What may be asked.
 _REQUESTS = (
-    "probe", "clock", "state", "texts", "take_lock", "chunk", "unpack", "rehearse", "discard", "stop", "start", "wait",
-    "commit", "settle", "back", "execute",
+    "probe", "clock", "state", "texts", "take_lock", "chunk", "unpack", "rehearse", "discard", "stop", "start",
+    "follow", "wait", "commit", "settle", "back", "execute",
 )  # fmt: skip
 
 

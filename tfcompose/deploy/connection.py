@@ -39,7 +39,7 @@ START = (
 class Settings:
     """What the agent is given first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name.
 
-    ``sourcing`` is the line of bash that sources the files of its first argument, and becomes the command.
+    ``sourcing`` is the line of bash that sources the files before ``--``, and becomes the command behind it.
     """
 
     name: str

@@ -77,7 +77,7 @@ class Release:
     @property
     def name(self) -> str:
         """The release's name."""
-        return digest_of(repr(sorted(self.manifest.items())).encode())[:NAME_LENGTH]
+        return name_of(self.manifest)
 
     @property
     def has_wheels(self) -> bool:
@@ -100,6 +100,11 @@ class Release:
             for path, file in self.copies.items():
                 yield from _added(tar, buffer, path, file.read_bytes(), executable=os.access(file, os.X_OK))
         yield buffer.getvalue()
+
+
+def name_of(manifest: Mapping[str, str]) -> str:
+    """Return the name of the release that has these files, by their digests."""
+    return digest_of(repr(sorted(manifest.items())).encode())[:NAME_LENGTH]
 
 
 def _added(tar: tarfile.TarFile, buffer: io.BytesIO, path: str, data: bytes, *, executable: bool) -> Iterator[bytes]:

@@ -1,8 +1,8 @@
 """The order in which a release comes to all hosts, or to none.
 
 Ask every host what it has; take every lock; send the release and rehearse it. Only then end what runs, on all hosts,
-start the release on trial, and wait until every edge of every host is live. Then keep it everywhere, or go back
-everywhere.
+start the release on trial, and wait until every edge of every host is live; launchers that can follow the release go on
+meanwhile. Then keep it everywhere, or go back everywhere.
 """
 
 from __future__ import annotations
@@ -19,8 +19,11 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.deploy.agent import UNIT
 from tfcompose.deploy.connection import Host, LostError, RefusedError, connected, settings_of
+from tfcompose.deploy.following import can_follow, same_files
+from tfcompose.deploy.release import name_of
 from tfcompose.deploy.unit import Unit
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
+from tfcompose.plan.file import read_plan
 from tfcompose.plan.hosts import hosts_of, share_of, without_computer
 from tfcompose.text import counted, duration, listed
 
@@ -33,6 +36,8 @@ if TYPE_CHECKING:
 
 #: A part of a release that is sent at once, in bytes.
 CHUNK = 1_000_000
+#: The plan among a release's files.
+PLAN = "plan.json"
 #: How long a host waits before it says how far it is, in seconds.
 SLICE_S = 3.0
 #: So many names are listed.
@@ -59,7 +64,10 @@ class Target:
 
 @dataclass(slots=True)
 class Share:
-    """A host while it is deployed to: what it has, and what it is to have."""
+    """A host while it is deployed to: what it has, and what it is to have.
+
+    ``follows`` says that its launcher can change to the release while it runs.
+    """
 
     host: Host
     unit: Unit
@@ -67,6 +75,7 @@ class Share:
     state: dict[str, Any] = field(default_factory=dict)
     release: Release | None = None
     goal: str = ""
+    follows: bool = False
 
     @property
     def name(self) -> str:
@@ -96,7 +105,7 @@ class Share:
         lines = [f"{path}: {word}" for word, paths in words for path in sorted(paths)]
         if self.state["unit"] != self.unit.text():
             lines.append(f"{self.unit.file}: {'changed' if self.state['unit'] else 'new'}")
-        if not lines and not self.state["active"]:
+        if not lines and (self.state["unsettled"] or not self.state["active"]):
             lines.append(f"{self.unit.file}: started")
         if not lines and not self.state["enabled"]:
             lines.append(f"{self.unit.file}: enabled")
@@ -138,6 +147,34 @@ class Rollout:
             share.state = states[share.name]
             share.release = release.with_text(UNIT, share.unit.text())
             share.goal = share.release.name
+        await self._decide_who_follows(release.plan)
+
+    async def _decide_who_follows(self, plan: Plan) -> None:
+        """Find out which hosts can go on while they change, which all of them have to allow."""
+        changing = [one for one in self.shares if one.changes() and one.state["release"]]
+        texts = await asyncio.gather(*(one.host.ask("texts", paths=[PLAN], any_size=True) for one in changing))
+        try:
+            before = [read_plan(some[PLAN], PLAN) for some in texts if some.get(PLAN)]
+        except RejectedError:  # another version's
+            return
+        if len(before) < len(changing) or not all(can_follow(one, plan) for one in before):
+            return
+        for share in changing:
+            share.follows = self._is_sound(share) and same_files(share.state["files"], share.wanted.manifest)
+
+    def _is_sound(self, share: Share) -> bool:
+        """Whether a host runs its release as it was brought there, with all that it starts."""
+        state, robot = share.state, share.state["robot"]
+        if (
+            robot is None
+            or state["failed"]
+            or state["unsettled"]
+            or not state["active"]
+            or state["unit"] != share.unit.text()
+        ):
+            return False
+        late = any(one["failed"] or not one["ready"] for one in robot["processes"] if one["kind"] != "external")
+        return not late and name_of(state["files"]) == state["release"]
 
     def strangers(self) -> list[Finding]:
         """Return which robots run on hosts without having been deployed."""
@@ -231,16 +268,19 @@ class Rollout:
     async def activate(self) -> str:
         """Start each host's goal on trial, and keep it once everything is live; return what there is to say.
 
-        A host that has its goal already, and runs it, goes on.
+        A host that has its goal already, and runs it, goes on; on one that can follow, only what is different starts
+        again.
 
         Raises:
             RejectedError: with what is missing, or which host was lost, and what the others went back to.
         """
         begun = time.monotonic()
         changing = [one for one in self.shares if one.changes()]
+        anew = [one for one in changing if not one.follows]
         try:
-            await self._all(lambda one: self._ask(one, "stop"), changing)
-            await self._all(lambda one: self._ask(one, "start", release=one.goal), changing)
+            await self._all(lambda one: self._ask(one, "stop"), anew)
+            await self._all(lambda one: self._ask(one, "start", release=one.goal), anew)
+            await self._all(self._follow, [one for one in changing if one.follows])
             live = await self._until_live(begun) if self.target.waits else "started"
             await self._all(lambda one: self._ask(one, "commit", release=one.goal), changing)
         except RejectedError as error:
@@ -252,6 +292,10 @@ class Rollout:
             raise
         await self._all(self._settle, changing)
         return f"{live} after {duration(time.monotonic() - begun)}"
+
+    async def _follow(self, share: Share) -> None:
+        answer = await self._ask(share, "follow", release=share.goal, host=share.name)
+        self.report(f"{share.name}: {answer}")
 
     async def _settle(self, share: Share) -> None:
         try:
@@ -318,7 +362,7 @@ class Rollout:
             message = f"{len(missing)} of {len(expected)} edges are not live on {share.name}: "
             found.append(finding("TF917", message + listed(named, NAMED_AT_MOST), at))
         if late:
-            named = [f"{one['name']} ({one['detail'] or one['waits'] or one['state'].lower()})" for one in late]
+            named = [f"{one['name']} ({one['detail'] or one['waits'] or one['state']})" for one in late]
             found.append(finding("TF917", f"not ready on {share.name}: {listed(named, NAMED_AT_MOST)}", at))
         return found
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tfcompose.export.supervisors import SOURCING, quoted
+from tfcompose.export.supervisors import quoted, sourced
 
 #: How long everything on a host has to end: the launcher ends processes one after the other.
 STOP_S = 90
@@ -60,6 +60,4 @@ class Unit:
         at = f"{self.base}/current"
         python = f"{at}/venv/bin/python" if self.has_wheels else self.python
         words = [python, "-m", "tfcompose", "up", f"{at}/plan.json", "--host", self.host, "--no-live"]
-        if self.setup:
-            words = ["/bin/bash", "-c", SOURCING, " ".join(self.setup), *words]
-        return " ".join(quoted(word).replace("$", "$$") for word in words)
+        return " ".join(quoted(word).replace("$", "$$") for word in sourced(self.setup, words))

@@ -16,23 +16,29 @@ from tfcompose.tf2.pose_buffer import PoseBuffer
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.geometry import Pose
     from tfcompose.language import FleetSpec
 
-#: A robot sends twice a second: after this time without anything, its link is stale, in seconds.
+#: A robot sends twice a second: where the last that came was sent longer ago, its link is stale, in seconds.
 STALE_S = 2.0
 #: An edge is stale after so many periods, and never before ``STALE_S``.
 _PERIODS = 4.0
 #: By so much the clocks of two computers may differ, in seconds.
 CLOCK_S = 0.5
 _RETRY_S = 1.0
+_LATE = "is its link slow? else its clock is behind: chrony, or systemd-timesyncd"
 _SECOND_NS = 1_000_000_000
 
 LinkState = Literal["live", "stale", "silent", "unreachable"]
 
 
+class StaleError(Exception):
+    """Raised where a pose needs a link or an edge that is stale; the message names the first of them."""
+
+
 @dataclass(frozen=True, slots=True)
 class EdgeStatus:
-    """A shared edge, by its names in the fleet; ages are in seconds, None: it never came.
+    """A shared edge, by its names in the fleet; ages are in seconds since it was sent, None: it never came.
 
     ``delay_s`` is its last arrival here minus its stamp, by the two computers' clocks; None for a fixed edge.
     """
@@ -48,8 +54,9 @@ class EdgeStatus:
 class RobotStatus:
     """What is known of a robot: whether it is reached, how long ago it sent, and what it shares.
 
-    live: it sends; stale: nothing came for ``STALE_S``; silent: its router is reached, and it has sent nothing yet;
-    unreachable: its router is not.
+    live: it sends; stale: nothing came that was sent within ``STALE_S``; silent: its router is reached, and it has sent
+    nothing yet; unreachable: its router is not. ``delay_s`` is how long what came last was on its way, by the two
+    computers' clocks.
     """
 
     robot: str
@@ -57,13 +64,15 @@ class RobotStatus:
     state: LinkState
     age_s: float | None
     edges: tuple[EdgeStatus, ...]
+    delay_s: float = 0.0
 
 
 @dataclass(slots=True)
 class _Link:
-    """What came of a robot; times are of the monotonic clock, in seconds."""
+    """What came of a robot; times are when it was sent, by the monotonic clock here, in seconds."""
 
     last: float | None = None
+    delay_s: float = 0.0
     edges: dict[tuple[str, str], tuple[float, float | None]] = field(default_factory=dict)
     decoder: Decoder = field(default_factory=Decoder)
 
@@ -76,6 +85,10 @@ class FleetObserver:
         self.buffer = PoseBuffer()
         self._lock = threading.Lock()
         self._links = {robot: _Link() for robot in fleet.robots}
+        ends = (
+            [fleet.final(one, frame) for frame in edge.ends] for one in fleet.robots for edge in fleet.edges_of(one)
+        )
+        self._parents = {child: parent for parent, child in ends}
         self._sessions: dict[str, Any] = {}
         self._ended = threading.Event()
         self._threads = [
@@ -110,10 +123,37 @@ class FleetObserver:
         with self._lock:
             return [self._status(robot, now) for robot in self.fleet.robots]
 
+    def pose(self, target: str, source: str) -> tuple[Pose, int | None]:
+        """Return the newest pose of ``source`` in ``target``, and its stamp as ``PoseBuffer.latest`` does.
+
+        Raises:
+            StaleError: if a link or an edge between the two is stale; the buffer still has its last pose.
+            TransformException: if there is none.
+        """
+        needed = self._between(target, source)
+        for one in self.status():
+            edges = [edge for edge in one.edges if edge.child in needed]
+            if edges and one.age_s is not None and one.age_s > STALE_S:
+                raise StaleError(f"the link to {one.robot} is stale")
+            for edge in edges:
+                if edge.stale:
+                    raise StaleError(f"{edge.parent} → {edge.child} of {one.robot} is stale")
+        return self.buffer.latest(target, source)
+
     def findings(self) -> Iterator[Finding]:
         """Yield what is wrong now."""
         for one in self.status():
             yield from problems_of(one)
+
+    def _between(self, target: str, source: str) -> set[str]:
+        """Return the children of the fleet's edges that are between two frames."""
+        chains = []
+        for frame in (target, source):
+            chain = [frame]
+            while (parent := self._parents.get(chain[-1])) is not None and parent not in chain:
+                chain.append(parent)
+            chains.append(set(chain))
+        return chains[0] ^ chains[1]
 
     def _status(self, robot: str, now: float) -> RobotStatus:
         link, router = self._links[robot], self.fleet.robots[robot].router
@@ -125,7 +165,7 @@ class FleetObserver:
             stale = age_s is not None and age_s > max(STALE_S, _PERIODS / shared.rate)
             edges.append(EdgeStatus(parent, child, age_s, delay_s, stale))
         age_s = None if link.last is None else now - link.last
-        return RobotStatus(robot, router, self._state(router, age_s), age_s, tuple(edges))
+        return RobotStatus(robot, router, self._state(router, age_s), age_s, tuple(edges), link.delay_s)
 
     def _state(self, router: str, age_s: float | None) -> LinkState:
         if age_s is not None and age_s <= STALE_S:
@@ -153,16 +193,19 @@ class FleetObserver:
 
     def _take(self, robot: str, static: bool, sample: Any) -> None:  # noqa: FBT001 (given by partial)
         now, now_ns = time.monotonic(), time.time_ns()
+        time_s = now_ns / _SECOND_NS
         with self._lock:
             link = self._links[robot]
             try:
                 rows = tuple(link.decoder.rows(bytes(sample.payload)))
             except ValueError:
                 return
-            link.last = now
+            link.delay_s = 0.0 if sample.timestamp is None else time_s - sample.timestamp.get_time().timestamp()
+            sent = now - max(link.delay_s, 0.0)  # what waited in a link that was cut is as old as it is
+            link.last = max(sent, link.last or sent)
             for row in rows:
                 stamp_ns = row[2] * _SECOND_NS + row[3]
-                link.edges[row[0], row[1]] = (now, None if static else (now_ns - stamp_ns) / _SECOND_NS)
+                link.edges[row[0], row[1]] = (sent, None if static else (now_ns - stamp_ns) / _SECOND_NS)
         self.buffer.insert(rows, static=static, authority=robot)
 
 
@@ -174,18 +217,21 @@ def problems_of(one: RobotStatus) -> Iterator[Finding]:
         yield finding("TF882", f"the router of {one.robot} at {one.router} is not reached{ago}", None, help=advice)
         return
     if one.state == "stale":
-        message = f"the link to {one.robot} is stale: nothing came for {one.age_s:.1f} s"
-        yield finding("TF883", message, None, help=f"does its process still run? tfcompose fleet share {one.robot}")
+        message = f"the link to {one.robot} is stale: what came last was sent {one.age_s:.1f} s ago"
+        advice = _LATE if one.delay_s > CLOCK_S else f"does its process still run? tfcompose fleet share {one.robot}"
+        yield finding("TF883", message, None, help=advice)
         return
     if one.state == "silent":
         advice = f"start it on the robot: tfcompose fleet share {one.robot}"
         message = f"{one.robot} shares nothing: its router is reached, and nothing came"
         yield finding("TF883", message, None, help=advice)
         return
+    if one.delay_s > CLOCK_S:
+        yield finding("TF885", f"what {one.robot} sends comes {one.delay_s:.1f} s after it was sent", None, help=_LATE)
     for edge in one.edges:
         name = f"{edge.parent} → {edge.child}"
         if edge.age_s is None or edge.stale:
-            when = "never came" if edge.age_s is None else f"came {edge.age_s:.1f} s ago"
+            when = "never came" if edge.age_s is None else f"was sent {edge.age_s:.1f} s ago for the last time"
             advice = "does the robot publish it under these names? tfcompose doctor on the robot"
             yield finding("TF884", f"{name} of {one.robot} {when}", None, help=advice)
         elif edge.delay_s is not None and edge.delay_s < -CLOCK_S:

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from tfcompose.signals import Stop
 
 
-def share(fleet: FleetSpec, robot: str, stop: Stop, say: Callable[[str], None]) -> None:
-    """Share a robot's edges until ``stop`` is requested.
+def share(fleet: FleetSpec, robot: str, namespace: str, stop: Stop, say: Callable[[str], None]) -> None:
+    """Share a robot's edges until ``stop`` is requested; ``namespace`` is that of its TF topics.
 
     Raises:
         RosError: if ROS cannot start a node.
     """
     sender = Sender(fleet, robot, say)
-    moving, fixed = topics_below(fleet.robots[robot].namespace)
+    moving, fixed = topics_below(namespace)
     topics = [Topic(fixed, static=True, qos=None), Topic(moving, static=False, qos=None)]
     listener = ThreadListener(sender.on_message, topics, use_sim_time=False)
     listener.start()

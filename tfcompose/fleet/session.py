@@ -23,6 +23,7 @@ def connected(router: str) -> Any:
         "connect/endpoints": [router],
         "connect/timeout_ms": _CONNECT_MS,
         "scouting/multicast/enabled": False,
+        "timestamping/enabled": True,  # when it was sent, by the clock of who sends
     }
     for name, value in settings.items():
         config.insert_json5(name, json.dumps(value))

@@ -41,6 +41,20 @@ def _by_name(value: Any) -> Any:
 Shared = Annotated[SharedEdge, BeforeValidator(_by_name, Text | SharedEdge)]
 
 
+class FleetMember(Spec):
+    """Which robot of a fleet this is: it shares the edges that the fleet's file names."""
+
+    file: Text = key(..., "the fleet's file, relative to the file that names it", "fleet.yaml")
+    robot: Text | None = key(None, "which of the fleet's robots this is; default: the robot's name", "r1")
+
+
+def _by_file(value: Any) -> Any:
+    return {"file": value} if isinstance(value, str) else value
+
+
+Member = Annotated[FleetMember, BeforeValidator(_by_file, Text | FleetMember)]
+
+
 class FleetRobot(Spec):
     """A robot: where its router is, and what of its tree the others get."""
 

@@ -9,7 +9,7 @@ from tfcompose.findings import Finding, Note, finding
 from tfcompose.model import GUARD, STATIC, Process
 from tfcompose.plan import Ready
 from tfcompose.plan.middleware import IMPLEMENTATIONS, ROUTER, ROUTER_LISTENS, ROUTER_PROGRAM, router_variables
-from tfcompose.resolve.processes import how
+from tfcompose.resolve.processes import added, says_how
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,8 +28,7 @@ _PROGRAM = ("rmw_zenoh_cpp", "rmw_zenohd")
 
 def is_own_router(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> bool:
     """Return whether a process is the router that nobody has to declare: what stands under its name adds to it."""
-    says_how = declared and (declared.run or declared.external or declared.simulate or declared.component)
-    return spec.ros.rmw == "zenoh" and name == ROUTER and not says_how
+    return spec.ros.rmw == "zenoh" and name == ROUTER and not says_how(declared)
 
 
 def own_router(spec: RobotSpec, source: Source) -> list[Process]:
@@ -42,12 +41,8 @@ def own_router(spec: RobotSpec, source: Source) -> list[Process]:
     process = Process(
         ROUTER, "run", at=source.at_key(path), argv=(ROUTER_PROGRAM,), restart="on-failure", emulate_tty=True
     )
-    if declared:
-        stated = how(declared, spec.ros.namespace, "built-in")
-        process = replace(process, **{key: stated[key] for key in stated if key in declared.model_fields_set})
-    static = spec.processes.get(STATIC)
-    host = process.host or (static.host if static else None)
-    return [replace(process, ready=process.ready or _READY, host=host)]
+    process = added(process, declared, spec)
+    return [replace(process, ready=process.ready or _READY)]
 
 
 def with_router(robot: Robot) -> Robot:

@@ -49,13 +49,17 @@ class _Work:
     def _node(self, node: Node, process: Process) -> Node:
         params: dict[str, Any] = {}
         places: dict[str, tuple[Span, ...]] = {}
-        for file, place in self._files_of(node):
+        without: list[Finding] = []
+        files = self._files_of(node)
+        for file, place in files:
             if isinstance(file, str) and file:
-                given = self._params_in(file, place, node, process)
+                given = self._params_in(file, place, node, process, without)
                 places |= {key: (place, value.at) for key, value in given.items() if isinstance(value, Word)}
                 params = _laid_over(params, _words(given))
             else:
                 self.found.append(finding("TF103", "params: file takes the names of files", place))
+        if len(without) == len(files):  # a file that all nodes are given need not have something for each
+            self.found += without
         has_files = names_files(node.params)
         inline = {key: value for key, value in node.params.items() if not (has_files and key == FILE_KEY)}
         paths = {key: (*node.path, "params", key) for key in inline}
@@ -70,8 +74,8 @@ class _Work:
         paths = [(named, at)] if isinstance(named, str) else [(one, (*at, i)) for i, one in enumerate(named)]
         return [(file, self.source.at(path)) for file, path in paths]
 
-    def _params_in(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:
-        """Return what a file says to the node, in words; a file that says nothing to it is a finding."""
+    def _params_in(self, file: str, at: Span, node: Node, process: Process, without: list[Finding]) -> dict[str, Any]:
+        """Return what a file says to the node, in words; ``without`` gets a finding if it says nothing to it."""
         call = OF_FILES.fullmatch(file)
         path = path_named(call[2] if call else file, at)
         loaded = self._load(path, at)
@@ -80,7 +84,7 @@ class _Work:
         namespace = self.namespace if process.namespace is None else process.namespace
         meant = [one for one in loaded.nodes if matches(full_name(namespace, one.name), node.name)]
         if not meant and not loaded.found:
-            self.found.append(_nothing(path, at, node, process, loaded.nodes))
+            without.append(_nothing(path, at, node, process, loaded.nodes))
         params: dict[str, Any] = {}
         for one in meant:
             params = _laid_over(params, one.params)
@@ -112,7 +116,7 @@ def _nothing(path: str, at: Span, node: Node, process: Process, there: Sequence[
     notes = [Note(f"it has {meant.name}", meant.at)] if meant else []
     advice = f"call it {node.name} there, or give the process that node: it has {', '.join(names) or 'no node'}"
     message = f"{path} has no parameters for {node.name}, the node of {process.name}"
-    return finding("TF334", message, at, help=advice, notes=notes)
+    return finding("TF334", message, at, help=advice, notes=notes, severity="warning")
 
 
 def matches(pattern: str, name: str) -> bool:

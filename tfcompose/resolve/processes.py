@@ -243,12 +243,28 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
     return own
 
 
+def says_how(declared: ProcessSpec | None) -> bool:
+    """Return whether it is said how a process runs: else what stands under its name adds to one of tfcompose's own."""
+    return declared is not None and bool(declared.run or declared.external or declared.simulate or declared.component)
+
+
+def added(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
+    """Return a process that tfcompose adds, with what stands under its name; it runs where ``static`` does."""
+    if declared:
+        stated = how(declared, spec.ros.namespace, "built-in")
+        process = replace(process, **{key: stated[key] for key in stated if key in declared.model_fields_set})
+    static = spec.processes.get(STATIC)
+    return replace(process, host=process.host or (static.host if static else None))
+
+
 def built_in_keys(name: str, declared: ProcessSpec, source: Source) -> list[Finding]:
     """Return findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
     known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
     wrong = declared.model_fields_set - known
     advice = f"its keys can be: {', '.join(sorted(known))}"
+    if wrong & RUNNING:
+        advice = f"give what {'joints publishes from' if name == JOINTS else 'you start'} a name of its own; {advice}"
     found = [
         finding("TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice)
         for key in wrong

@@ -17,6 +17,7 @@ from tfcompose.model import Edge, Process, Robot, may_be_refused
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.containers import component_findings, component_process, container_process
 from tfcompose.resolve.edges import Drafts, source_numbers
+from tfcompose.resolve.fleet import is_own_share, own_share, wrong_membership
 from tfcompose.resolve.hosts import hosts_of, with_host_place
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.middleware import is_own_router, own_router, with_router, wrong_middleware
@@ -137,6 +138,7 @@ class _Work:
         self.found += self._wrong_components(robot)
         if self.holder is None:
             self.found += wrong_middleware(robot, self.spec, self.source)
+            self.found += wrong_membership(robot, self.spec, self.source, self.read)
             robot = with_router(robot)
         return Resolved(robot, (*self.of_parts, *self.found), self.collected)
 
@@ -298,10 +300,10 @@ def _has_calibrations(spec: RobotSpec) -> bool:
 def _processes(validated: Validated, found: list[Finding], *, is_part: bool) -> list[Process]:
     processes = built_in(validated.spec, validated.source)
     spec = validated.spec
-    processes += [] if is_part else own_router(spec, validated.source)
+    processes += [] if is_part else [*own_router(spec, validated.source), *own_share(spec, validated.source)]
     processes += [container_process(name, declared, validated) for name, declared in spec.containers.items()]
     for name, declared in spec.processes.items():
-        if is_own_router(name, declared, spec):
+        if is_own_router(name, declared, spec) or is_own_share(name, declared, spec):
             found += built_in_keys(name, declared, validated.source)
             continue
         process, refused = user_process(name, declared, validated)

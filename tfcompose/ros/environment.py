@@ -161,7 +161,7 @@ def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
                 f"rmw: {ros.rmw} needs {name}, which is not installed",
             )
         advice += f"; here is {', '.join(here)}" if here else ""
-        return finding("TF909", message, None, help=advice)
+        return finding("TF901", message, None, help=advice)
     if not is_fastdds({RMW: name}) and find_spec("tf2_msgs") is None:
         advice = f"install ros-{_release(ros)}-tf2-msgs, or use {IMPLEMENTATIONS['fastdds']}"
         return finding("TF901", f"with {name} the package tf2_msgs is needed, and is not installed", None, help=advice)

@@ -47,6 +47,8 @@ _ROUTER = '["tcp/localhost:7447"]'
 _TF_TYPE = "tf2_msgs::msg::dds_::TFMessage_"
 #: So many messages wait to be taken.
 _MOST_WAITING = 20_000
+#: So many tokens that came or went wait until somebody asks for publishers.
+_MOST_TOKENS = 100_000
 #: So many latched messages of a publisher are asked for.
 _LATCHED = 100
 
@@ -145,33 +147,39 @@ def open_session(environment: Mapping[str, str]) -> zenoh.Session:
 
 
 class ZenohGraph:
-    """The publishers of a domain, as long as its session lives; their tokens come by themselves."""
+    """The publishers of a domain, as long as its session lives.
+
+    Tokens wait in a channel until somebody asks: a callback would have a thread of its own, which Python waits for
+    before it calls what ends the session.
+    """
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
         self._lock = threading.Lock()
         self._publishers: dict[str, TokenOfPublisher] = {}
         self._subscriber: Any = session.liveliness().declare_subscriber(
-            f"{_SPACE}/{domain}/**", self._changed, history=True
+            f"{_SPACE}/{domain}/**", zenoh.handlers.FifoChannel(_MOST_TOKENS), history=True
         )
 
     def publishers(self, topic: str) -> list[TokenOfPublisher]:
         """Return who publishes on the topic now, by its full name, sorted by node and id."""
         with self._lock:
+            self._take()
             found = [one for one in self._publishers.values() if one.topic == topic]
         return sorted(found, key=lambda one: (one.node, one.gid))
 
     def node_of(self, gid: bytes) -> str | None:
         """Return the full name of the node whose publisher has this id; None while it is not known."""
         with self._lock:
+            self._take()
             return next((one.node for one in self._publishers.values() if one.gid == gid), None)
 
     def close(self) -> None:
         """End the subscription."""
         self._subscriber.undeclare()
 
-    def _changed(self, sample: zenoh.Sample) -> None:
-        token = str(sample.key_expr)
-        with self._lock:
+    def _take(self) -> None:
+        while sample := self._subscriber.try_recv():
+            token = str(sample.key_expr)
             if sample.kind == zenoh.SampleKind.DELETE:
                 self._publishers.pop(token, None)
             elif one := publisher_of(token):

@@ -1,0 +1,55 @@
+"""A guard that reads TF from Zenoh, as that of a robot with rmw_zenoh does, where rclpy has no such middleware.
+
+Its node stays on the middleware that is there, and finds nobody; messages come by eclipse-zenoh, with the ids of their
+attachments, and who publishes is asked of liveliness tokens, as always on Zenoh.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+#: Read by each Python that starts.
+_SITE = """
+import sys
+if "tfcompose.guard" in sys.orig_argv:
+    import atexit
+    import os
+    import tfcompose.ros.graph as graph
+    import tfcompose.ros.node as node
+    from tfcompose.ros.zenoh_graph import ZenohTF, domain_of, open_session
+    graph.get_rmw_implementation_identifier = node.middleware = lambda: "rmw_zenoh_cpp"
+    graph._ask = lambda node: False
+    session, open_here = open_session(os.environ), []
+    atexit.register(session.close)
+    class ZenohSubscription(node.TFSubscription):
+        def __init__(self, of, *, static, topic=None, deep=False):
+            super().__init__(of, static=static, topic=topic, deep=deep)
+            self._static = static
+            self._zenoh = ZenohTF(session, domain_of(os.environ), (self.topic, self.topic))
+            open_here.append(self._zenoh)
+        def take(self):
+            return [self._as_received(one) for one in self._zenoh.take() if one.static == self._static]
+        def _as_received(self, one):
+            gid, source_ns, sequence = None, 0, 0
+            if one.attachment:
+                gid, source_ns, sequence = one.attachment.gid, one.attachment.source_ns, one.attachment.sequence
+            return node.Received(one.data, gid, source_ns, one.received_ns, sequence, gid)
+    node.TFSubscription = ZenohSubscription
+    import tfcompose.live.topics as topics
+    def close(self):
+        for one in open_here:
+            one.close()
+    topics.TFTopics.close = close
+"""
+
+
+def guard_on_zenoh(folder: Path, router: str) -> dict[str, str]:
+    """Return what makes guards read Zenoh that are started with it in their environment."""
+    site = folder / "site"
+    site.mkdir()
+    (site / "sitecustomize.py").write_text(_SITE, encoding="utf-8")
+    override = f'mode="peer";connect/endpoints=["{router}"]'
+    return {
+        "PYTHONPATH": os.pathsep.join([str(site), *filter(None, sys.path)]),
+        "ZENOH_CONFIG_OVERRIDE": override,
+    }

@@ -1,0 +1,104 @@
+"""An interactive shell on a terminal, which an emulator reads."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import struct
+import sys
+import termios
+import threading
+from typing import TYPE_CHECKING
+
+import psutil
+import pyte
+
+from tests.support import processes
+from tests.support.waiting import until
+
+if TYPE_CHECKING:
+    import subprocess
+    from pathlib import Path
+
+#: Runs a program with this terminal as its own, as a window has it.
+_OWNER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
+PROMPT = "shell$ "
+#: How each shell is started without files of the user's, with that prompt.
+COMMANDS = {
+    "bash": ["bash", "--norc", "-i"],
+    "zsh": ["zsh", "-f", "-i"],
+    "fish": ["fish", "--no-config", "-i", "-C", f"function fish_prompt; echo -n '{PROMPT}'; end"],
+}
+
+
+class Shell:
+    """An interactive shell on a terminal of 80 columns; what it shows is on ``screen``, and all bytes in ``text``."""
+
+    def __init__(self, folder: Path, shell: str = "bash", **environment: str) -> None:
+        self.screen = pyte.Screen(80, 24)
+        self._stream = pyte.Stream(self.screen)
+        self._master, slave = pty.openpty()
+        self.text = ""
+        self.resize(80, 24)
+        env = os.environ | {"TERM": "xterm-256color", "PS1": PROMPT, "CI": "", "NO_COLOR": ""} | environment
+        command = [sys.executable, "-c", _OWNER, *COMMANDS[shell]]
+        self.process: subprocess.Popen[str] = processes.start(
+            command, stdin=slave, stdout=slave, stderr=slave, cwd=folder, env=env
+        )
+        self._slave = slave
+        self.reads = threading.Event()
+        self.reads.set()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.shows(PROMPT)
+
+    def _read(self) -> None:
+        with contextlib.suppress(OSError):
+            while data := os.read(self._master, 1 << 16):
+                self.reads.wait()
+                text = data.decode(errors="replace")
+                self.text += text
+                self._stream.feed(text)
+
+    def type(self, text: str) -> None:
+        """Type it, with a key for each character."""
+        os.write(self._master, text.encode())
+
+    @property
+    def shown(self) -> str:
+        """What the screen shows."""
+        return "\n".join(list(self.screen.display))
+
+    def shows(self, *words: str) -> None:
+        """Wait until the screen shows them all."""
+        assert until(lambda: all(word in self.shown for word in words)), self.shown
+
+    def resize(self, columns: int, rows: int) -> None:
+        """Give the window another size."""
+        self.screen.resize(rows, columns)
+        fcntl.ioctl(self._master, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+
+    def up(self, *words: str) -> None:
+        """Type ``tfcompose up`` of the folder's robot."""
+        self.type(f"{sys.executable} -m tfcompose up robot.yaml {' '.join(words)}\n")
+
+    def view(self) -> psutil.Process:
+        """Return the process that shows the live view: the shell's own child."""
+        return psutil.Process(self.process.pid).children()[0]
+
+    def below(self) -> list[psutil.Process]:
+        """Return the processes that it started, and those that they did."""
+        return psutil.Process(self.process.pid).children(recursive=True)
+
+    def close(self) -> None:
+        """End it, and all that it started."""
+        self.reads.set()
+        with contextlib.suppress(psutil.Error):
+            for one in self.below():
+                one.kill()
+        processes.end(self.process)
+        os.close(self._slave)
+        self._reader.join(5)
+        os.close(self._master)

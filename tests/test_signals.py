@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tests.support.waiting import until
 from tfcompose.cli import main
 from tfcompose.cli.parser import COMMANDS
 from tfcompose.launcher.supervisor import Signals
@@ -58,6 +59,18 @@ def test_who_waits_in_ros_takes_it_once(lost: list[object]) -> None:
         with Stop() as stop:
             assert not stop.requested
     assert not lost, "it would be printed"
+
+
+def test_an_interrupt_comes_to_pydantic_as_soon_as_that_has_returned() -> None:
+    """Its Rust prints a panic of what Python raises while it loads."""
+    pydantic = {"__name__": "pydantic_core", "send_an_interrupt": send_an_interrupt}
+    exec("def load():\n    send_an_interrupt()\n    return 'loaded'", pydantic)  # noqa: S102 (a module of that name)
+    with RememberedInterrupt():
+        assert pydantic["load"]() == "loaded"  # type: ignore[operator]
+        with pytest.raises(KeyboardInterrupt):
+            until(lambda: False)
+        assert take_interrupt()
+    assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
 
 
 @pytest.mark.parametrize("error", [RuntimeError("Error calling __set_name__"), BaseException("a panic of Rust")])

@@ -221,8 +221,8 @@ GUARD_ORDERS = TaggedUnion[GuardOrder]("order", get_args(GuardOrder))
 
 # Notices: from the launcher to a person, and to clients of its control socket.
 
-#: supervisord's names, and EXPECTED for an external process.
-StateName = Literal["STOPPED", "STARTING", "RUNNING", "BACKOFF", "STOPPING", "EXITED", "FATAL", "EXPECTED"]
+#: supervisord's states, and that of an external process; people and programs read these words.
+StateName = Literal["stopped", "starting", "running", "backoff", "stopping", "exited", "fatal", "expected"]
 Stream = Literal["stdout", "stderr"]
 
 

@@ -481,21 +481,29 @@ Frames that are the same for all are listed in shared_frames; all others get the
 
 The robot is off, out of the network, or has no router: that is the process zenoh_router of a robot with ros: {rmw:
 zenoh}, and else Zenoh's own zenohd. Its address is in the fleet's file.""",
-    "TF883": """A robot of a fleet sends nothing, or stopped sending.
+    "TF883": """A robot of a fleet sends nothing, or stopped sending, or what comes was sent long ago.
 
 Its process tfcompose fleet share sends twice a second, whatever the robot does. It does not run, or its link to the
-router is cut.""",
+router is cut. What a link held back while it was cut stays stale when it comes; so does all from a robot whose clock is
+behind by more than two seconds.""",
     "TF884": """An edge that a robot of a fleet shares does not come, while the robot is reached.
 
 Nobody publishes it on the robot, or under other names, or on topics in another namespace than the fleet's file
 says.""",
-    "TF885": """A robot of a fleet stamps its edges ahead of this computer's clock.
+    "TF885": """A robot of a fleet stamps its edges ahead of this computer's clock, or what it sends comes late.
 
-Poses between robots are looked up at one time, which only synchronised clocks have: use chrony or
-systemd-timesyncd.""",
-    "TF901": """ROS 2 is missing, or cannot be used.
+Poses between robots are looked up at one time, which only synchronised clocks have: use chrony or systemd-timesyncd.
+Where clocks agree, what comes late was held up in a link that is slow.""",
+    "TF886": """A robot says that it is one of a fleet, and the fleet's file names no such robot.
 
-pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",
+fleet: {file: fleet.yaml, robot: r1} says which it is; without robot it has the robot's own name.""",
+    "TF887": """The fleet's file has the robot share an edge that the robot does not have.
+
+Nobody would ever get it. Edges are named by their frames on the live tree, with the robot's frame_prefix if it has one,
+and a chain of several edges is not one.""",
+    "TF901": """ROS 2 or a package of it, such as the middleware that is chosen, is missing or cannot be used.
+
+pip install 'tfcompose[ros]' brings ROS 2 on x86-64 Linux; elsewhere source your distribution's setup file.""",
     "TF902": """A plan cannot be used: the file is not a plan, is incomplete, or has another version.
 
 Build it again.""",

@@ -2,8 +2,10 @@
 
 While a command loads, Ctrl-C ends it also where Python can raise nothing: Python throws an exception away that comes up
 in a callback of its own, such as those that its import system has, and goes on. So what SIGINT raises there is
-remembered, for whoever handles signals next. A process then has a flag that SIGINT, SIGTERM and SIGHUP set, and that
-wakes whoever waits. ROS is not imported: a process handles signals before it spends a second on starting it.
+remembered, for whoever handles signals next. pydantic's Rust prints a panic where an exception comes to it while it
+loads; SIGINT raises nothing before pydantic has returned. A process then has a flag that SIGINT, SIGTERM and SIGHUP
+set, and that wakes whoever waits. ROS is not imported: a process handles signals before it spends a second on starting
+it.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 
 
 _remembered: list[int] = []
+#: So long an interrupt is held before pydantic is looked for again.
+HELD_S = 0.02
 
 
 def take_interrupt() -> bool:
@@ -44,6 +48,7 @@ class RememberedInterrupt:
         self._is_set = signal.getsignal(signal.SIGINT) is signal.default_int_handler
         if self._is_set:
             try:
+                self._alarm = signal.signal(signal.SIGALRM, _interrupt_again)
                 signal.signal(signal.SIGINT, _interrupt)
             except ValueError:  # in another thread
                 self._is_set = False
@@ -54,6 +59,8 @@ class RememberedInterrupt:
         sys.unraisablehook = self._unraisable
         if self._is_set:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, self._alarm)
 
     def _thrown_away(self, what: sys.UnraisableHookArgs) -> None:
         """Let Python print what it throws away, but not an interrupt, which is remembered."""
@@ -61,8 +68,20 @@ class RememberedInterrupt:
             self._unraisable(what)
 
 
-def _interrupt(number: int, _frame: FrameType | None) -> None:
+def _interrupt(number: int, frame: FrameType | None) -> None:
     _remembered.append(number)
+    _interrupt_again(number, frame)
+
+
+def _interrupt_again(_number: int, frame: FrameType | None) -> None:
+    """Raise an interrupt that nobody took yet, or try it again soon where pydantic called what runs now."""
+    if not _remembered:
+        return
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").startswith("pydantic"):
+            signal.setitimer(signal.ITIMER_REAL, HELD_S)
+            return
+        frame = frame.f_back
     raise KeyboardInterrupt
 
 

@@ -8,8 +8,6 @@ half a period at the median, and what it takes on the way.
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import time
 from contextlib import ExitStack
 from itertools import pairwise
@@ -18,9 +16,8 @@ from statistics import median, quantiles
 import psutil
 
 from tests.benchmarks.results import Rows, record
-from tests.support.fleets import SimulatedRobot, fleet_of
+from tests.support.fleets import RobotProcesses
 from tests.support.waiting import until
-from tests.support.zenoh_peers import free_port, session
 from tfcompose.fleet.observe import FleetObserver
 
 ROBOTS, SECONDS = 20, 10.0
@@ -29,40 +26,11 @@ RATES = ("5 Hz", "10 Hz", "20 Hz")
 LIMIT_S, LIMIT_CORE = 0.1, 0.05
 
 
-def _routers(ports: list[int]) -> dict[str, str]:
-    return {f"r{number}": f"tcp/127.0.0.1:{port}" for number, port in enumerate(ports)}
-
-
-def robot(name: str, rate: str, *ports: str) -> None:
-    """Be a robot until this process is ended."""
-    simulated = SimulatedRobot(fleet_of(_routers([int(port) for port in ports]), rate), name, 1.0)
-    try:
-        sys.stdin.read()
-    finally:
-        simulated.close()
-
-
-def routers(*ports: str) -> None:
-    """Be the routers of all robots until this process is ended."""
-    with ExitStack() as stack:
-        for port in ports:
-            stack.enter_context(session("router", listen=[f"tcp/127.0.0.1:{port}"]))
-        sys.stdin.read()
-
-
 def measure(rate: str, robots: int = ROBOTS, seconds: float = SECONDS) -> tuple[list[float], float]:
     """Return the ages of poses between neighbours, in seconds, and what a robot costs, as a part of a core."""
-    ports = [str(free_port()) for _ in range(robots)]
-    fleet = fleet_of(_routers([int(port) for port in ports]), rate)
-
-    def started(stack: ExitStack, *words: str) -> psutil.Process:
-        command = [sys.executable, "-m", "tests.benchmarks.bench_fleet", *words, *ports]
-        process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.PIPE))
-        return psutil.Process(process.pid)
-
-    with ExitStack() as stack:
-        started(stack, "routers")
-        processes = [started(stack, "robot", name, rate) for name in fleet.robots]
+    with RobotProcesses(robots, rate) as running, ExitStack() as stack:
+        fleet = running.fleet
+        processes = [psutil.Process(one.pid) for one in running.processes.values()]
         observer = FleetObserver(fleet)
         stack.callback(observer.close)
         if not observer.wait(120):
@@ -101,15 +69,9 @@ def main() -> None:
     for rate in RATES:
         ages, core = measure(rate)
         cells = [f"{1e3 * median(ages):.0f} ms", f"{1e3 * quantiles(ages, n=20)[-1]:.0f} ms", f"{core:.1%}"]
-        rows[f"{ROBOTS} robots at {rate}: age of a pose at the median, at 95 %; of a core, each"] = cells
+        rows[f"each edge at {rate}"] = cells
     record("fleet", rows, load)
 
 
 if __name__ == "__main__":
-    words = sys.argv[1:]
-    if words[:1] == ["robot"]:
-        robot(*words[1:])
-    elif words[:1] == ["routers"]:
-        routers(*words[1:])
-    else:
-        main()
+    main()

@@ -3,28 +3,43 @@
 import os
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.support import processes
 from tests.support.cli import tfcompose_in
+from tests.support.shell import PROMPT, Shell
 from tfcompose.cli.commands.completion import SCRIPTS
 from tfcompose.cli.parser import COMMANDS, GROUPS, summary_of
+from tfcompose.launcher.runtime_dir import Lock, runtime_dir_of
+from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.plan.file import write_plan
 
 ROBOTS = Path(__file__).parents[2] / "robots"
+CELL = """\
+tfcompose: 1
+robot: cell
+args: {cameras: {default: 2}}
+hosts: {main: {}, jetson: {}}
+frames: {base_link: {}, tool0: {parent: base_link}}
+profiles: {demo: {}}
+"""
 
 CASES = {
+    "": {*COMMANDS, "--help", "--version"},
     "li": {"lint"},
     "lint --sel": {"--select"},
     "lint --select TF61": {f"TF61{n}" for n in range(10)},
+    "lint --select TF611,TF308": {"TF611,TF308"},
     "lint --format s": {"sarif"},
+    "lint --format=s": {"--format=sarif"},
     "lint x.yaml -p ": set(),
     "up my_robot.yaml -p ": {"demo"},
     "up --guard ": {"off", "watch", "strict"},
-    "pose rover.yaml odo": {"odom"},
-    "explain TF30": {f"TF30{n}" for n in range(1, 10)},
-    "explain rover.yaml ma": {"map"},
+    "up --timeout ": set(),
+    "completion z": {"zsh"},
+    "init a": {"arm"},
     "presets realsense/d45": {"realsense/d455", "realsense/d456", "realsense/d457"},
     "export sy": {"systemd"},
     "help backg": {"background"},
@@ -32,17 +47,45 @@ CASES = {
     "help docto": {"doctor"},
     "down --robot ": set(),
     "nothing ": set(),
+}
+#: Words that can be files as well, or these alone.
+FILES = {
     "lint ro": set(),
+    "up --overlay ": set(),
+    "up --overlay=": set(),
+    "build -o ": set(),
+    "pose rover.yaml odo": {"odom"},
+    "explain TF30": {f"TF30{n}" for n in range(1, 10)},
+    "explain rover.yaml ma": {"map"},
 }
 
 
-@pytest.mark.parametrize("line", CASES)
+@pytest.mark.parametrize("line", [*CASES, *FILES])
 def test_a_word_is_completed(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tmp_path.chmod(0o700)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     words = line.split(" ")
     done = tfcompose_in(ROBOTS, "completion", "--at", len(words), "--", "tfcompose", *words)
-    assert (done.returncode, set(done.stdout.split())) == (0, CASES[line])
+    assert (done.returncode, set(done.stdout.split())) == (int(line in FILES), (CASES | FILES)[line])
+
+
+LINES = {
+    "tfcompose li": ["lint"],
+    "tfcompose lint --format=s": ["sarif"],
+    "tfcompose pose 'my robot.yaml' odo": ["odom"],
+    'tfcompose pose "my robot.yaml" odo': ["odom"],
+    "tfcompose pose my\\ robot.yaml odo": ["odom"],
+    "tfcompose pose 'my robot.yaml' 'odo": ["odom"],
+    "tfcompose up cell.yaml cameras:": ["="],
+    "tfcompose up cell.yaml --host ": ["main", "jetson"],
+    "tfcompose up cell.yaml -p ": ["demo"],
+}
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_line_is_split_as_bash_does_it(line: str, folder: Path) -> None:
+    done = tfcompose_in(folder, "completion", "--line", line, "--breaks", " \t\n\"'@><=;|&(:")
+    assert done.stdout.split() == LINES[line]
 
 
 @pytest.mark.parametrize("at", [-3, 0, 99])
@@ -51,22 +94,74 @@ def test_a_place_outside_of_the_line_has_nothing(at: int, tmp_path: Path) -> Non
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_bash_completes_with_the_script(tmp_path: Path) -> None:
-    program = tmp_path / "tfcompose"
+#: What is typed before the tab key, and the line after it; a frame, a file, a preset, a code, a robot, a process.
+TYPED = {
+    "tfcompose li": "lint ",
+    "tfcompose pose cell.yaml too": "tool0 ",
+    "tfcompose pose 'my robot.yaml' odo": "odom ",
+    "tfcompose lint cel": "cell.yaml ",
+    "tfcompose lint -f my": "my\\ robot.yaml ",
+    "tfcompose lint --overlay=cel": "--overlay=cell.yaml ",
+    "tfcompose presets realsense/d45": "realsense/d45",
+    "tfcompose lint --select TF611,TF308": "TF611,TF308 ",
+    "tfcompose lint --format=s": "--format=sarif ",
+    "tfcompose down --robot rov": "rover@67 ",
+    "tfcompose logs base": "base_drive ",
+    "tfcompose up cell.yaml cam": "cameras:=",
+    "tfcompose up cell.yaml -p d": "demo ",
+    "tfcompose up cell.yaml --host je": "jetson ",
+}
+SETUP = {
+    "bash": 'eval "$(tfcompose completion bash)"',
+    "zsh": 'autoload -Uz compinit; compinit -u; eval "$(tfcompose completion zsh)"',
+    "fish": "tfcompose completion fish | source",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder with two robot files, and a robot that runs in domain 67, as far as others see it."""
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "67")
+    (tmp_path / "my robot.yaml").write_text((ROBOTS / "rover.yaml").read_text("utf-8"), "utf-8")
+    (tmp_path / "cell.yaml").write_text(CELL, "utf-8")
+    plan = Plan("rover", "", None, RosSettings(), (), (PlanProcess("base_drive", "run"),))
+    place = runtime_dir_of(plan, os.environ)
+    lock = Lock(place)
+    plan_file = place.plan_folder("0") / "plan.json"
+    plan_file.parent.mkdir()
+    plan_file.write_text(write_plan(plan), "utf-8")
+    yield tmp_path
+    lock.close()
+
+
+@pytest.mark.parametrize("name", SETUP)
+def test_a_shell_on_a_terminal_completes_words_at_the_tab_key(name: str, folder: Path) -> None:
+    if not shutil.which(name):
+        pytest.skip(f"{name} is not installed")
+    (folder / "bin").mkdir()
+    program = folder / "bin" / "tfcompose"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m tfcompose "$@"\n', "utf-8")
     program.chmod(0o755)
-    line = "COMP_WORDS=(tfcompose up --gu); COMP_CWORD=2; _tfcompose"
-    script = f'eval "$(tfcompose completion bash)"; {line}; echo "${{COMPREPLY[@]}}"'
-    done = processes.run(["bash", "-c", script], env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"})
-    assert (done.returncode, done.stdout.split(), done.stderr) == (0, ["--guard"], "")
+    path = f"{program.parent}:{os.environ['PATH']}"
+    shell = Shell(folder, name, PATH=path, HOME=str(folder), PYTHONPATH=str(ROBOTS.parent), LC_ALL="C.UTF-8")
+    try:
+        shell.type(f"{SETUP[name]}\r")
+        for typed, completed in TYPED.items():
+            shell.type(f"\x15\x0c{typed}\t#")  # on an empty line of an empty screen
+            shell.shows(f"{PROMPT}{typed.rpartition(' ')[0]} {completed}#")
+        shell.type("\x15\x0ctfcompose up cell.yaml --timeout \t#")
+        shell.shows("--timeout #")
+        assert "my robot.yaml" not in shell.shown
+        assert shell.text.count("command not found") == 0
+    finally:
+        shell.close()
 
 
-@pytest.mark.parametrize("shell", SCRIPTS)
-def test_each_shell_that_is_here_reads_its_script(shell: str, tmp_path: Path) -> None:
-    assert tfcompose_in(tmp_path, "completion", shell).stdout == SCRIPTS[shell]
-    if shutil.which(shell):
-        (tmp_path / "script").write_text(SCRIPTS[shell], "utf-8")
-        assert processes.run([shell, "-n", str(tmp_path / "script")]).returncode == 0
+def test_there_is_a_script_for_each_shell_and_for_no_other(tmp_path: Path) -> None:
+    assert SCRIPTS.keys() == SETUP.keys()
+    assert all(tfcompose_in(tmp_path, "completion", shell).stdout == SCRIPTS[shell] for shell in SCRIPTS)
     assert tfcompose_in(tmp_path, "completion", "csh").returncode == 2
 
 

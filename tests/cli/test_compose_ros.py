@@ -70,7 +70,7 @@ def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_a
     assert "all ready after" in up.stdout
     processes = ps(tfc)
     for process in processes.values():
-        assert (process["state"], process["ready"], process["restarts"]) == ("RUNNING", True, 0)
+        assert (process["state"], process["ready"], process["restarts"]) == ("running", True, 0)
         assert psutil.pid_exists(process["pid"])
         assert process["memory"] > 1e6
     edges = [(1, 1), (1, 1), (0, 0)]
@@ -103,7 +103,7 @@ def test_what_is_missing_when_the_time_is_over_is_reported_with_1_and_the_robot_
     up = tfc("up", "--wait", "--timeout", "12")
     assert up.returncode == 1
     assert [name in up.stderr for name in ("drive", "static", "odom → base_link")] == [True, False, True]
-    assert ps(tfc)["static"]["state"] == "RUNNING"
+    assert ps(tfc)["static"]["state"] == "running"
 
 
 def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobody(
@@ -124,7 +124,7 @@ def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobod
     assert until(lambda: ps(tfc)["drive"]["restarts"] == 1)
     assert tfc("wait", "--ready", "--timeout", "60").returncode == 0
     assert tfc("stop", "drive", "static").returncode == 0
-    assert until(lambda: {ps(tfc)[name]["state"] for name in ("drive", "static")} == {"STOPPED"})
+    assert until(lambda: {ps(tfc)[name]["state"] for name in ("drive", "static")} == {"stopped"})
     assert tfc("stop", "drive").returncode == 1
     os.kill(before["hangs"]["pid"], signal.SIGSTOP)
     assert until(lambda: "TF804" in tfc("logs").stdout)
@@ -146,7 +146,7 @@ def test_what_waits_for_a_stopped_process_is_reported_to_wait_by_ps_and_by_who_s
     assert tfc("up", "--wait").returncode == 0
     assert tfc("restart", "late").stdout == "late: restarting\n"
     assert tfc("stop", "drive").returncode == 0
-    assert until(lambda: ps(tfc)["drive"]["state"] == "STOPPED")
+    assert until(lambda: ps(tfc)["drive"]["state"] == "stopped")
     waits = "waits for drive"
     assert waits in tfc("restart", "late").stdout
     assert until(lambda: re.search(f"  late +{waits}", tfc("ps").stdout)), tfc("ps").stdout
@@ -158,7 +158,10 @@ def test_what_waits_for_a_stopped_process_is_reported_to_wait_by_ps_and_by_who_s
 def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_keep(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
+    nothing = tfc("up", "--update")
+    assert (nothing.returncode, "does not run" in nothing.stderr) == (1, True), nothing
     assert tfc("up", "--wait").returncode == 0
+    assert tfc("up", "--update").returncode == 0
     before = ps(tfc)
     with EdgeListener("base_link") as drive:
         _change(tfc, tmp_path)
@@ -250,7 +253,7 @@ def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
         assert f" pid {launcher_of(tmp_path)}, with XDG_RUNTIME_DIR={tmp_path}/runtime" in second.stderr
         down = tfc("down", "--leftovers")
         assert (down.returncode, down.stdout.split()[0]) == (0, "0")
-    assert {process["state"] for process in ps(tfc).values()} == {"RUNNING"}
+    assert {process["state"] for process in ps(tfc).values()} == {"running"}
 
 
 def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the_way(tfc: Callable[..., Any]) -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NOON = 1_800_000_000.0
 #: A process that runs and is ready, in the order of the class.
-RUNNING = ProcessStatus("", "run", None, "RUNNING", "", True, False, True, "", "", 4711, 3725.0, 0, 0, 0, ())  # noqa: FBT003
+RUNNING = ProcessStatus("", "run", None, "running", "", True, False, True, "", "", 4711, 3725.0, 0, 0, 0, ())  # noqa: FBT003
 PAGES: dict[Page, str] = {"processes": "esc", "log": "1", "edges": "e", "findings": "f", "help": "?"}
 TAKEN = finding("TF801", "map → odom is also published by /slam_old", None, notes=[Note("pid 77")], help="end it")
 

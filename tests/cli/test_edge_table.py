@@ -31,8 +31,8 @@ def observer() -> TreeObserver:
     [
         (None, "edge publisher kind rate jitter gap age delay"),
         (140, "edge publisher kind rate jitter gap age delay"),
-        (95, "edge publisher kind rate gap age delay"),
-        (85, "edge publisher kind rate age delay"),
+        (95, "edge publisher rate jitter gap age delay"),
+        (85, "edge publisher rate gap age delay"),
         (70, "edge publisher rate age delay"),
     ],
 )

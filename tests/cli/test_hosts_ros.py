@@ -37,8 +37,8 @@ def test_two_hosts_start_their_shares_and_each_receives_the_entire_tree(
         main.output + jetson.output
     )
     shares = {
-        "rover": {"static": "RUNNING", "drive": "RUNNING", "arm_drive": "EXPECTED", "guard": "RUNNING"},
-        "rover.jetson": {"static": "EXPECTED", "drive": "EXPECTED", "arm_drive": "RUNNING", "guard": "RUNNING"},
+        "rover": {"static": "running", "drive": "running", "arm_drive": "expected", "guard": "running"},
+        "rover.jetson": {"static": "expected", "drive": "expected", "arm_drive": "running", "guard": "running"},
     }
     assert ps() == shares
     assert offences(main.output + jetson.output) == []

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
-import os
-import pty
 import signal
-import struct
-import sys
-import termios
-import threading
 from typing import TYPE_CHECKING
 
 import psutil
-import pyte
 import pytest
 
-from tests.support import processes
+from tests.support.shell import PROMPT, Shell
 from tests.support.waiting import gone, until
 
 if TYPE_CHECKING:
-    import subprocess
     from collections.abc import Iterator
     from pathlib import Path
 
 pytestmark = pytest.mark.ros
 
-#: A shell with this terminal as its own, as a window has it.
-SHELL = "import fcntl, os, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp('bash', ['bash', '--norc', '-i'])"
 ROBOT = """\
 tfcompose: 1
 robot: rover
@@ -39,73 +27,8 @@ processes:
   talker:
     run: [python3, -c, "import time; print('\\\\x1b[2Jspeaks', flush=True); time.sleep(600)"]
 """
-PROMPT = "shell$ "
 #: What goes to the other screen of a terminal, and what comes back from it.
 OTHER_SCREEN, OWN_SCREEN = "\033[?1049h", "\033[?1049l"
-
-
-class Shell:
-    """An interactive shell on a terminal of 80 columns; what it shows is on ``screen``, and all bytes in ``text``."""
-
-    def __init__(self, folder: Path, **environment: str) -> None:
-        self.screen = pyte.Screen(80, 24)
-        self._stream = pyte.Stream(self.screen)
-        self._master, slave = pty.openpty()
-        self.text = ""
-        self.resize(80, 24)
-        env = os.environ | {"TERM": "xterm-256color", "PS1": PROMPT, "CI": "", "NO_COLOR": ""} | environment
-        command = [sys.executable, "-c", SHELL]
-        self.process: subprocess.Popen[str] = processes.start(
-            command, stdin=slave, stdout=slave, stderr=slave, cwd=folder, env=env
-        )
-        self._slave = slave
-        self.reads = threading.Event()
-        self.reads.set()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-        self.shows(PROMPT)
-
-    def _read(self) -> None:
-        with contextlib.suppress(OSError):
-            while data := os.read(self._master, 1 << 16):
-                self.reads.wait()
-                text = data.decode(errors="replace")
-                self.text += text
-                self._stream.feed(text)
-
-    def type(self, text: str) -> None:
-        os.write(self._master, text.encode())
-
-    def up(self, *words: str) -> None:
-        self.type(f"{sys.executable} -m tfcompose up robot.yaml {' '.join(words)}\n")
-
-    @property
-    def shown(self) -> str:
-        return "\n".join(list(self.screen.display))
-
-    def shows(self, *words: str) -> None:
-        assert until(lambda: all(word in self.shown for word in words)), self.shown
-
-    def resize(self, columns: int, rows: int) -> None:
-        self.screen.resize(rows, columns)
-        fcntl.ioctl(self._master, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
-
-    def below(self) -> list[psutil.Process]:
-        return psutil.Process(self.process.pid).children(recursive=True)
-
-    def view(self) -> psutil.Process:
-        """Return the process that shows the live view: the shell's own child."""
-        return psutil.Process(self.process.pid).children()[0]
-
-    def close(self) -> None:
-        self.reads.set()
-        with contextlib.suppress(psutil.Error):
-            for one in self.below():
-                one.kill()
-        processes.end(self.process)
-        os.close(self._slave)
-        self._reader.join(5)
-        os.close(self._master)
 
 
 @pytest.fixture

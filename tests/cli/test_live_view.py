@@ -83,7 +83,7 @@ class View:
 
 
 def running(*names: str) -> list[ProcessState]:
-    return [ProcessState(name, "RUNNING", 7) for name in names]
+    return [ProcessState(name, "running", 7) for name in names]
 
 
 def test_the_line_stays_below_the_log_and_the_log_is_complete() -> None:
@@ -131,7 +131,7 @@ def test_a_terminal_that_becomes_narrower_gets_a_shorter_line() -> None:
 
 
 def test_who_others_start_counts_when_its_edges_are_live() -> None:
-    view = View(plan_of("drive", owner="drive")).tell(ProcessState("drive", "EXPECTED"))
+    view = View(plan_of("drive", owner="drive")).tell(ProcessState("drive", "expected"))
     assert "0 of 1 processes" in view.lines[-1]
     view.tell(OwnerLive("drive", "/drive", ("base_link → lidar",), 1.0))
     assert "1 of 1 processes" in view.lines[-1]

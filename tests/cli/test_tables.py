@@ -1,15 +1,25 @@
 """Tables: whole into a pipe, fitted and coloured on a terminal."""
 
+import json
+import re
+from collections import Counter
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from tfcompose.cli import preset_page
 from tfcompose.cli.compiling import library
+from tfcompose.cli.documentation import topic
+from tfcompose.cli.process_table import row
 from tfcompose.cli.tables import Table, shortened
 from tfcompose.cli.terminal import plain
 from tfcompose.compile import compile_robot
+from tfcompose.ipc import ProcessState, ProcessStatus, StateName, notice_line
+from tfcompose.plan.codec import encode
 from tfcompose.render.text import RED
-from tfcompose.render.tree import tree
+from tfcompose.render.tree import pose_text, tree
+from tfcompose.tree import drawn
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
@@ -29,9 +39,9 @@ TABLE = Table(
 
 def test_a_pipe_gets_each_cell_in_full() -> None:
     lines = TABLE.lines(ROWS, indent="  ")
-    for row, line in zip(ROWS, lines, strict=True):
-        assert line.split("  ")[1] == row[0]
-        assert line.endswith(next(cell for cell in reversed(row) if cell))
+    for cells, line in zip(ROWS, lines, strict=True):
+        assert line.split("  ")[1] == cells[0]
+        assert line.endswith(next(cell for cell in reversed(cells) if cell))
 
 
 @pytest.mark.parametrize(
@@ -54,7 +64,46 @@ def test_a_terminal_gets_no_line_that_wraps_and_every_number(width: int, heads: 
 def test_frames_that_differ_still_differ_when_they_are_shortened() -> None:
     lines = TABLE.lines(ROWS, 60)
     assert len(set(lines)) == len(ROWS)
-    assert shortened("camera_link → camera_color_optical_frame", 28) == "camera_li…olor_optical_frame"
+    assert shortened("camera_link → camera_color_optical_frame", 28) == "→ camera_color_optical_frame"
+    assert shortened("camera_link → camera_color_optical_frame", 20) == "→ camer…ptical_frame"
+    assert shortened("base_link → front_left_wheel_link", 29) == "b…ink → front_left_wheel_link"
+
+
+@pytest.mark.parametrize("columns", [60, 80, 100])
+@pytest.mark.parametrize("name", ["autonomous_robot", "field_rover", "house_robot", "picker", "two_rovers"])
+def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(name: str, columns: int) -> None:
+    robot = compile_robot(
+        (ROBOTS / f"{name}.yaml").read_text("utf-8"),
+        f"{name}.yaml",
+        library(),
+        read=lambda file: (ROBOTS / file).read_text("utf-8"),
+    ).robot
+    assert robot
+    robot = robot.with_final_names()
+    text = tree(robot, columns)
+    assert max(map(len, text.splitlines())) <= columns
+    words = iter(re.sub("[│├└─]", " ", text).split())
+    for edge in (one for root in robot.roots() for _, one in drawn(robot.children(), root, lambda edge: edge.child)):
+        wanted = [edge.child, edge.owner, *pose_text(edge).split()]
+        assert all(word in words for word in wanted), f"{wanted} stand there in this order"
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+@pytest.mark.parametrize("name", ["realsense/d455", "hesai/ot128"])
+def test_a_page_of_a_preset_has_no_line_wider_than_the_terminal_and_every_word(name: str, columns: int) -> None:
+    facts = preset_page.facts(name, library())
+    page = preset_page.text(facts, columns)
+    assert max(map(len, page.splitlines())) <= columns
+    plain_words, words = (re.sub("[│├└─]", " ", text).split() for text in (preset_page.text(facts), page))
+    assert Counter(words) == Counter(plain_words)
+
+
+@pytest.mark.parametrize("state", get_args(StateName))
+def test_a_state_is_one_word_in_text_in_json_and_in_the_help(state: StateName) -> None:
+    status = ProcessStatus("drive", "run", None, state, "", True, False, True, "", "", 7, 1.0, 0, 0, 0, ())  # noqa: FBT003
+    event = json.loads(notice_line(ProcessState("drive", state), 0))
+    assert row(status, {})[1] == encode(status)["state"] == event["state"]
+    assert f"`{state}`" in topic("background")
 
 
 def test_colours_take_no_room() -> None:

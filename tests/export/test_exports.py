@@ -18,7 +18,7 @@ from tests.support.findings import words_of
 from tests.support.plans import built, compiled_plan
 from tests.support.robots import DRIVEN
 from tfcompose.export.launch import launch
-from tfcompose.export.supervisors import Machine, compose, systemd
+from tfcompose.export.supervisors import Machine, compose, sourced, systemd
 from tfcompose.plan import Plan, PlanProcess, StopRule
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.stock import stand_ins, static_names
@@ -124,12 +124,12 @@ def test_systemd_finds_nothing_wrong_with_the_units(
 
 def test_a_value_stays_what_it_is_whatever_systemd_makes_of_its_characters() -> None:
     """A unit's ``%h`` is a folder, and ``$HOME`` in a command a variable; doubled they are themselves."""
-    machine = Machine("/opt/100%h", "/usr/bin/python3", ("/opt/$HOME/setup.bash",), {"A": '%h "b" \\ $C'})
+    machine = Machine("/opt/100%h", "/usr/bin/python3", ("/opt/$HOME/my setup.bash",), {"A": '%h "b" \\ $C'})
     static = units(compiled_plan(DRIVEN), machine)["rover-static.service"]["Service"]
     assert static["Environment"][:1] == [r'"A=%%h \"b\" \\ $C"']
     assert static["WorkingDirectory"] == ["/opt/100%%h"]
     (command,) = static["ExecStart"]
-    assert '"/opt/$$HOME/setup.bash" /usr/bin/python3' in command
+    assert '"/opt/$$HOME/my setup.bash" -- /usr/bin/python3' in command
     assert "/opt/100%%h/plan.json static" in command
     assert 'exec \\"$$@\\""' in command
 
@@ -215,6 +215,15 @@ def test_a_health_check_has_ross_environment_also_where_only_the_entry_point_sou
         env = {"PATH": os.environ["PATH"], "ROS_DISTRO": distro}
         done = processes.run(words, env=env)
         assert (done.stdout.strip("\n"), done.stderr) == (output, "")
+
+
+def test_setup_files_with_spaces_are_sourced_in_order_before_the_command(tmp_path: Path) -> None:
+    files = [tmp_path / "one more.sh", tmp_path / "-- two.sh"]
+    for number, file in enumerate(files):
+        file.write_text(f'export SOURCED="${{SOURCED}}{number}"\n')
+    done = processes.run(sourced([str(file) for file in files], ["sh", "-c", 'echo "$SOURCED $1"', "sh", "--"]))
+    assert (done.stdout, done.stderr) == ("01 --\n", "")
+    assert sourced((), ["a"]) == ["a"]
 
 
 def test_a_host_is_a_profile_and_nobody_waits_for_a_service_of_another() -> None:

@@ -566,7 +566,8 @@ def fleets() -> Iterator[Finding]:
     with mock.patch.multiple(fleet, find_spec=lambda _: None, reject=_rejected):
         yield from _refused(fleet.refuse_without_zenoh)
     for state, age in states:
-        yield from problems_of(RobotStatus("r1", "tcp/a:7447", state, age, edges))
+        for delay_s in (0.0, 1.0):
+            yield from problems_of(RobotStatus("r1", "tcp/a:7447", state, age, edges, delay_s))
 
 
 def _check_fleet(source: Source) -> None:

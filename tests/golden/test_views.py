@@ -69,8 +69,8 @@ COMMANDS = {
 
 PLAN = Plan("rover", "0", None, RosSettings(), (), tuple(PlanProcess(name, "run") for name in ("static", "drive")))
 NOTICES: tuple[Notice, ...] = (
-    ProcessState("static", "RUNNING", 7),
-    ProcessState("drive", "EXPECTED"),
+    ProcessState("static", "running", 7),
+    ProcessState("drive", "expected"),
     LogLine("drive", "stderr", "no device"),
     AllStarted(2, ("drive",), 1.0),
     OwnerLive("static", "/static", ("base_link → lidar", "base_link → imu"), 1.25),
@@ -81,11 +81,11 @@ NOTICES: tuple[Notice, ...] = (
     TreeComplete(3, 4.5),
     AllReady((StartRow("static", 0.0, 1.25), StartRow("drive", None, 4.5)), 4.5, ("camera",)),
     Replanned(("static",), ("slam",), ("camera",), ("base_link → camera",)),
-    ProcessState("drive", "BACKOFF", None, "exit code 1; restart 1 of 5 in 1 s"),
-    ProcessState("drive", "EXITED", None, "exit code 0"),
-    ProcessState("drive", "FATAL", None, "exit code 1, after 5 restarts"),
+    ProcessState("drive", "backoff", None, "exit code 1; restart 1 of 5 in 1 s"),
+    ProcessState("drive", "exited", None, "exit code 0"),
+    ProcessState("drive", "fatal", None, "exit code 1, after 5 restarts"),
     Stopping("TF808 process_failed"),
-    ProcessState("static", "STOPPING", 7, "SIGINT"),
+    ProcessState("static", "stopping", 7, "SIGINT"),
     Ended(1, ("drive: no device",)),
 )
 
@@ -100,11 +100,11 @@ def process(name: str, state: str, **more: object) -> ProcessStatus:
 
 STATUS = RobotStatus(
     "rover", None, 5, "0", 75.0, complete=False, ready=False, stopping=False, missing=(), silent=(), processes=(
-        process("static", "RUNNING", pid=7_000_001, uptime=75.0, edges=2, live=2),
-        process("slam", "RUNNING", pid=7_000_002, uptime=4000.0, edges=1, ready=False),
-        process("nav", "STOPPED", waits="waits for slam to be ready"),
-        process("camera", "FATAL", detail="exit code 1, after 5 restarts", failed=True, restarts=5),
-        process("arm", "EXPECTED", host="jetson", edges=1),
+        process("static", "running", pid=7_000_001, uptime=75.0, edges=2, live=2),
+        process("slam", "running", pid=7_000_002, uptime=4000.0, edges=1, ready=False),
+        process("nav", "stopped", waits="waits for slam to be ready"),
+        process("camera", "fatal", detail="exit code 1, after 5 restarts", failed=True, restarts=5),
+        process("arm", "expected", host="jetson", edges=1),
     ),
 )  # fmt: skip
 

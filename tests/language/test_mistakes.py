@@ -52,6 +52,52 @@ MISTAKES = [
     (FRAME % "rpy_deg: [0, 90, 0]", "5:29 TF101", "90 deg"),
     (SHAPE.replace("visual: {box: [1, 1, 1], %s}", "box: [1, 1, 1]"), "3:21 TF101", "visual:"),
     (SHAPE.replace("visual: {box: [1, 1, 1], %s}", "inertial: {mass: 1, ixx: 1}"), "3:41 TF101", "inertia:"),
+    (PROCESS % "package: nav2_amcl", "6:26 TF101", "run: nav2_amcl"),
+    (PROCESS % "executable: amcl", "6:26 TF101", "run: amcl"),
+    (PROCESS % "preset: ekf", "6:26 TF101", "node: {preset: ekf}"),
+    (PROCESS % "args: [--fast]", "6:26 TF101", "run: args:"),
+    (PROCESS % "ros2_control: base_controller", "6:26 TF101", "controller_manager"),
+    (PROCESS % "remap: {/cmd_vel: '/cmd vel'}", "6:44 TF106", ""),
+    (PROCESS % "remap: {'scan:=front': scan}", "6:34 TF106", ""),
+    (
+        BASE + "processes:\n  nav: {run: {package: nav2_bringup, executable: navigation_launch.py}}\n",
+        "5:50 TF106",
+        "launch: nav2_bringup/navigation_launch.py",
+    ),
+    (BASE + "processes:\n  joints: {simulate: {joints: sweep}}\n", "5:12 TF101", "name of its own"),
+    (BASE + "namespace: nurse\n", "4:1 TF101", "ros: {namespace: nurse}"),
+    (BASE + "use_sim_time: true\n", "4:1 TF101", "ros: {clock: sim}"),
+    (BASE + "units: {length: cm}\n", "4:1 TF101", "30 cm"),
+    (CAM % "look: front", "5:59 TF106", "forward"),
+    (CAM % "inverted: true", "5:53 TF101", "rpy: 180 deg"),
+    (FRAME % "tf: driver", "5:29 TF101", "sensors owner"),
+    (SHAPE.replace("[1, 1, 1], %s", "{size: [0.2, 0.3, 1]}"), "3:35 TF103", "[0.2, 0.3, 1]"),
+    (SHAPE.replace("[1, 1, 1], %s", "{size: 0.2 0.3 1}"), "3:35 TF103", "[0.2, 0.3, 1]"),
+    (SHAPE.replace("box: [1, 1, 1], %s", "cylinder: {radius: 1, height: 1}"), "3:52 TF101", "length"),
+    (SHAPE.replace("box: [1, 1, 1], %s", "sphere: {diameter: 1}"), "3:39 TF101", "radius"),
+    (
+        BASE.replace("{}}", "{}, lift: {}}")
+        + "joints:\n  j: {type: hinge, parent: base_link, child: lift, mimic: k}\n",
+        "5:13 TF106",
+        "revolute",
+    ),
+    (
+        BASE.replace("{}}", "{}, lift: {}}")
+        + "joints:\n  j: {type: continuous, parent: base_link, child: lift, mimic: k}\n",
+        "5:64 TF103",
+        "{joint: k}",
+    ),
+    (
+        BASE + "joints:\n  i: {type: continuous, parent: base_link, child: pan}\n"
+        "frames: {eye: {parent: pan}}\n",
+        "6:24 TF203",
+        "links: {pan: {}}",
+    ),
+    (BASE + "env: {A: b}\n", "4:1 TF101", "env: domain_id:"),
+    (BASE + "ros: {use_sim_time: true}\n", "4:7 TF101", "clock: sim"),
+    (PROCESS % "after: {a: running}", "6:37 TF106", "started"),
+    (BASE + "frames:\n  base_link: {parent: base_footprint}\n", "5:23 TF203", "frames: {base_footprint: {}}"),
+    (FRAME % "owner: static_transform_publisher", "5:36 TF302", "leave owner out"),
     # owners
     (BASE + "frames:\n  odom: {owner: drive}\n", "5:10 TF102", "owner: drive child"),
     (

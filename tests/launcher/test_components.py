@@ -49,7 +49,7 @@ def test_components_are_loaded_in_the_plans_order_once_their_container_is_ready(
     history.feed(GateOpen("box", "there"))
     assert history.loads() == ["b", "a"]
     assert history.started == ["guard", "box"], "no process of the operating system is started for them"
-    assert history.answer("a", "b").states("a") == ["STARTING", "RUNNING"]
+    assert history.answer("a", "b").states("a") == ["starting", "running"]
     assert history.state.tracked["a"].pid == history.state.tracked["box"].pid
 
 
@@ -74,7 +74,7 @@ def test_an_optional_component_that_fails_leaves_the_rest_running() -> None:
     history = begin(GUARD, BOX, component("a", required=False), component("b")).feed(Clear(), GateOpen("box", "there"))
     history.answer("a", why="no device").answer("b")
     assert history.only().severity == "warning"
-    assert history.state.tracked["b"].state == "RUNNING"
+    assert history.state.tracked["b"].state == "running"
     assert history.killed == []
 
 
@@ -82,7 +82,7 @@ def test_an_optional_component_that_fails_leaves_the_rest_running() -> None:
 def test_a_component_is_loaded_again_after_a_while_as_its_policy_says(policy: Any) -> None:
     history = begin(GUARD, BOX, component("a", restart=policy, max_restarts=1)).feed(Clear(), GateOpen("box", "there"))
     history.answer("a", why="no device")
-    assert history.states("a")[-1] == "BACKOFF"
+    assert history.states("a")[-1] == "backoff"
     assert history.sleep_until_due() == pytest.approx(1.0)
     assert history.loads() == ["a", "a"]
     history.answer("a", why="no device")
@@ -93,7 +93,7 @@ def test_a_container_that_dies_comes_back_with_its_components_in_order() -> None
     box = replace(BOX, restart="on-failure")
     history = loaded(component("b", owns=(("odom", "base_link"),)), component("a"), box=box)
     history.feed(Live("b", ("base_link",)), OwnerReady("b"), Exited("box", -SIGKILL))
-    assert history.states("a")[-1] == history.states("b")[-1] == "STOPPED"
+    assert history.states("a")[-1] == history.states("b")[-1] == "stopped"
     assert Absent("b") in history.orders, "its silence is nobody's fault"
     history.wait(1.0)
     assert history.loads() == ["b", "a"], "not before the container is ready again"
@@ -115,7 +115,7 @@ def test_an_answer_of_the_container_before_says_nothing_about_the_one_after() ->
     assert history.requested[-1].number != before.number
     history.requested.append(before)
     history.answer("a", why="went away")
-    assert history.state.tracked["a"].state == "STARTING"
+    assert history.state.tracked["a"].state == "starting"
 
 
 def test_a_container_that_ends_for_good_takes_its_components_with_it() -> None:
@@ -131,29 +131,29 @@ def test_a_component_is_stopped_started_and_restarted_alone() -> None:
     number = history.requested[-1].number
     history.feed(ProcessRequest("stop", "b"))
     assert history.requested[-1] == UnloadComponent("b", number)
-    assert history.answer("b").states("b")[-2:] == ["STOPPING", "STOPPED"]
+    assert history.answer("b").states("b")[-2:] == ["stopping", "stopped"]
     history.wait(60).feed(ProcessRequest("start", "b")).answer("b")
-    assert history.states("b")[-1] == "RUNNING"
+    assert history.states("b")[-1] == "running"
     history.feed(ProcessRequest("restart", "b")).answer("b").answer("b")
-    assert history.states("b")[-4:] == ["STOPPING", "STOPPED", "STARTING", "RUNNING"]
+    assert history.states("b")[-4:] == ["stopping", "stopped", "starting", "running"]
     assert history.killed == []
-    assert history.states("a") == ["STARTING", "RUNNING"]
+    assert history.states("a") == ["starting", "running"]
 
 
 def test_a_component_that_is_stopped_while_it_is_loaded_is_unloaded() -> None:
     history = begin(GUARD, BOX, component("a")).feed(Clear(), GateOpen("box", "there"), ProcessRequest("stop", "a"))
     assert isinstance(history.requested[-1], UnloadComponent)
-    assert history.answer("a").state.tracked["a"].state == "STOPPED"
+    assert history.answer("a").state.tracked["a"].state == "stopped"
 
 
 def test_a_container_is_restarted_with_its_components_but_not_with_one_that_was_stopped() -> None:
     history = loaded(component("a"), component("b")).feed(ProcessRequest("stop", "b")).answer("b")
     history.feed(ProcessRequest("restart", "box"))
     assert history.killed == [("box", SIGINT)]
-    assert history.states("a")[-1] == "STOPPED"
+    assert history.states("a")[-1] == "stopped"
     history.feed(Exited("box", 0), GateOpen("box", "there")).answer("a")
     assert history.loads() == ["a", "b", "a"]
-    assert history.state.tracked["b"].state == "STOPPED"
+    assert history.state.tracked["b"].state == "stopped"
 
 
 def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() -> None:
@@ -188,7 +188,7 @@ def test_a_guard_that_follows_another_is_given_what_is_not_answered_yet() -> Non
     again = [LoadComponent(name, number, again=True) for name, number in (("a", first.number), ("b", second.number))]
     assert history.requested[2:] == again
     history.answer("b")
-    assert history.states("b") == ["STARTING", "RUNNING"], "it runs already"
+    assert history.states("b") == ["starting", "running"], "it runs already"
 
 
 def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -> None:
@@ -243,7 +243,7 @@ def test_a_component_that_somebody_unloads_has_ended_and_is_loaded_again_as_its_
     assert history.found() == []
     assert history.orders[-1] == Absent("a")
     history.wait(1.0).answer("a")
-    assert history.states("a")[-3:] == ["BACKOFF", "STARTING", "RUNNING"]
+    assert history.states("a")[-3:] == ["backoff", "starting", "running"]
 
 
 def test_a_load_that_fails_slowly_is_given_up_as_one_that_fails_at_once() -> None:
@@ -251,7 +251,7 @@ def test_a_load_that_fails_slowly_is_given_up_as_one_that_fails_at_once() -> Non
     history.feed(Clear(), GateOpen("box", "there"))
     for _ in range(2):
         history.wait(25).answer("a", why="no device").wait(1.0)
-    assert history.state.tracked["a"].state == "FATAL"
+    assert history.state.tracked["a"].state == "fatal"
 
 
 def test_a_guard_that_follows_another_hears_of_an_owner_before_it_is_to_load_it() -> None:

@@ -164,7 +164,7 @@ def test_a_container_that_is_killed_comes_back_with_its_components(tmp_path: Pat
 
     def is_back(notices: list[Notice]) -> bool:
         return (
-            sum(isinstance(one, TreeComplete) for one in notices) == 2 and states(notices, "rectify")[-1] == "RUNNING"
+            sum(isinstance(one, TreeComplete) for one in notices) == 2 and states(notices, "rectify")[-1] == "running"
         )
 
     notices = run(tmp_path, ROBOT, kill, is_back)
@@ -172,7 +172,7 @@ def test_a_container_that_is_killed_comes_back_with_its_components(tmp_path: Pat
     assert [one | {"pid": 0} for one in second] == [one | {"pid": 0} for one in first]
     assert {one["pid"] for one in first}.isdisjoint(one["pid"] for one in second)
     for name in ("rectify", "odometry"):
-        assert states(notices, name) == ["STARTING", "RUNNING", "STOPPED", "STARTING", "RUNNING"]
+        assert states(notices, name) == ["starting", "running", "stopped", "starting", "running"]
     assert found(notices) == []
 
 
@@ -189,13 +189,13 @@ def test_a_component_is_tried_again_until_its_constructor_succeeds(tmp_path: Pat
     broken.touch()
 
     def mend(notices: list[Notice]) -> bool:
-        if "BACKOFF" in states(notices, "rectify"):
+        if "backoff" in states(notices, "rectify"):
             broken.unlink()
         return not broken.exists()
 
     restart = "container: box\n    restart: on-failure\n    restart_delay: 0.3 s\n"
     notices = run(tmp_path, ROBOT.replace("container: box\n", restart), mend, are_ready)
-    assert states(notices, "rectify")[:4] == ["STARTING", "BACKOFF", "STARTING", "RUNNING"]
+    assert states(notices, "rectify")[:4] == ["starting", "backoff", "starting", "running"]
     assert found(notices) == []
 
 
@@ -208,7 +208,7 @@ def test_a_component_that_takes_its_time_is_loaded_once_and_another_container_do
     notices = run(tmp_path, text, are_ready)
     plugins = [one["plugin"] for one in requested(stand_in)]
     assert sorted(plugins) == ["demo/demo::Empty", "drive/demo::Moving", "image_proc/demo::Slow"]
-    running = [one.process for one in notices if isinstance(one, ProcessState) and one.state == "RUNNING"]
+    running = [one.process for one in notices if isinstance(one, ProcessState) and one.state == "running"]
     assert running.index("other") < running.index("rectify") < running.index("odometry")
 
 
@@ -239,7 +239,7 @@ def test_a_container_that_is_killed_in_the_middle_of_a_load_comes_back_with_all(
     plugins = ["image_proc/demo::Slow", "drive/demo::Moving"]
     assert [one["plugin"] for one in requested(stand_in)] == [plugins[0], *plugins]
     for name in ("rectify", "odometry"):
-        assert states(notices, name) == ["STARTING", "STOPPED", "STARTING", "RUNNING"]
+        assert states(notices, name) == ["starting", "stopped", "starting", "running"]
     assert found(notices) == []
 
 
@@ -309,8 +309,8 @@ def test_components_come_back_with_an_external_container_that_somebody_starts_ag
         return are_ready(notices)
 
     def are_back(notices: list[Notice]) -> bool:
-        return all(states(notices, name)[-2:] == ["STARTING", "RUNNING"] for name in ("rectify", "odometry")) and (
-            "BACKOFF" in states(notices, "rectify")
+        return all(states(notices, name)[-2:] == ["starting", "running"] for name in ("rectify", "odometry")) and (
+            "backoff" in states(notices, "rectify")
         )
 
     restart = "container: box\n    restart: on-failure\n"

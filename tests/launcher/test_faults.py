@@ -113,7 +113,7 @@ class Run:
 
     def is_up(self) -> bool:
         try:
-            return all(process.state == "RUNNING" for process in self.ps().values())
+            return all(process.state == "running" for process in self.ps().values())
         except OSError:
             return False
 
@@ -178,7 +178,7 @@ def test_a_reader_that_stops_reading_stops_nobody(launch: Callable[..., Run]) ->
     os.close(writer)
     try:
         assert until(run.is_up)
-        assert until(lambda: run.ps()["flood"].state == "RUNNING")
+        assert until(lambda: run.ps()["flood"].state == "running")
         assert run.down() == 0
     finally:
         os.close(reader)
@@ -202,7 +202,7 @@ def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Ru
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
-    assert until(lambda: run.ps()["daemon"].state == "EXITED")
+    assert until(lambda: run.ps()["daemon"].state == "exited")
     assert not gone(pid)
     if how == "is killed":
         run.popen.kill()
@@ -240,7 +240,7 @@ def test_what_left_its_group_and_its_environment_ends_with_the_run(
     run = launch(bare, program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
-    assert until(lambda: run.ps()["bare"].state == ("RUNNING" if parent == "stays" else "EXITED"))
+    assert until(lambda: run.ps()["bare"].state == ("running" if parent == "stays" else "exited"))
     assert pid not in {one.pid for one in leftovers(f"{NAME}:")}
     if how == "is killed":
         run.search()
@@ -305,7 +305,7 @@ def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launc
     assert until(run.is_up)
     launcher = psutil.Process(run.popen.pid)
 
-    verbs: tuple[tuple[Verb, str], ...] = (("stop", "STOPPED"), ("start", "RUNNING"))
+    verbs: tuple[tuple[Verb, str], ...] = (("stop", "stopped"), ("start", "running"))
 
     def cycle(count: int) -> None:
         for _ in range(count):
@@ -331,7 +331,7 @@ def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
     run = launch(program("a", SLEEPER), failing, clock=CLOCK_GOES_BACK)
     assert until(run.is_up)
     (tmp_path / "back").touch()
-    assert until(lambda: run.ps()["failing"].state == "FATAL"), "1 s and 2 s of waiting are over"
+    assert until(lambda: run.ps()["failing"].state == "fatal"), "1 s and 2 s of waiting are over"
     assert (run.ps()["a"].uptime or 0) > 2
     assert ask(run.place, ProcessRequest("restart", "a"), Done).ok
     assert until(lambda: run.ps()["a"].restarts == 1)

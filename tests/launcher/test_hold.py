@@ -101,7 +101,7 @@ def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: 
     plan = plan_of(observing_until("dies"), dies)
     assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
     states = [one.state for one in notices if isinstance(one, ProcessState) and one.process == "static"]
-    assert states == ["STARTING", "RUNNING", "EXITED"]
+    assert states == ["starting", "running", "exited"]
     assert not psutil.Process().children(recursive=True)
 
 
@@ -111,5 +111,5 @@ def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(tm
     dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
     plan = plan_of(program("guard", f"{observation}raise SystemExit(4)", kind="guard", cwd="."), dies)
     assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
-    assert {one.process for one in notices if isinstance(one, ProcessState) and one.state == "EXITED"} == {"guard"}
+    assert {one.process for one in notices if isinstance(one, ProcessState) and one.state == "exited"} == {"guard"}
     assert not psutil.Process().children(recursive=True)

@@ -95,7 +95,7 @@ def test_a_guard_that_is_off_is_not_waited_for_and_still_says_what_is_live_and_r
 
 def test_an_external_process_is_expected_and_not_started() -> None:
     history = begin(DRIVE, SLAM, guard=GuardPolicy(mode="off"))
-    assert history.states("drive") == ["EXPECTED"]
+    assert history.states("drive") == ["expected"]
     assert history.started == ["slam"]
 
 
@@ -200,7 +200,7 @@ def test_a_built_in_process_that_ends_has_failed_even_with_exit_code_0(
 
 def test_a_program_that_ends_with_0_is_done_and_the_others_go_on() -> None:
     history = begin(STATIC, SLAM).feed(Exited("slam", 0))
-    assert history.states("slam")[-1] == "EXITED"
+    assert history.states("slam")[-1] == "exited"
     assert (history.found(), history.killed, history.exit_code) == ([], [], None)
 
 
@@ -226,12 +226,12 @@ def test_backoff_grows_and_ends_as_a_failure() -> None:
     delays = []
     for _ in range(5):
         history.feed(Exited("a", 1))
-        assert history.states("a")[-1] == "BACKOFF"
+        assert history.states("a")[-1] == "backoff"
         delays.append(history.sleep_until_due())
     assert delays == pytest.approx([1, 2, 4, 8, 16])
     assert history.started == ["a"] * 6
     history.feed(Exited("a", 1))
-    assert history.states("a")[-1] == "FATAL"
+    assert history.states("a")[-1] == "fatal"
     expect(history.only(), "TF808", "a", "exit code 1", " 5 restarts")
     assert history.exit_code == 1
 
@@ -262,13 +262,13 @@ def test_a_run_of_10_s_makes_earlier_failures_forgotten() -> None:
 def test_on_failure_leaves_a_program_that_is_done_and_always_starts_it_again() -> None:
     history = begin(run_process("a", restart="on-failure"), run_process("b", restart="always"), STATIC)
     history.feed(Exited("a", 0), Exited("b", 0))
-    assert (history.states("a")[-1], history.states("b")[-1]) == ("EXITED", "BACKOFF")
+    assert (history.states("a")[-1], history.states("b")[-1]) == ("exited", "backoff")
 
 
 def test_a_process_that_waits_for_its_restart_is_not_started_once_everything_stops() -> None:
     history = begin(run_process("a", restart="always"), STATIC).feed(Exited("a", 1), Signalled(SIGINT)).wait(2)
     assert history.started == ["a", "static"]
-    assert history.states("a")[-1] == "STOPPED"
+    assert history.states("a")[-1] == "stopped"
     assert history.feed(Exited("static", 0)).exit_code == 0
 
 
@@ -304,7 +304,7 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
     history.feed(Exited("slam", -SIGINT)).wait(60)
     assert (history.started, history.states("slam")[-1], history.exit_code) == (
         ["guard", "static", "slam"],
-        "STOPPED",
+        "stopped",
         None,
     )
     expect(history.feed(Found(ERROR, "slam")).found()[-1], "TF801", "nothing is stopped", "slam")

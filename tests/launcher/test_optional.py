@@ -42,14 +42,14 @@ def test_it_is_first_started_again_as_often_as_the_plan_says() -> None:
     history = begin(STATIC, replace(optional(), restart="on-failure", max_restarts=2))
     slept = [history.feed(Exited("camera", 1)).sleep_until_due() for _ in range(2)]
     assert slept == [1.0, 2.0]
-    assert history.feed(Exited("camera", 1)).states("camera")[-1] == "FATAL"
+    assert history.feed(Exited("camera", 1)).states("camera")[-1] == "fatal"
     assert history.state.stop is None
 
 
 def test_one_that_the_operating_system_does_not_start_is_given_up_too() -> None:
     history = begin(STATIC, optional()).feed(StartFailed("camera", "no such program"))
     expect(history.only(), "TF808", "camera", "no such program")
-    assert (history.states("camera")[-1], history.state.stop) == ("FATAL", None)
+    assert (history.states("camera")[-1], history.state.stop) == ("fatal", None)
 
 
 def test_one_that_ends_as_it_should_has_not_failed() -> None:
@@ -96,7 +96,7 @@ def test_one_that_never_ran_does_not_count_as_started() -> None:
     history = begin(GUARD, optional(), optional("nav", after={"camera": "started"}))
     history.starts = False
     history.feed(Clear(), StartFailed("camera", "no such program")).wait(1)
-    assert history.state.tracked["nav"].state == "STOPPED"
+    assert history.state.tracked["nav"].state == "stopped"
     assert history.state.given_up == ("camera", "nav")
 
 
@@ -133,7 +133,7 @@ def test_ps_says_what_is_optional_why_it_ended_and_that_it_has_failed() -> None:
     history = failed(SLAM)
     output = {one.name: one for one in status(history.state, history.now).processes}
     camera = output["camera"]
-    assert (camera.state, camera.detail, camera.failed) == ("EXITED", "exit code 3", True)
+    assert (camera.state, camera.detail, camera.failed) == ("exited", "exit code 3", True)
     assert (camera.required, output["slam"].required) == (False, None)
 
 

@@ -158,7 +158,7 @@ def test_max_restarts_is_the_plans() -> None:
     history = begin(replace(run_process("a", restart="on-failure"), max_restarts=2))
     for _ in range(2):
         history.feed(Exited("a", 1)).sleep_until_due()
-    assert history.feed(Exited("a", 1)).states("a")[-1] == "FATAL"
+    assert history.feed(Exited("a", 1)).states("a")[-1] == "fatal"
     expect(history.only(), "TF808", "a", "exit code 1", " 2 restarts")
 
 
@@ -208,7 +208,7 @@ def test_a_process_is_restarted_and_the_guard_is_informed_before_and_after() -> 
 def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
     history = begin(STATIC, run_process("a", restart="always"))
     history.feed(ProcessRequest("stop", "a"), Exited("a", 1)).wait(60)
-    assert (history.states("a")[-1], history.exit_code) == ("STOPPED", None)
+    assert (history.states("a")[-1], history.exit_code) == ("stopped", None)
     assert history.started == ["static", "a"]
     assert history.feed(ProcessRequest("start", "a")).started == ["static", "a", "a"]
     assert history.found() == []
@@ -258,7 +258,7 @@ def test_a_guard_that_dies_is_reported_and_restarted_with_its_reports_and_live_e
     history.feed(Exited("guard", -SIGKILL, ("last words",)))
     expect(history.only(), "TF808", "guard", "SIGKILL", "guard: last words")
     assert history.only().severity == "warning"
-    assert history.states("guard") == ["BACKOFF"]
+    assert history.states("guard") == ["backoff"]
     assert history.state.live == {"odom"}
     assert history.sleep_until_due() == pytest.approx(1)
     assert (history.started[-1], history.state.memory) == ("guard", {"a": 1, "b": 2})

@@ -109,7 +109,7 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed(tmp_path: Path) -> No
             os.kill(os.getpid(), SIGINT)
 
     assert supervise(plan_of(program("a", DEAF)), tmp_path / "plan.json", report=report, times=times) == 0
-    details = [notice.detail for notice in notices if isinstance(notice, ProcessState) and notice.state == "STOPPING"]
+    details = [notice.detail for notice in notices if isinstance(notice, ProcessState) and notice.state == "stopping"]
     assert [detail.split()[-1] for detail in details] == ["SIGINT", "SIGTERM", "SIGKILL"]
     assert gone(int(logged(notices, "a")[0].split()[1]))
 
@@ -185,7 +185,7 @@ def test_what_cannot_be_executed_is_named_and_everything_ends_with_1(tmp_path: P
     expect(found, "TF808", "a ", "Exec format error", str(broken))
     assert [notice.state for notice in notices if isinstance(notice, ProcessState) and notice.process == "b"][
         -1
-    ] == "STOPPED"
+    ] == "stopped"
 
 
 def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(tmp_path: Path) -> None:
@@ -240,12 +240,12 @@ def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_
 
     def running_b() -> Notice | None:
         return next(
-            (one for one in notices if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "RUNNING")),
+            (one for one in notices if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "running")),
             None,
         )
 
     assert supervise(plan_of(events, b, a), tmp_path / "plan.json", report=report) == 0
-    started = [notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "STARTING"]
+    started = [notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "starting"]
     assert started == ["guard", "a", "b"]
     assert logged(notices, "guard")[:1] == ["not an event: rubbish"]
 
@@ -269,7 +269,7 @@ def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: P
     code, notices = run(tmp_path, guard(end="raise SystemExit('no rclpy')"), program("a", SLEEPER))
     assert code == 1
     assert [
-        notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "STARTING"
+        notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "starting"
     ] == ["guard"]
 
 

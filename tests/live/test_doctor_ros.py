@@ -497,11 +497,16 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("RMW_IMPLEMENTATION", "rmw_none_cpp"), ("ROS_DOMAIN_ID", "300"), ("ROS_DOMAIN_ID", "lab")]
+    ("name", "value", "code", "exit_code"),
+    [
+        ("RMW_IMPLEMENTATION", "rmw_none_cpp", "TF901", 2),
+        ("ROS_DOMAIN_ID", "300", "TF909", 1),
+        ("ROS_DOMAIN_ID", "lab", "TF909", 1),
+    ],
 )
 @pytest.mark.usefixtures("domain")
 def test_settings_with_which_ros_does_not_start_are_reported_by_every_live_command(
-    monkeypatch: pytest.MonkeyPatch, name: str, value: str
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str, code: str, exit_code: int
 ) -> None:
     """ROS itself ends the process, with exit code 102, or with Fast DDS's own words."""
     monkeypatch.setenv(name, value)
@@ -509,6 +514,6 @@ def test_settings_with_which_ros_does_not_start_are_reported_by_every_live_comma
         command = [sys.executable, "-m", "tfcompose", *words]
         done = processes.run(command)
         output = done.stdout + done.stderr
-        assert done.returncode == 1
-        assert output.startswith(f"error[TF909] {name}={value}")
+        assert done.returncode == exit_code
+        assert output.startswith(f"error[{code}] {name}={value}")
         assert len(output.splitlines()) == 2

@@ -36,7 +36,10 @@ def inertia_missing(robot: Robot) -> Iterator[Finding]:
             at = robot.links[edge.child].at
             message = f"{edge.child}, moved by {edge.joint_name}, has no mass, but {other} has"
             advice = '<inertial> with <mass value="…"/> and <inertia …/>'
-            advice = advice if robot.is_foreign(at) else "inertial: {mass: 0.5 kg}"
+            if not robot.is_foreign(at):
+                link = robot.links[edge.child]
+                shape = "" if link.visuals or link.collisions else ", visual: {box: [0.1, 0.1, 0.1]}"
+                advice = f"inertial: {{mass: 0.5 kg}}{shape}"
             yield finding("TF709", message, at, help=f"add {advice}")
 
 

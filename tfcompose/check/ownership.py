@@ -33,6 +33,10 @@ def edge_with_two_owners(robot: Robot) -> Iterator[Finding]:
             yield finding("TF301", message, place, notes=notes, help="remove one of the two edges, or its owner")
 
 
+#: ROS's own programs, which tfcompose replaces.
+STOCK = frozenset({"robot_state_publisher", "static_transform_publisher", "joint_state_publisher"})
+
+
 @rule("TF302")
 def unknown_owner(robot: Robot) -> Iterator[Finding]:
     """An edge names an owner that is not a process.
@@ -50,6 +54,8 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
         message = f"unknown owner {owner} of {with_more(edges[0].name, len(edges) - 1)}"
         runs = next((p.name for p in robot.processes if owner in {node.rpartition("/")[2] for node in p.nodes}), "")
         declare = f"did you mean {runs}, the process that runs this node?" if runs else declare
+        if owner in STOCK:
+            declare = "leave owner out: tfcompose publishes fixed frames and joints itself"
         advice = left_out_by(robot.conditions, owner) or did_you_mean(owner, names, declare)
         yield finding("TF302", message, at, help=advice)
 
@@ -316,7 +322,8 @@ def parameters_of_another_node(robot: Robot) -> Iterator[Finding]:
 
     ROS gives a node the parameters under its full name and silently drops all others. In a parameter file, a name
     without a leading slash is relative to the process's namespace; * stands for one part of a name and ** for any
-    number of them. Inline parameters do not repeat the node's name and ``ros__parameters``: tfcompose adds these.
+    number of them. If none of a process's files has anything for its node, that is a warning: such a file is legal, and
+    sets nothing. Inline parameters do not repeat the node's name and ``ros__parameters``: tfcompose adds these.
     """
     for process in robot.processes:
         for node in process.ros_nodes:

@@ -240,6 +240,8 @@ _SIDES = {"left": ("right", 1), "right": ("left", 1), "front": ("rear", 0), "rea
 _NEAR_M = 1e-6
 #: Nearer to the middle than this, left and right may well be at one place.
 _MIDDLE_M = 0.01
+#: So near to the other one's mirror image, the two are a pair.
+_MIRRORED_M = 0.001
 
 
 def placed(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
@@ -267,12 +269,25 @@ def twins(frame: str) -> Iterator[str]:
                 yield "_".join([*words[:index], "back", *words[index + 1 :]])
 
 
+def are_swapped(one: Edge, other: Edge) -> bool:
+    """Return whether the two are named after two sides of their parent and each stands, mirrored, on the other one."""
+    axis, sign = side_of(one.child, other.child)
+    here, there = one.pose.xyz, other.pose.xyz
+    mirrored = tuple(-value if index == axis else value for index, value in enumerate(there))
+    return sign * here[axis] < -_MIDDLE_M and math.dist(here, mirrored) < _MIRRORED_M
+
+
+def side_of(frame: str, twin: str) -> tuple[int, int]:
+    """Return the axis on which the frame and its twin differ, and on which side of it the frame's name says it is."""
+    word = next(one for one, other in zip(frame.split("_"), twin.split("_"), strict=True) if one != other)
+    return _SIDES[word][1], 1 if word in {"left", "front"} else -1
+
+
 def are_mirrored(one: Edge, other: Edge) -> bool:
     """Return whether the two are named after two sides of the robot and yet stand on the same one, at one place."""
     if one.parent != other.parent or other.child not in twins(one.child):
         return False
-    differs = [a != b for a, b in zip(one.child.split("_"), other.child.split("_"), strict=True)]
-    axis = _SIDES[one.child.split("_")[differs.index(True)]][1]
+    axis, _ = side_of(one.child, other.child)
     apart = math.dist(one.pose.xyz, other.pose.xyz)
     return apart < _NEAR_M and abs(one.pose.xyz[axis]) > _MIDDLE_M
 

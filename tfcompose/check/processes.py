@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.model import left_out_by
+from tfcompose.units import UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -193,3 +195,26 @@ def host_without_processes(robot: Robot) -> Iterator[Finding]:
         if name not in used and ("hosts", name) not in robot.broken:
             advice = f"processes: {{static: {{host: {name}}}}} runs all that names no other host, or remove it"
             yield finding("TF858", f"no process runs on the host {name}", host.at, help=advice)
+
+
+#: A number, a space and what may be a unit.
+_WITH_UNIT = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?) +(\S+)")
+
+
+@rule("TF859")
+def parameter_with_unit(robot: Robot) -> Iterator[Finding]:
+    """A parameter of a node is a number with a unit.
+
+    ROS parameters have no units, so the node gets a string, and most nodes end with InvalidParameterTypeException.
+    Write the number in the unit that the node expects: ``wheel_separation: 0.4``. If the node does read such a
+    string, allow the finding.
+    """
+    for process in robot.processes:
+        for node in process.ros_nodes:
+            for name, value in node.params.items():
+                parts = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
+                if parts and parts[2] in UNITS:
+                    at, *_ = node.places.get(name, (node.at,))
+                    message = f"{node.name} gets the parameter {name} as a string: {value}"
+                    advice = f"parameters have no units: write {name}: {parts[1]}, in the unit that the node expects"
+                    yield finding("TF859", message, at, help=advice)

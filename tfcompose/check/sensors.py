@@ -6,10 +6,10 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.check.poses import are_mirrored, envelope, is_near, twins
+from tfcompose.check.poses import are_mirrored, are_swapped, envelope, is_near, placed, side_of, twins
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, finding
-from tfcompose.geometry import Pose, angle_between, norm
+from tfcompose.geometry import IDENTITY_XYZW, Pose, angle_between, norm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -155,6 +155,8 @@ def calibration_copied(robot: Robot) -> Iterator[Finding]:
 #: What is built into other devices, and so may share their pose.
 _BUILT_IN_KINDS = frozenset({"imu", "gnss"})
 _SAME_M, _SAME_RAD = 1e-6, 1e-6
+#: A parent that is turned by more has other sides than the base.
+_TURNED_RAD = 0.02
 
 
 @rule("TF621", follows="pose")
@@ -200,6 +202,34 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
             notes = [Note(f"{twin.child} is defined here", twin.at)]
             advice = "change the sign of one: y is positive to the left, x to the front"
             yield finding("TF622", message, edge.at, help=advice, notes=notes)
+
+
+@rule("TF625", follows="pose")
+def sides_swapped(robot: Robot) -> Iterator[Finding]:
+    """A left frame is on the right of its parent and the right one on the left, or front and rear are swapped.
+
+    The two are each other's mirror image, and each stands where the other's name says. By REP-103 y is positive to the
+    left and x to the front. Example: ``left_camera`` is at y = -0.1 and ``right_camera`` at y = 0.1: what the
+    left camera sees appears on the robot's right. Swap the signs, or the names. Fixed frames and wheels are judged, in
+    a parent turned as the base is: on a rack that looks back, left is the robot's right. A gripper's fingers are
+    named as their maker likes.
+    """
+    poses = placed(robot, moving=True)
+    given: dict[str, Edge] = {}
+    for edge in robot.edges:
+        base = poses.get(edge.parent)
+        is_fixed = edge.joint.type == "continuous" if edge.joint else edge.kind == "static"
+        if not edge.given or not is_fixed or base is None or angle_between(base.quat_xyzw, IDENTITY_XYZW) > _TURNED_RAD:
+            continue
+        twin = next((given[name] for name in twins(edge.child) if name in given), None)
+        given[edge.child] = edge
+        if twin and twin.parent == edge.parent and are_swapped(twin, edge):
+            axis = "xy"[side_of(edge.child, twin.child)[0]]
+            places = " and ".join(f"{one.child} at {axis} = {one.pose.xyz['xy'.index(axis)]:g}" for one in (twin, edge))
+            message = f"{places} in {edge.parent}: each is on the other's side"
+            notes = [Note(f"{twin.child} is defined here", twin.at)]
+            advice = "swap the signs, or the names: y is positive to the left, x to the front"
+            yield finding("TF625", message, edge.at, help=advice, notes=notes)
 
 
 #: Parts of parameter names that tell two devices apart as a serial number does.

@@ -85,19 +85,21 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
     second tree, which no lookup reaches.
     """
     searches = count(1)
+    moved = {edge.child for edge in robot.edges if edge.joint_name}
 
-    def advice(name: str, at: Span, section: str) -> str:
+    def advice(name: str, at: Span, section: str, child: str = "") -> str:
         if conditional := left_out_by(robot.conditions, name):
             return conditional
         near = robot.frames if next(searches) <= _MOST_SEARCHES else ()
         declare = f'add <link name="{name}"/>' if robot.is_foreign(at) else f"declare it: {section}: {{{name}: {{}}}}"
-        return did_you_mean(name, near, declare)
+        return did_you_mean(name, [one for one in near if one != child], declare)
 
     for edge in robot.edges:
         for parent in (edge.parent, *edge.switched) if edge.given else ():
             if parent not in robot.frames and not robot.excuses(parent):
                 message = f"{edge.child}: unknown parent frame {parent}"
-                yield finding("TF203", message, edge.at, help=advice(parent, edge.at, "frames"))
+                section = "links" if parent in moved else "frames"
+                yield finding("TF203", message, edge.at, help=advice(parent, edge.at, section, edge.child))
         if edge.child not in robot.frames and not robot.excuses(edge.child):
             at = edge.child_at or edge.at
             message = f"joint {edge.joint_name}: unknown child link {edge.child}"

@@ -1,10 +1,10 @@
-"""What a word of a command line can be: commands, options, their values, and names that the robot file has.
-
-Where nothing is returned the shell offers files.
-"""
+"""What a word of a command line can be: commands, options, their values, and names that the robot file has."""
 
 from __future__ import annotations
 
+import os
+import re
+import shlex
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.command_parser import Command, command_parser
@@ -21,28 +21,70 @@ if TYPE_CHECKING:
 YAML = (".yaml", ".yml")
 
 
-def candidates(commands: Mapping[str, Command], words: Sequence[str], at: int) -> list[str]:
-    """Return what ``words[at]`` can be; ``words`` begins with the program's name, and the word may be half written."""
+#: Words in the help of arguments that take a file or a folder.
+PATHS = frozenset({"FILE", "DIR", "FOLDER", "BAG", "PICTURE", "PLAN", "OLD", "NEW"})
+
+
+def candidates(commands: Mapping[str, Command], words: Sequence[str], at: int) -> tuple[list[str], bool]:
+    """Return what ``words[at]`` can be, and whether it can also be a file.
+
+    ``words`` begins with the program's name, and the word may be half written.
+    """
     if at < 1:
-        return []
-    word, before = (words[at] if at < len(words) else ""), list(words[1:at])
+        return [], False
+    word, before = (
+        (words[at] if at < len(words) else ""),
+        list(map(_expanded, words[1:at])),
+    )
     if not before:
-        return _beginning(word, [*commands, "--help", "--version"])
+        return _beginning(word, [*commands, "--help", "--version"]), False
     if before[0] not in commands:
-        return []
+        return [], False
     if before == ["help"]:
         from tfcompose.language.reference import keys, paths
 
-        return _beginning(word, [*TOPICS, *commands, *(paths() if "." in word else keys())])
+        return _beginning(word, [*TOPICS, *commands, *(paths() if "." in word else keys())]), False
     actions = command_parser(before[0], commands[before[0]])._actions  # noqa: SLF001 (argparse has no other way)
     options = {text: action for action in actions for text in action.option_strings}
+    option, equals, value = word.partition("=")
+    joined = options.get(option) if equals else None
+    if joined is not None and joined.nargs != 0:
+        return [f"{option}={one}" for one in _completed(value, _values(joined, before), joined)], _is_path(joined)
     valued = options.get(before[-1])
     if valued is not None and valued.nargs != 0:
-        return _beginning(word, _values(valued, before))
+        return _completed(word, _values(valued, before), valued), _is_path(valued)
     if word.startswith("-"):
-        return _beginning(word, options)
+        return _beginning(word, options), False
     positionals = [one for one in actions if not one.option_strings]
-    return _beginning(word, [value for one in positionals for value in _values(one, before)])
+    if positionals and positionals[0].choices and positionals[0].nargs is None and len(before) == 1:
+        positionals = positionals[:1]  # the first word is needed
+    known = [value for one in positionals for value in _values(one, before)]
+    return _beginning(word, known), any(map(_is_path, positionals))
+
+
+def split_line(line: str) -> list[str]:
+    """Return the words of a command line up to the cursor; the last one may be empty, or its quotes still open."""
+    for end in ("", "'", '"', "\\"):
+        try:
+            words = shlex.split(f"{line}{end}")
+        except ValueError:
+            continue
+        return [*words, ""] if not end and (not line or line[-1].isspace()) and not line.endswith("\\ ") else words
+    return []
+
+
+def _expanded(word: str) -> str:
+    return os.path.expanduser(word)  # noqa: PTH111 (where there is no such user it stays as it is)
+
+
+def _is_path(action: Action) -> bool:
+    return isinstance(action.metavar, str) and not PATHS.isdisjoint(re.findall("[A-Z]+", action.metavar))
+
+
+def _completed(word: str, known: Iterable[str], action: Action) -> list[str]:
+    """Return what an option's value can be; of a list with commas, what its last part can be."""
+    first, comma, last = word.rpartition(",") if action.metavar == "CODES" else ("", "", word)
+    return [f"{first}{comma}{one}" for one in _beginning(last, known)]
 
 
 def _beginning(word: str, known: Iterable[str]) -> list[str]:
@@ -53,6 +95,8 @@ def _values(action: Action, before: Sequence[str]) -> list[str]:
     """Return the values of an argument, as far as they have names."""
     if action.choices is not None:
         return [str(one) for one in action.choices]
+    if isinstance(action.metavar, str) and action.metavar.islower():
+        return action.metavar.split("|")
     source = _SOURCES.get((before[0], action.dest)) or _SOURCES.get(("", action.dest))
     return source(before) if source else []
 
@@ -85,16 +129,28 @@ def _codes_or_frames(before: Sequence[str]) -> list[str]:
     return _frames(before) if any(word.endswith(YAML) for word in before) else _codes(before)
 
 
-def _profiles(before: Sequence[str]) -> list[str]:
-    """Return the profiles of the robot file that is named, or of that of this folder."""
+def _section(name: str, before: Sequence[str]) -> list[str]:
+    """Return the names in a section of the robot file that is given, or of that of this folder."""
     from tfcompose.load import load
 
     file = next((word for word in before if word.endswith(YAML) and not is_plan(word)), DEFAULT_FILE)
     try:
-        profiles = load(read_text(file), file).data.get("profiles")
+        section = load(read_text(file), file).data.get(name)
     except RejectedError:
         return []
-    return [str(one) for one in profiles] if isinstance(profiles, dict) else []
+    return [str(one) for one in section] if isinstance(section, dict) else []
+
+
+def _profiles(before: Sequence[str]) -> list[str]:
+    return _section("profiles", before)
+
+
+def _hosts(before: Sequence[str]) -> list[str]:
+    return _section("hosts", before)
+
+
+def _given(before: Sequence[str]) -> list[str]:
+    return [f"{name}:=" for name in _section("args", before)]
 
 
 def _presets(_: Sequence[str]) -> list[str]:
@@ -131,6 +187,10 @@ def _processes(_: Sequence[str]) -> list[str]:
 _SOURCES: dict[tuple[str, str], Callable[[Sequence[str]], list[str]]] = {
     ("", "profiles"): _profiles,
     ("", "robot"): _robots,
+    ("", "given"): _given,
+    ("deploy", "hosts"): _hosts,
+    ("export", "host"): _hosts,
+    ("up", "host"): _hosts,
     ("", "a"): _frames,
     ("", "b"): _frames,
     ("lint", "select"): _codes,

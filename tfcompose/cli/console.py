@@ -45,7 +45,7 @@ NAMED_AT_MOST = 4
 #: Of so many last lines of a process it is known that they were printed; findings quote fewer.
 QUOTED_AT_MOST = 40
 #: States that need no line of their own: the edges say more.
-UNREPORTED = frozenset({"STARTING", "STOPPED"})
+UNREPORTED = frozenset({"starting", "stopped"})
 
 #: The status line is drawn at most so often, in seconds.
 STATUS_EVERY_S = 0.2
@@ -163,10 +163,10 @@ class Console:
     def _(self, notice: ProcessState) -> None:
         if notice.state in UNREPORTED:
             return
-        text = f"{notice.process}: {notice.state.lower()}"
-        if notice.state == "RUNNING":
+        text = f"{notice.process}: {notice.state}"
+        if notice.state == "running":
             text = f"started {notice.process} (pid {notice.pid})"
-        elif notice.state == "EXPECTED":
+        elif notice.state == "expected":
             nodes = ", ".join(self._nodes.get(notice.process, ()))
             host = self._hosts.get(notice.process)
             text = f"expecting {notice.process} ({nodes}): {f'{host} starts it' if host else 'it is started elsewhere'}"
@@ -305,7 +305,7 @@ class StatusLine:
         """Count what the notice says."""
         if isinstance(notice, ProcessState):
             self._states[notice.process] = notice.state
-            if notice.state not in ("RUNNING", "EXPECTED", "STOPPING"):
+            if notice.state not in ("running", "expected", "stopping"):
                 self._live.pop(notice.process, None)
         elif isinstance(notice, OwnerLive):
             self._live[notice.owner] = len(notice.edges)
@@ -354,13 +354,13 @@ class StatusLine:
     def _runs(self, name: str) -> bool:
         """Return whether the process runs; one that others start does when its edges are live, as far as is known."""
         state = self._states.get(name)
-        return state in ("RUNNING", "STOPPING") or (
-            state == "EXPECTED" and (not self._owned[name] or name in self._live)
+        return state in ("running", "stopping") or (
+            state == "expected" and (not self._owned[name] or name in self._live)
         )
 
     def _missing(self) -> str:
         if self._stopping:
-            alive = [name for name, state in self._states.items() if state in ("RUNNING", "STOPPING")]
+            alive = [name for name, state in self._states.items() if state in ("running", "stopping")]
             return f"stopping {listed(alive, STATUS_NAMED_AT_MOST)}" if alive else "stopping"
         waits = [name for name, owned in self._owned.items() if owned and name not in self._live]
         return f"waiting for {listed(waits, STATUS_NAMED_AT_MOST)}" if waits and not self._ready else ""

@@ -272,7 +272,7 @@ class Dashboard:
         head.append_text(self._state())
         if self.status:
             ours = [process for process in self._processes() if process.kind != "external"]
-            running = sum(process.state == "RUNNING" for process in ours)
+            running = sum(process.state == "running" for process in ours)
             edges, live = self._live_edges()
             head.append(f" · {running}/{len(ours)} processes", style="" if running == len(ours) else "yellow")
             if edges:

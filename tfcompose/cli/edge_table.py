@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 #: A stamp that is farther off is taken to be of another clock.
 _CLOCKS_AGREE_S = 1e6
 HEADS = ("edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay", "")
-#: A narrow terminal goes without jitter, gap and kind: a row of a fixed edge has no numbers, whatever its kind says.
+#: A narrow terminal goes without kind (a row of a fixed edge has no numbers), jitter, gap, delay and age.
 TABLE = Table(
     right=frozenset(range(3, 8)),
-    spare=(4, 5, 2),
+    spare=(2, 4, 5, 7, 6),
     least={8: 16, 1: 16, 0: 24},
     colour=lambda column, _: YELLOW if HEADS[column] == "" else "",
 )

@@ -113,11 +113,11 @@ def host_share(plan: Plan, host: str | None, here: str) -> Plan:
     return share
 
 
-def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool) -> Path:
+def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool, build_dir: Path | None = None) -> Path:
     """Copy the plan, and what stands beside it, to where the run is; return the copy.
 
     A build then does not reach into a run. Meshes stay where they are: descriptions address them from the copy too.
-    ``alone`` removes the copies of earlier runs.
+    ``alone`` removes the copies of earlier runs; ``build_dir`` is where paths begin, if not beside the plan.
 
     Raises:
         SystemExit: after saying that it cannot be copied.
@@ -129,7 +129,7 @@ def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool) -> Path
             if name is not None and (file.parent / name).is_file():
                 parts[name] = (file.parent / name).read_bytes()
         for name in descriptions & parts.keys():
-            parts[name] = _with_absolute_addresses(parts[name], (file.parent / name).parent)
+            parts[name] = _with_absolute_addresses(parts[name], ((build_dir or file.parent) / name).parent)
         digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
         folder = place.plan_folder(digest)
         if alone:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import re
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import IDENTITY_XYZW
 from tfcompose.language.preset import Chosen, FurtherProcess, PresetOptics
 from tfcompose.numbers import clean_quat, clean_rpy, number
+from tfcompose.render.tree import wrapped
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled, node_preset, node_preset_names
 
@@ -54,13 +56,13 @@ def facts(name: str, library: Library) -> dict[str, Any]:
     }
 
 
-def text(preset: dict[str, Any]) -> str:
-    """Return the page."""
+def text(preset: dict[str, Any], columns: int | None = None) -> str:
+    """Return the page, with lines of at most so many columns."""
     parts = [f"{preset['name']}  {preset['vendor']} {preset['model']}, {preset['kind']}\n{preset['about']}"]
     if preset["options"]:
         rows = [(key, _option_text(option)) for key, option in preset["options"].items()]
         parts.append("options\n" + _table(rows))
-    parts.append(f"frames of a sensor {NAME}\n" + _tree(preset))
+    parts.append(f"frames of a sensor {NAME}\n" + _tree(preset, columns))
     if preset["body"]:
         parts.append(f"body\n  {_body_text(preset['body'])}")
     if preset["optics"]:
@@ -71,7 +73,22 @@ def text(preset: dict[str, Any]) -> str:
     sources = [_source(fact) for fact in preset["source"]] + _optics_sources(preset["optics"])
     if sources:
         parts.append("source\n" + "\n".join(sources))
-    return "\n\n".join(parts) + "\n"
+    return _fitted("\n\n".join(parts) + "\n", columns)
+
+
+def _fitted(page: str, columns: int | None) -> str:
+    """Return the page with lines of at most so many columns; what has no room goes on below, by cells."""
+    if columns is None:
+        return page
+    lines = []
+    for line in page.splitlines():
+        name, *cells = re.split(r" {2,}", line.strip())
+        parts = wrapped([("  ", name, cells)], columns)[0] if len(line) > columns and len(cells) > 1 else [line]
+        for part in parts:
+            begun = re.match(r" +\S+ {2,}", part)
+            indent = begun.end() if begun and begun.end() < columns // 2 else 6
+            lines += textwrap.wrap(part, columns, subsequent_indent=" " * indent, break_on_hyphens=False) or [""]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _named(pattern: str, preset: PresetSpec) -> str:
@@ -185,21 +202,25 @@ def _option_text(option: dict[str, Any]) -> str:
     return f"{kind}{', '.join(option.get('values', []))}{default}{about}"
 
 
-def _tree(preset: dict[str, Any]) -> str:
+def _tree(preset: dict[str, Any], columns: int | None) -> str:
     below: dict[str, list[dict[str, Any]]] = {}
     for frame in preset["frames"]:
         below.setdefault(frame["parent"], []).append(frame)
-    rows: list[tuple[str, ...]] = [(preset["mount"], "the mount", "", "", "")]
+    rows = [("", preset["mount"], ("the mount", "", "", ""))]
 
     def add(parent: str, indent: str) -> None:
         inside = below.get(parent, [])
         for frame in inside:
             last = frame is inside[-1]
-            rows.append((f"{indent}{'└── ' if last else '├── '}{frame['name']}", *_facts_of(frame)))
+            rows.append((f"{indent}{'└── ' if last else '├── '}", frame["name"], _facts_of(frame)))
             add(frame["name"], indent + ("    " if last else "│   "))
 
     add(preset["mount"], "")
-    return _table(rows)
+    table = _table([(lines + name, *facts) for lines, name, facts in rows])
+    if columns is None or max(map(len, table.splitlines())) <= columns:
+        return table
+    tight = [(lines, name, [fact for fact in facts if fact]) for lines, name, facts in rows]
+    return "\n".join(f"  {line}" for some in wrapped(tight, columns - 2) for line in some)
 
 
 def _facts_of(frame: dict[str, Any]) -> tuple[str, str, str, str]:
@@ -346,8 +367,8 @@ def _claim(claim: ClaimSpec, usual: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def node_text(preset: dict[str, Any]) -> str:
-    """Return the page."""
+def node_text(preset: dict[str, Any], columns: int | None = None) -> str:
+    """Return the page, with lines of at most so many columns."""
     parts = [f"{preset['name']}  the node {preset['node']} of {preset['package']}\n{preset['about']}"]
     parts.append("publishes" + (", one of these" if preset["one_of"] else ""))
     parts[-1] += "".join(f"\n  {_claim_text(claim)}" for claim in preset["publishes"])
@@ -361,7 +382,7 @@ def node_text(preset: dict[str, Any]) -> str:
         parts.append(f"note\n  {preset['hint']}")
     sources = [" ".join(str(part) for part in fact.values()) for fact in preset["source"]]
     parts.append("source\n" + "\n".join(f"  {source}" for source in sources))
-    return "\n\n".join(parts) + "\n"
+    return _fitted("\n\n".join(parts) + "\n", columns)
 
 
 def _claim_text(claim: dict[str, Any]) -> str:

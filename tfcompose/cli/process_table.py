@@ -35,12 +35,12 @@ def row(process: ProcessStatus, used: Usage) -> tuple[str, ...]:
 
 def _state(process: ProcessStatus) -> str:
     """Return the state in words, with why it is in it where that is not plain."""
-    state = process.state.lower()
-    if process.state == "EXPECTED":
+    state = process.state
+    if process.state == "expected":
         return f"{state} of {process.host}" if process.host else state
-    if process.state == "RUNNING":
+    if process.state == "running":
         return state if process.ready else f"{state}, not ready"
-    if process.state == "STOPPED" and process.waits:  # it will be started
+    if process.state == "stopped" and process.waits:  # it will be started
         return process.waits
     why = f" ({process.detail[:LONGEST_WHY]}{'…' * (len(process.detail) > LONGEST_WHY)})" if process.detail else ""
     return f"{state}{why}{', failed' if process.failed and state != 'fatal' else ''}"

@@ -156,7 +156,12 @@ def notices(
                 return
             *lines, rest = (rest + data).split(b"\n")
             for line in lines:
-                yield read_notice(line)
+                try:
+                    yield read_notice(line)
+                except (ValueError, TypeError) as error:
+                    raise ConnectionError(
+                        f"its launcher reports what this tfcompose does not understand: {error}"
+                    ) from None
 
 
 def wait_until_ready(place: RuntimeDir, timeout_s: float | None) -> int:
@@ -187,8 +192,8 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
     warn(f"{place.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose logs and down")
     for process in status.processes:
         if process.failed:
-            warn(f"  failed: {process.name} ({process.state.lower()}, {process.detail})")
-        elif not process.ready and process.state != "EXITED":
+            warn(f"  failed: {process.name} ({process.state}, {process.detail})")
+        elif not process.ready and process.state != "exited":
             warn(f"  not ready: {process.name} ({_why_not_ready(process)})")
     if missing:
         warn(f"  not live: {listed(missing, NAMED_AT_MOST)}")
@@ -196,9 +201,9 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
 
 def _why_not_ready(process: ProcessStatus) -> str:
     """Return what it waits for before its start; else its state, what it is without, and what is seen there."""
-    if process.state == "STOPPED" and process.waits:
+    if process.state == "stopped" and process.waits:
         return process.waits
-    parts = [process.state.lower()]
+    parts: list[str] = [process.state]
     if process.edges:
         parts.append(f"{process.live} of {process.edges} edges live")
     elif process.waits:

@@ -79,6 +79,8 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
         fail(f"the run cannot be recorded: {error}", UNREADABLE)
     with ExitStack() as stack:
         stack.callback(lock.close)
+        if arguments.update:
+            fail(f"{place.name} does not run, and up --update starts nothing")
         if hidden := hidden_run(place):
             fail(hidden)
         copy = copy_plan(plan, file, place, alone=True)
@@ -130,8 +132,9 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     who = (
         f"{place.name} runs already: pid {holder.pid}, since {since(holder)}" if holder else f"{place.name} just ended"
     )
-    copy = copy_plan(plan, file, place, alone=False)
-    answer = request(place, UpdateRequest(str(copy), str(file.absolute().parent)), PlanChange)
+    folder = Path(arguments.build_dir).absolute() if arguments.build_dir else file.absolute().parent
+    copy = copy_plan(plan, file, place, alone=False, build_dir=folder)
+    answer = request(place, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
         fail(who)
     parts = (("restarted", answer.changed), ("started", answer.added), ("stopped", answer.removed))
@@ -144,7 +147,7 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
         print(vanished(answer.held))
     if arguments.wait:
         return wait_until_ready(place, arguments.timeout)
-    return 0 if changes or arguments.detach else FAILED
+    return 0 if changes or arguments.detach or arguments.update else FAILED
 
 
 def _with_profiles(found: Finding, arguments: Namespace) -> Finding:

@@ -1,7 +1,8 @@
 """Tables of text: as wide as they are for files and pipes; for a terminal fitted, coloured and drawn again in place.
 
 A pipe gets the same bytes whatever the terminal is. On a narrow terminal the columns that matter least are left out,
-and names are shortened after their first third: their ends tell them apart. rich would cut numbers there, too.
+and names are shortened after their first third: their ends tell them apart. Of an edge the parent is shortened before
+the child, which no other edge has. rich would cut numbers there, too.
 """
 
 from __future__ import annotations
@@ -42,12 +43,14 @@ class Table:
         return [indent + self._line(row, widths, colour) for row in rows]
 
     def _fit(self, widths: dict[int, int], width: int) -> None:
+        for column in [one for one, wide in widths.items() if not wide]:
+            del widths[column]
         least = {column: min(wide, self.least.get(column, wide)) for column, wide in widths.items()}
-        for column in self.spare:
+        for column in [one for one in self.spare if one in widths]:
             if _excess(least, width) <= 0:
                 break
             del widths[column], least[column]
-        for column in self.least:
+        for column in [one for one in self.least if one in widths]:
             widths[column] = max(widths[column] - max(_excess(widths, width), 0), least[column])
 
     def _line(self, row: Sequence[str], widths: dict[int, int], colour: Callable[[int, str], str] | None) -> str:
@@ -67,9 +70,16 @@ def _excess(widths: dict[int, int], width: int) -> int:
 
 
 def shortened(text: str, width: int, *, at_end: bool = False) -> str:
-    """Return the text in so many characters: with an ellipsis at its end, or after its first third."""
+    """Return the text in so many characters: with an ellipsis at its end, or after its first third.
+
+    Of an edge, ``parent → child``, that is the first third of the parent; of the child alone where there is no room.
+    """
     if len(text) <= width:
         return text
+    parent, arrow, child = text.partition(" → ")
+    if arrow and not at_end:
+        room = width - len(arrow) - len(child)
+        return f"{shortened(parent, room)}{arrow}{child}" if room > 0 else f"→ {shortened(child, width - 2)}"
     head = width - 1 if at_end else (width - 1) // 3
     return f"{text[:head]}…{text[len(text) - (width - 1 - head) :]}"
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: shell has them for a program that was ended by Ctrl-C, or by writing where nobody reads.
 FAILED, UNREADABLE, INTERRUPTED, OUTPUT_CLOSED = 1, 2, 130, 141
 
-#: A file that cannot be read; ROS, trimesh and rosbags.
+#: A file that cannot be read; ROS or a package of it, trimesh, rosbags and eclipse-zenoh.
 _LACKING = frozenset({"TF001", "TF901", "TF905", "TF906", "TF920"})
 
 #: Control sequences (ECMA-48): those that end in m set colours, the others do something; and titles and links.

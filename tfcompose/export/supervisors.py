@@ -16,7 +16,7 @@ from tfcompose.files import File
 from tfcompose.plan.middleware import middleware_variables
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from tfcompose.plan import Plan, PlanProcess
 
@@ -175,8 +175,13 @@ def yaml_text(value: Mapping[str, Any]) -> str:
     return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000)
 
 
-#: Sources files, then becomes the command; bash, because ROS's setup files are bash's.
-SOURCING = 'for file in $0; do . "$file"; done; exec "$@"'
+#: Sources its arguments up to ``--``, then becomes the command behind it; bash, because ROS's setup files are bash's.
+SOURCING = 'until [ "$1" = -- ]; do . "$1"; shift; done; shift; exec "$@"'
+
+
+def sourced(setup: Sequence[str], words: list[str]) -> list[str]:
+    """Return the words that source the setup files and become the command; the command's own where there are none."""
+    return ["/bin/bash", "-c", SOURCING, "bash", *setup, "--", *words] if setup else words
 
 
 def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
@@ -264,9 +269,7 @@ def _logs(plan: Plan, machine: Machine) -> list[str]:
 
 
 def _exec(process: PlanProcess, machine: Machine) -> str:
-    words = command_of(process, machine.python, f"{machine.folder}/plan.json")
-    if machine.setup:
-        words = ["/bin/bash", "-c", SOURCING, " ".join(machine.setup), *words]
+    words = sourced(machine.setup, command_of(process, machine.python, f"{machine.folder}/plan.json"))
     return " ".join(quoted(word).replace("$", "$$") for word in words)
 
 

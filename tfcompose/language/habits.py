@@ -20,7 +20,9 @@ _MASS = "it belongs under inertial: {mass: 2 kg}"
 _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
     word: meanings
     for words, meanings in (
-        ("pose origin transform tf", (("xyz", _POSE),)),
+        ("pose origin transform", (("xyz", _POSE),)),
+        ("tf", (("xyz", "tf is for sensors; the process that publishes the edge is owner, and " + _POSE),)),
+        ("inverted upside_down flipped", (("rpy", "hanging upside down is rpy: [180 deg, 0, 0]"),)),
         ("position translation trans location offset x y z", (("xyz", _POSITION),)),
         ("rotation orientation rot euler roll pitch yaw", (("rpy", _ROTATION),)),
         ("quaternion quat q qx qy qz qw", (("quat_xyzw", "a quaternion is quat_xyzw: [0, 0, 0, 1], w last"),)),
@@ -59,7 +61,16 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
         ("cpus cpu_affinity affinity", (("schedule", "its processors are schedule: {cpus: [2, 3]}"),)),
         ("priority sched_priority", (("schedule", "a real-time priority is schedule: {priority: 80}"),)),
         ("if condition unless", (("when", "whether it is there is when: ${args.sim}"),)),
-        ("environment additional_env", (("env", "variables are env: {NAME: value}"),)),
+        (
+            "env environment additional_env",
+            (
+                ("env", "variables are env: {NAME: value}"),
+                (
+                    "processes",
+                    "variables are a process's: processes: {NAME: {env: {…}}}; the domain is ros: {domain_id: 5}",
+                ),
+            ),
+        ),
         ("remappings remaps", (("remap", "other names are remap: {scan: front/scan}"),)),
         ("parameters ros__parameters", (("params", "parameters are params: {use_sim_time: false}"),)),
         ("command cmd exec entrypoint", (("run", "the command is run: [program, argument]"),)),
@@ -69,19 +80,68 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
             (("frames", "the key before the colon is the name; frames: {camera_link: {name: lens}} renames a frame"),),
         ),
         ("serial serial_number serial_no ip port device hostname", (("process", _OPTION), ("options", _OPTION))),
+        ("package pkg", (("run", "a ROS node is run: {package: VALUE, executable: …}"),)),
+        ("executable", (("run", "a ROS node is run: {package: …, executable: VALUE}"),)),
+        ("launch launch_file", (("run", "a launch file is run: {launch: VALUE}"),)),
         (
-            "package pkg executable",
-            (("run", "a ROS node is run: {package: slam_toolbox, executable: async_slam_toolbox_node}"),),
+            "args arguments launch_arguments",
+            (("run", "they belong to what is run: {launch: …, args: {use_sim_time: false}}, or args: [--verbose]"),),
         ),
-        ("launch launch_file", (("run", "a launch file is run: {launch: slam_toolbox/online_async_launch.py}"),)),
-        ("preset", (("node", "the preset of a node is node: {preset: slam_toolbox}"),)),
+        (
+            "ros2_control controller controllers",
+            (("run", "controllers are nodes of run: {package: controller_manager, executable: ros2_control_node}"),),
+        ),
+        ("preset", (("node", "the preset of a node is node: {preset: VALUE}"),)),
+        (
+            "namespace domain_id rmw frame_prefix clock discovery distro",
+            (("ros", "it belongs under ros: {WORD: VALUE}"),),
+        ),
+        (
+            "use_sim_time sim_time",
+            (("ros", "simulated time is ros: {clock: sim}"), ("clock", "simulated time is clock: sim")),
+        ),
+        ("min minimum", (("lower", "the least is lower"),)),
+        ("max maximum", (("upper", "the most is upper"),)),
+        ("units unit", (("vars", "each value has its unit: 30 cm, 15 deg; bare numbers are metres and radians"),)),
+        ("height", (("length", "the height of a cylinder is length"),)),
+        ("diameter", (("radius", "half of the diameter is radius"),)),
         ("type model", (("preset", "the model is preset: realsense/d435i; tfcompose presets lists them"),)),
     )
     for word in words.split()
 }
 
 
-def habit(word: str, known: Collection[str]) -> str:
-    """Return what to write instead of a key that another format has, where ``known`` are the keys; else nothing."""
+#: Values that have another name here.
+_VALUES = {
+    word: value
+    for words, value in (
+        ("front forwards ahead", "forward"),
+        ("back rear backwards behind", "backward"),
+        ("upward upwards top", "up"),
+        ("downward downwards bottom", "down"),
+        ("hinge rotary rotational", "revolute"),
+        ("slider linear sliding", "prismatic"),
+        ("wheel", "continuous"),
+        ("unless-stopped", "always"),
+        ("running launched", "started"),
+        ("healthy live active", "ready"),
+        ("finished exited completed", "done"),
+        ("on_failure", "on-failure"),
+    )
+    for word in words.split()
+}
+
+
+def habit(word: str, known: Collection[str], value: object = None) -> str:
+    """Return what to write instead of a key that another format has, where ``known`` are the keys; else nothing.
+
+    ``value`` is what stands there.
+    """
     advice = next((advice for key, advice in _HABITS.get(word, ()) if key in known), "")
-    return advice.replace("WORD", word)
+    return advice.replace("WORD", word).replace("VALUE", value if isinstance(value, str) else "…")
+
+
+def usual_value(word: str, allowed: Collection[str]) -> str:
+    """Return the allowed word that means the same, or the word itself."""
+    value = _VALUES.get(word.lower(), word)
+    return value if value in allowed else word

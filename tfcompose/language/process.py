@@ -22,6 +22,7 @@ from tfcompose.language.values import (
     NodeName,
     OnlyTrue,
     Parameters,
+    RosName,
     Text,
     TopicName,
     VariableName,
@@ -107,6 +108,15 @@ class Run(Checked):
     )
     args: Arguments = key((), "arguments; of a launch file by name", ["--verbose"], {"use_composition": False})
     argv: Words = key((), "the whole command, instead of package and executable", ["python3", "-m", "my_robot.drive"])
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[tuple[str], PydanticCustomError]]:
+        """Yield that a launch file is none of a package's executables."""
+        yield from super().check(data)  # type: ignore[misc]
+        file = data.get("executable")
+        if isinstance(file, str) and re.search(r"[._]launch\.(py|xml|yaml|yml)$", file):
+            advice = f"a launch file is run: {{launch: {data.get('package', 'PACKAGE')}/{file}}}"
+            yield ("executable",), refused("TF106", f"{file} is a launch file, not an executable", advice)
 
     @property
     def is_startable(self) -> bool:
@@ -300,7 +310,7 @@ class Supervised(Checked):
 
     params: Parameters = key({}, _PARAMS, {"use_sim_time": False}, to=NOT_SIMULATED)
     log_level: LogLevel | None = key(None, "the level of its nodes' loggers", to=PROGRAM)
-    remap: dict[str, Text] = key(
+    remap: dict[RosName, RosName] = key(
         {}, "topics, services and actions under other names", {"scan": "front/scan"}, to=REMAPPED
     )
     env: dict[VariableName, Word] = key({}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 from pydantic import ValidationError
 
 from tfcompose.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
-from tfcompose.language.habits import habit
+from tfcompose.language.habits import habit, usual_value
 from tfcompose.language.spec import FIRST, at, fields_of, kinds_of, mapping_at
 from tfcompose.units import shown
 
@@ -192,7 +192,7 @@ def _unknown_key(model: type[Spec], path: Path, data: Any, meant: Counter[tuple[
     around = data
     for step in path[:-1]:
         around = around[step]
-    usual = habit(name, known)
+    usual = habit(name, known, around.get(path[-1]))
     if not slip and not usual and _is_a_section(model, path):
         message = f"{path[1]} is a section of its own, not one of {path[0]}"
         return Refusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
@@ -233,7 +233,7 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
             str(word) for one in kinds_of(at(model, path)) if get_origin(one) is Literal for word in get_args(one)
         ]
         advice = f"one of: {', '.join(allowed)}"
-        advice = did_you_mean(value, allowed, advice) if isinstance(value, str) else advice
+        advice = did_you_mean(usual_value(value, allowed), allowed, advice) if isinstance(value, str) else advice
         return Refusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
     code, message, advice = WORDS.get(kind, UNFORESEEN)
     if kind == "string_type":
@@ -242,7 +242,10 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
         advice = f"write {_SWITCHES[str(value).lower()]}"
     elif kind in {"model_type", "dataclass_type"}:
         keys = fields_of(mapping_at(model, path))
+        required = [name for name, field in keys.items() if field.is_required()]
         advice = f"its keys can be: {', '.join(keys)}"
+        if isinstance(value, str) and len(required) == 1:
+            advice = f"for example {{{required[0]}: {value}}}"
         if path and path[-1] in keys:
             advice = f"{path[-1]} belongs to the entry above: indent it more than the name of that"
     elif kind == "dict_type":

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from tfcompose.language.args import Args
 from tfcompose.language.bodies import LinkSpec
+from tfcompose.language.fleet import Member
 from tfcompose.language.hosts import HostName, HostSpec
 from tfcompose.language.optics import OpticsSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
@@ -420,6 +421,9 @@ class RobotSpec(Spec):
     )
     hosts: dict[HostName, HostSpec] = key(
         {}, "the computers that processes name as their host", {"brain": {"ssh": "robot@10.0.0.2"}}
+    )
+    fleet: Member | None = key(
+        None, "the fleet that it shares edges with, by a process fleet_share", {"file": "fleet.yaml", "robot": "r1"}
     )
     profiles: Parameters = key(
         {}, "named overlays, chosen with --profile", {"demo": {"sensors": {"laser": {"driver": "none"}}}}

@@ -86,6 +86,10 @@ class InARow:
 
     def _advice(self, value: Any) -> str:
         """Return what to write instead: what may be meant by a string, a mapping, or numbers with decimal commas."""
+        if isinstance(value, dict) and value.keys() == {"size"}:  # as URDF's box has it
+            inner = value["size"]
+            is_complete = isinstance(inner, list) and len(inner) == self.count
+            return f"write [{', '.join(map(str, inner))}]" if is_complete else self._advice(inner)
         text = value[0] if isinstance(value, list) and len(value) == 1 else value
         items = _ITEM.findall(text) if isinstance(text, str) else None
         for names in (_AXES, _ANGLES):
@@ -225,6 +229,10 @@ TopicName = Annotated[
         r"~?/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*",
         "the name of a topic or a service: letters, digits, _ and /",
     ),
+]
+#: What stands before or after := in a remapping; it may be computed.
+RosName = Annotated[
+    Text, Matches(r"(\$\{[^}]*\}|[^\s:]|:(?!=))+", "a name that can be remapped: without spaces, and without :=")
 ]
 #: A variable of the environment.
 VariableName = Annotated[Text, AfterValidator(_names_a_variable)]

@@ -71,12 +71,12 @@ def _process(state: State, one: Tracked, now: float) -> ProcessStatus:
         state=one.state,
         detail=one.detail,
         required=one.process.required,
-        failed=bool(one.failed) or one.state == "FATAL",
+        failed=bool(one.failed) or one.state == "fatal",
         ready=one.ready,
         waits=waits_for(state, one),
         seen=one.observed,
         pid=one.pid,
-        uptime=round(now - one.began, 3) if one.state in ("RUNNING", "STOPPING") else None,
+        uptime=round(now - one.began, 3) if one.state in ("running", "stopping") else None,
         restarts=one.restarts,
         edges=len(owned),
         live=sum(child in state.live and child not in state.silent for child in owned),
@@ -120,13 +120,14 @@ def _update(
         return Refusal("; ".join(one.message for one in found)), None, None
     different = change(state.plan, plan_file.parent, plan, file.parent)
     names, before = [process.name for process in plan.processes], [process.name for process in state.plan.processes]
+    started = {process.name for process in (*state.plan.managed, *plan.managed)}
     answer = PlanChange(
-        changed=tuple(name for name in names if name in different.changed),
+        changed=tuple(name for name in names if name in different.changed & started),
         added=tuple(name for name in names if name not in before),
         removed=tuple(name for name in before if name not in names),
         held=different.held,
     )
-    if not any((answer.changed, answer.added, answer.removed, answer.held)):
+    if not any((different.changed, answer.added, answer.removed, answer.held)):
         return answer, None, None
     return answer, NewPlan(plan, different.changed, different.held), (file, commands)
 

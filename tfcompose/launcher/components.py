@@ -24,17 +24,17 @@ def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -
     """Take what a container has answered to the last order about a component."""
     one = step.state.tracked[event.process]
     match event:
-        case Loaded() if one.state == "STARTING":
+        case Loaded() if one.state == "starting":
             container = one.process.component and step.state.tracked[one.process.component.container]
-            step.enter(event.process, "RUNNING", pid=container.pid if container else None, began=step.now)
+            step.enter(event.process, "running", pid=container.pid if container else None, began=step.now)
             order_gate(step, step.state.tracked[event.process])
-        case NotLoaded(why=why) if one.state == "STARTING":
+        case NotLoaded(why=why) if one.state == "starting":
             _ended(step, replace(one, since=step.now), why, f"{one.process.name} could not be started: {why}")
-        case Unloaded(why=why) if one.state == "RUNNING":
+        case Unloaded(why=why) if one.state == "running":
             _ended(step, one, why, f"{one.process.name} has ended: {why}")
-        case Unloaded(why=why) if one.state == "STOPPING" and step.state.stop:
-            step.enter(event.process, "STOPPED", why)
-        case Unloaded(why=why) if one.state == "STOPPING":
+        case Unloaded(why=why) if one.state == "stopping" and step.state.stop:
+            step.enter(event.process, "stopped", why)
+        case Unloaded(why=why) if one.state == "stopping":
             left(step, one, why or "unloaded")
         case _:
             pass
@@ -44,14 +44,14 @@ def _ended(step: Transition, one: Tracked, why: str, message: str) -> None:
     """Take a component that was not loaded, or is not there any more: it is loaded again, or has failed."""
     name = one.process.name
     if step.state.stop:
-        step.enter(name, "STOPPED", why)
+        step.enter(name, "stopped", why)
         return
     lose_edges(step, one)
     one = step.state.tracked[name]
     if one.leaving:
         left(step, one, why)
     elif one.process.restart == "no":
-        step.enter(name, "FATAL", why)
+        step.enter(name, "fatal", why)
         step.fail_process(name, finding("TF808", message, None))
     else:
         schedule_restart(step, one, why, lambda when: finding("TF808", f"{message}{when}", None))
@@ -63,9 +63,9 @@ def order_components(step: Transition) -> None:
     It has to hear first who is absent: it forgets what it was ordered about those.
     """
     for name, one in step.state.tracked.items():
-        if one.process.component and one.state in ("STARTING", "RUNNING"):  # it watches over those that run
+        if one.process.component and one.state in ("starting", "running"):  # it watches over those that run
             step.actions.append(LoadComponent(name, one.order, again=True))
-        elif one.process.component and one.state == "STOPPING":
+        elif one.process.component and one.state == "stopping":
             step.actions.append(UnloadComponent(name, one.order))
 
 

@@ -75,12 +75,12 @@ def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
     """Return the finding for the edges of one owner that were not published in time."""
     names = listed((edge.name for edge in edges), NAMED_AT_MOST)
     name = owner.process.name
-    if owner.state == "STOPPED" and owner.order == 0:
+    if owner.state == "stopped" and owner.order == 0:
         waits = " and ".join(f"{other} to be {what}" for other, what in owner.process.after.items())
         why = f"was not started: it waits for {waits}" if waits else "was not started"
         return finding("TF811", f"nobody published {names}: {name} {why}", None)
-    if owner.state in ("STOPPED", "EXITED", "FATAL", "BACKOFF"):
-        why = f"{owner.state.lower()}: {owner.detail}" if owner.detail else owner.state.lower()
+    if owner.state in ("stopped", "exited", "fatal", "backoff"):
+        why = f"{owner.state}: {owner.detail}" if owner.detail else owner.state
         return finding("TF811", f"nobody publishes {names}: {name} is {why}", None)
     host = owner.process.host if owner.process.kind == "external" else None
     advice = f"start its share on {host}: tfcompose up --host {host}; a profile with host: null starts it here"

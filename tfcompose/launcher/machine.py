@@ -88,7 +88,7 @@ def wake_time(state: State) -> float | None:
     """Return when the machine next has something to do by itself: then it wants a ``Tick``."""
     times, due = state.times, []
     for one in state.tracked.values():
-        if one.state == "BACKOFF":
+        if one.state == "backoff":
             due.append(one.since + backoff_s(times, one.process, one.failures))
         firmer = firmer_at(times, one)
         gate = [at for at in (firmer, opens_at(one), late_at(state, one)) if at is not None]
@@ -143,7 +143,7 @@ def _requested_or_reported(step: Transition, event: Event) -> None:
 
 def _not_started(step: Transition, name: str, why: str) -> None:
     one = step.state.tracked[name]
-    step.enter(name, "FATAL", why, order=one.order if one.began else 0)
+    step.enter(name, "fatal", why, order=one.order if one.began else 0)
     step.fail_process(name, not_started(name, why))
 
 
@@ -154,13 +154,13 @@ def _begin(step: Transition) -> None:
     if guard and not unmet(step.state, step.state.tracked[guard]):
         step.start(guard)
     for name, tracked in step.state.tracked.items():
-        if tracked.state == "EXPECTED":
-            step.enter(name, "EXPECTED", began=step.now)
+        if tracked.state == "expected":
+            step.enter(name, "expected", began=step.now)
             order_gate(step, step.state.tracked[name])
 
 
 def _started(step: Transition, name: str, pid: int) -> None:
-    step.enter(name, "RUNNING", pid=pid, began=step.now)
+    step.enter(name, "running", pid=pid, began=step.now)
     if name != step.state.guard:
         order_gate(step, step.state.tracked[name])
         return
@@ -169,7 +169,7 @@ def _started(step: Transition, name: str, pid: int) -> None:
     if step.state.clear is not None:  # it joins the others
         for other in step.state.tracked.values():
             _introduce(step, other)
-            if not other.ready and other.state in ("RUNNING", "EXPECTED"):
+            if not other.ready and other.state in ("running", "expected"):
                 order_gate(step, other)
     order_components(step)
 
@@ -177,7 +177,7 @@ def _started(step: Transition, name: str, pid: int) -> None:
 def _introduce(step: Transition, owner: Tracked) -> None:
     """Tell a guard that joins what became of an owner meanwhile, whatever the one before it knew."""
     name = owner.process.name
-    runs = owner.state in ("STARTING", "RUNNING", "EXPECTED")
+    runs = owner.state in ("starting", "running", "expected")
     missing = any(child not in step.state.live for _, child in owner.process.owns)
     if owner.process.owns and not runs:
         step.actions.append(Order(Absent(name)))
@@ -288,7 +288,7 @@ def _expect_no_sign_of_life(step: Transition) -> None:
 
 def _guard_due(state: State) -> float | None:
     """Return when the guard is overdue, or taken to hang; None if nothing is expected of it."""
-    if state.guard is None or state.guard_alive is None or state.tracked[state.guard].state != "RUNNING":
+    if state.guard is None or state.guard_alive is None or state.tracked[state.guard].state != "running":
         return None
     if state.guard_overdue is None:
         return state.guard_alive + state.times.guard_silent_s
@@ -330,11 +330,11 @@ def _go_on(step: Transition) -> None:
     _kill_a_guard_that_hangs(step)
     give_up_waiting(step)
     for name, one in step.state.tracked.items():
-        if one.state not in ("STOPPED", "BACKOFF"):
+        if one.state not in ("stopped", "backoff"):
             continue
         may_start = step.state.clear is not None or name in _before_clear(step.state)
-        fresh = one.state == "STOPPED" and one.wanted and may_start and not unmet(step.state, one)
-        again = one.state == "BACKOFF" and step.now >= one.since + backoff_s(
+        fresh = one.state == "stopped" and one.wanted and may_start and not unmet(step.state, one)
+        again = one.state == "backoff" and step.now >= one.since + backoff_s(
             step.state.times, one.process, one.failures
         )
         if fresh or again:
@@ -346,7 +346,7 @@ def _go_on(step: Transition) -> None:
         step.update(reminded_of=frozenset(edge.child for edge in missing), reminded=step.now)
         step.notify(Waiting(tuple(_missing(step.state.plan, owner, edges) for owner, edges in by_owner(missing))))
     tracked = step.state.tracked.values()
-    if step.state.stop is None and all(one.failed or one.state in ("EXITED", "EXPECTED") for one in tracked):
+    if step.state.stop is None and all(one.failed or one.state in ("exited", "expected") for one in tracked):
         step.finish(1 if step.state.given_up else 0)
 
 

@@ -42,11 +42,11 @@ def unmet_in_words(state: State, one: Tracked) -> str:
 def give_up_waiting(step: Transition) -> None:
     """Have those fail that wait for what cannot come any more."""
     for name, one in step.state.tracked.items():
-        if one.state != "STOPPED" or not one.wanted or one.failed:
+        if one.state != "stopped" or not one.wanted or one.failed:
             continue
         for other, what in unmet(step.state, one):
             found = step.state.tracked[other]
-            if found.failed or found.state == "EXITED":
+            if found.failed or found.state == "exited":
                 why = "has failed" if found.failed else "has ended"
                 step.fail_process(name, waits_in_vain(name, other, what, why))
                 break
@@ -56,8 +56,8 @@ def _is_met(other: Tracked, what: StartCondition) -> bool:
     if what == "ready":
         return other.ready
     if what == "done":
-        return other.state == "EXITED" and not other.failed
-    return other.was_started or other.state == "EXPECTED"
+        return other.state == "exited" and not other.failed
+    return other.was_started or other.state == "expected"
 
 
 # Gates.
@@ -111,9 +111,9 @@ def check_gates(step: Transition) -> None:
         if one.ready or not _is_awaited(one):
             continue
         kind, ready = gate_of(one.process), one.process.ready
-        if one.state != "STARTING" and (kind == "started" or (kind in _GUARDED and step.state.guard is None)):
+        if one.state != "starting" and (kind == "started" or (kind in _GUARDED and step.state.guard is None)):
             open_gate(step, name, "started")
-        elif kind == "time" and ready and one.state != "STARTING" and step.now >= one.began + ready.number:
+        elif kind == "time" and ready and one.state != "starting" and step.now >= one.began + ready.number:
             open_gate(step, name, f"{ready.number:g} s have passed")
         elif not one.late and (due := late_at(step.state, one)) is not None and step.now >= due:
             step.track(name, replace(one, late=True))
@@ -127,7 +127,7 @@ def late_at(state: State, one: Tracked) -> float | None:
     if one.ready or one.late or not _is_awaited(one):
         return None
     ready = one.process.ready
-    if one.state != "STARTING" and (not has_own_gate(one.process) or (ready and ready.kind == "time")):
+    if one.state != "starting" and (not has_own_gate(one.process) or (ready and ready.kind == "time")):
         return None
     timeout_s = ready.timeout_s if ready else None
     return one.began + (state.times.ready_s if timeout_s is None else timeout_s)
@@ -135,23 +135,23 @@ def late_at(state: State, one: Tracked) -> float | None:
 
 def _is_awaited(one: Tracked) -> bool:
     """Return whether it is expected to become ready by itself; of a component, whether its container was asked."""
-    return one.state in ("RUNNING", "EXPECTED") or (one.state == "STARTING" and one.process.component is not None)
+    return one.state in ("running", "expected") or (one.state == "starting" and one.process.component is not None)
 
 
 def opens_at(one: Tracked) -> float | None:
     """Return when a gate opens by itself."""
     ready = one.process.ready
-    waits = not one.ready and one.state in ("RUNNING", "EXPECTED") and ready and ready.kind == "time"
+    waits = not one.ready and one.state in ("running", "expected") and ready and ready.kind == "time"
     return one.began + ready.number if waits and ready else None
 
 
 def waits_for(state: State, one: Tracked) -> str:
     """Return what a process is still without, in words; "" if it is ready, or is not to run."""
-    if one.state == "STOPPED" and one.wanted and not one.failed and (others := unmet_in_words(state, one)):
+    if one.state == "stopped" and one.wanted and not one.failed and (others := unmet_in_words(state, one)):
         return f"waits for {others}"
     if one.ready or not _is_awaited(one):
         return ""
-    if one.state == "STARTING" and one.process.component:
+    if one.state == "starting" and one.process.component:
         return f"{one.process.component.container} has not answered"
     ready = one.process.ready
     text = ready.text if ready else ""
@@ -181,7 +181,7 @@ def is_ready(state: State) -> bool:
     if state.clear is None or state.stop or state.awaited:
         return False
     wanted = [one for one in state.tracked.values() if one.wanted and not one.failed]
-    return all((one.ready and not one.leaving) or one.state == "EXITED" for one in wanted)
+    return all((one.ready and not one.leaving) or one.state == "exited" for one in wanted)
 
 
 def report_progress(step: Transition) -> None:
@@ -192,11 +192,11 @@ def report_progress(step: Transition) -> None:
 
 def _report_started(step: Transition) -> None:
     state = step.state
-    if state.all_started or state.clear is None or any(one.state == "STARTING" for one in state.tracked.values()):
+    if state.all_started or state.clear is None or any(one.state == "starting" for one in state.tracked.values()):
         return
     step.update(all_started=True)
     waiting = tuple(
-        name for name, one in state.tracked.items() if one.state == "STOPPED" and one.wanted and not one.failed
+        name for name, one in state.tracked.items() if one.state == "stopped" and one.wanted and not one.failed
     )
     started = sum(one.order > 0 for one in state.tracked.values())
     step.notify(AllStarted(started, waiting, step.since_begin))
@@ -211,6 +211,6 @@ def _report_ready(step: Transition) -> None:
     rows = []
     for name, one in state.tracked.items():
         if one.wanted and not one.failed and (one.began >= begun or state.replanned == 0.0):
-            started = None if one.state == "EXPECTED" else one.began - begun
+            started = None if one.state == "expected" else one.began - begun
             rows.append(StartRow(name, started, (one.ready_since or one.since) - begun))
     step.notify(AllReady(tuple(rows), step.now - begun, state.given_up))

@@ -90,12 +90,12 @@ class Tracked:
     @property
     def alive(self) -> bool:
         """Whether there is an operating system's process, or will be in a moment."""
-        return self.state in ("STARTING", "RUNNING", "STOPPING")
+        return self.state in ("starting", "running", "stopping")
 
     @property
     def was_started(self) -> bool:
         """Whether it has run, or runs."""
-        return self.order > 0 and self.state != "STARTING"
+        return self.order > 0 and self.state != "starting"
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +171,7 @@ def initial(plan: Plan, times: Times | None = None) -> State:
     processes = plan.processes
     guards = [process.name for process in processes if process.kind == "guard"]
     tracked = {
-        process.name: Tracked(process, "EXPECTED" if process.kind == "external" else "STOPPED") for process in processes
+        process.name: Tracked(process, "expected" if process.kind == "external" else "stopped") for process in processes
     }
     times = times or Times()
     settle_s = sum(float(tracked[name].process.env.get(SETTLE, 0)) for name in guards)
@@ -225,7 +225,7 @@ class Transition:
         again = before.order > 0
         component = before.process.component
         began = self.now if component else before.began
-        self.enter(name, "STARTING", order=order, level=0, restarts=before.restarts + again, began=began)
+        self.enter(name, "starting", order=order, level=0, restarts=before.restarts + again, began=began)
         if again and before.process.owns and self.state.guard not in (None, name):
             self.actions.append(Order(Present(name)))
         self.actions.append(LoadComponent(name, order) if component else Start(name))
@@ -260,8 +260,8 @@ class Transition:
         self.update(stop=stop)
         self.notify(Stopping(reason))
         for name, one in self.state.tracked.items():
-            if one.state == "BACKOFF":
-                self.enter(name, "STOPPED")
+            if one.state == "backoff":
+                self.enter(name, "stopped")
 
     def finish(self, exit_code: int) -> None:
         """End: nothing runs any more."""

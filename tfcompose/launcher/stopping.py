@@ -47,7 +47,7 @@ def _take_end(step: Transition, event: Exited) -> None:
     name, how = event.name, how_ended(event.returncode)
     one = step.state.tracked[name]
     if step.state.stop:
-        step.enter(name, "STOPPED", how)
+        step.enter(name, "stopped", how)
         return
     if name == step.state.guard and step.state.clear is not None and not one.leaving:
         _guard_exited(step, one, event)
@@ -64,7 +64,7 @@ def _take_end(step: Transition, event: Exited) -> None:
     if name != step.state.guard and (process.restart == "always" or (process.restart == "on-failure" and not done)):
         _restart_after(step, one, event)
         return
-    step.enter(name, "EXITED", how)
+    step.enter(name, "exited", how)
     # What others wait for has come, and does not go with the process.
     if done and ((before.ready and not process.owns) or (ready and ready.kind == "exit")):
         step.track(name, replace(step.state.tracked[name], ready=True, ready_since=before.ready_since or step.now))
@@ -110,7 +110,7 @@ def lose_edges(step: Transition, one: Tracked) -> None:
 def lose_components(step: Transition, container: str) -> None:
     """Take the components of a container as gone with it; those that are wanted come again when it is ready again."""
     for one in step.state.components_of(container):
-        if one.alive or one.state == "BACKOFF":
+        if one.alive or one.state == "backoff":
             lose_edges(step, one)
             if not one.process.owns and step.state.guard is not None:  # what was ordered holds for that container
                 step.actions.append(Order(Absent(one.process.name)))
@@ -122,7 +122,7 @@ def left(step: Transition, one: Tracked, how: str) -> None:
     """Take a process that was meant to end as ended: it stays so, is started again, or leaves the plan."""
     name = one.process.name
     step.track(name, one)
-    step.enter(name, "STOPPED", how, level=0, failures=0)
+    step.enter(name, "stopped", how, level=0, failures=0)
     if one.leaving == "drop":
         step.update(tracked={other: each for other, each in step.state.tracked.items() if other != name})
     else:
@@ -144,11 +144,11 @@ def schedule_restart(step: Transition, one: Tracked, how: str, failure: Callable
     most = one.process.restart_limit
     failures = 1 if step.now - one.since >= times.steady_s else one.failures + 1
     if failures > most:
-        step.enter(name, "FATAL", how)
+        step.enter(name, "fatal", how)
         step.fail_process(name, failure(f", after {counted(most, 'restart')}"))
         return
     delay = backoff_s(times, one.process, failures)
-    step.enter(name, "BACKOFF", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)
+    step.enter(name, "backoff", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)
 
 
 # Requests for one process.
@@ -162,13 +162,13 @@ def refusal(state: State, name: str, verb: Verb) -> str | None:
         return f"the plan has no process {name}; {advice}"
     if state.stop:
         return "everything is being stopped"
-    if one.state == "EXPECTED":
+    if one.state == "expected":
         return f"{name} is external, and started and stopped elsewhere"
     if name == state.guard and verb != "restart":
         return f"{name} watches the others and is not stopped alone; tfcompose up --guard off judges nobody"
     if verb == "start" and one.alive and one.leaving != "stop":
         return f"{name} runs already, with pid {one.pid}"
-    if verb == "stop" and not one.alive and one.state != "BACKOFF" and not (one.state == "STOPPED" and one.wanted):
+    if verb == "stop" and not one.alive and one.state != "backoff" and not (one.state == "stopped" and one.wanted):
         return f"{name} is not running"
     return None
 
@@ -182,8 +182,8 @@ def process_requested(step: Transition, request: ProcessRequest) -> None:
     if one.alive:
         step.track(request.name, replace(one, leaving="stop" if stays else "again", wanted=not stays))
         return
-    if one.state != "STOPPED":
-        step.enter(request.name, "STOPPED", failures=0)
+    if one.state != "stopped":
+        step.enter(request.name, "stopped", failures=0)
     step.track(request.name, replace(step.state.tracked[request.name], wanted=not stays))
 
 
@@ -214,7 +214,8 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
         if one.alive:
             step.track(name, replace(one, leaving="drop", wanted=False))
     names = tuple(step.state.tracked)
-    changed = tuple(name for name in names if name in event.changed and name in before)
+    started = {process.name for process in (*state.plan.managed, *plan.managed)}
+    changed = tuple(name for name in names if name in event.changed & started and name in before)
     added = tuple(name for name in names if name not in before)
     step.notify(Replanned(changed, added, tuple(gone), event.held))
 
@@ -222,12 +223,12 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
 def _taken_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked:
     process = event.plan.process(name)
     one = before.get(name)
-    rests: StateName = "EXPECTED" if process.kind == "external" else "STOPPED"
+    rests: StateName = "expected" if process.kind == "external" else "stopped"
     if one is None:
         return Tracked(process, rests)
     if name not in event.changed:
         return replace(one, process=process)
-    if one.alive and rests == "STOPPED":
+    if one.alive and rests == "stopped":
         return replace(one, process=process, leaving="again", wanted=True)
     return Tracked(process, rests, order=one.order)
 
@@ -304,7 +305,7 @@ def send_due_signals(step: Transition) -> None:
         if one.process.component:
             _end_component(step, one, level, one.process.component.container)
             continue
-        if one.state == "STARTING" or level <= one.level:
+        if one.state == "starting" or level <= one.level:
             continue
         signals = stop_signals(one.process)
         if one.level == 0 and one.leaving:
@@ -312,24 +313,24 @@ def send_due_signals(step: Transition) -> None:
             lose_components(step, name)
         step.actions.append(Kill(name, signals[level - 1]))
         before = f"still there after {signals[one.level - 1].name}: " if one.level else ""
-        step.enter(name, "STOPPING", before + signals[level - 1].name, pid=one.pid, level=level)
+        step.enter(name, "stopping", before + signals[level - 1].name, pid=one.pid, level=level)
 
 
 def _end_component(step: Transition, one: Tracked, level: int, container: str) -> None:
     """Have a component unloaded, if it is time; where everything is stopped, it ends with its container."""
     name, state = one.process.name, step.state
-    if level and state.stop and state.tracked[container].state != "EXPECTED":
-        step.enter(name, "STOPPED", f"with {container}")
+    if level and state.stop and state.tracked[container].state != "expected":
+        step.enter(name, "stopped", f"with {container}")
     if level <= one.level or not step.state.tracked[name].alive:
         return
     lose_edges(step, one)
     step.actions.append(UnloadComponent(name, one.order))
-    step.enter(name, "STOPPING", "unloaded", pid=one.pid, level=1)
+    step.enter(name, "stopping", "unloaded", pid=one.pid, level=1)
 
 
 def firmer_at(times: Times, one: Tracked) -> float | None:
     """Return when the next signal is due: the plan's time counts for each, or else the launcher's."""
-    if one.state != "STOPPING" or not 0 < one.level < len(stop_signals(one.process)):
+    if one.state != "stopping" or not 0 < one.level < len(stop_signals(one.process)):
         return None
     rule, kills = one.process.stop, one.level + 1 == len(stop_signals(one.process))
     own = rule.kill_timeout_s if kills and rule.kill_timeout_s is not None else rule.timeout_s

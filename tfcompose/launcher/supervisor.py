@@ -110,7 +110,7 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     be called in the main thread.
     """
     state = initial(plan, times)
-    processes = [one.process for one in state.tracked.values() if one.state != "EXPECTED"]
+    processes = [one.process for one in state.tracked.values() if one.state != "expected"]
     base = os.environ if base_env is None else base_env
     built_in = session.base if session else None
     commands, found = commands_of(plan, processes, plan_file, base, environment, built_in)

@@ -91,14 +91,24 @@ def _here(plan: Plan, process: PlanProcess, host: str | None) -> PlanProcess:
 
 
 def _elsewhere(process: PlanProcess) -> PlanProcess:
-    """Return the process as one that is expected; its own machine drives its nodes, here they are looked at."""
+    """Return the process as one that is expected: how it is run is its own machine's business."""
     ready, states = process.ready, set(process.lifecycle.values())
     if ready and ready.kind in _UNSEEN:
         ready = None
     elif ready is None and len(states) == 1 and set(process.nodes) == set(process.lifecycle):
         ready = Ready("lifecycle", states.pop())
-    return replace(
-        process, kind="external", argv=(), component=None, params_file=None, lifecycle={}, after={}, ready=ready
+    return PlanProcess(
+        process.name,
+        "external",
+        remap=process.remap,
+        nodes=process.nodes,
+        required=process.required,
+        ready=ready,
+        host=process.host,
+        owns=process.owns,
+        drives=process.drives,
+        switches=process.switches,
+        namespace=process.namespace,
     )
 
 

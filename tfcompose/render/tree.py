@@ -11,45 +11,104 @@ from tfcompose.numbers import clean_rpy, clean_xyz, number
 from tfcompose.tree import drawn
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from tfcompose.geometry import Pose
     from tfcompose.model import Edge, Robot
 
 
+#: Between the facts of a line.
+GAP = "  "
+
+
 def tree(robot: Robot, columns: int | None = None) -> str:
     """Return the tree, one frame a line: kind, owner, rate; position in metres and rpy in degrees where not zero.
 
-    Where that is wider than ``columns``, the facts follow each name at once, without the kinds that owners imply.
+    Where that is wider than ``columns``, the facts follow each name at once, without the kinds that owners imply; then
+    without ``static`` where somebody else is the owner; and at last they go on in the next line.
     """
     children = robot.children()
-    rows: list[tuple[str, Edge | None]] = []
-    for root in robot.roots():
-        rows.append((root, None))
-        rows += [(lines + edge.child, edge) for lines, edge in drawn(children, root, lambda edge: edge.child)]
-    width = max((len(name) for name, _ in rows), default=0)
-    owners = max((len(edge.owner) for _, edge in rows if edge), default=0)
-    lines = [_row(name, edge, width, owners) for name, edge in rows]
-    if columns is not None and max(map(len, lines), default=0) > columns:
-        lines = [_tight(name, edge) for name, edge in rows]
+    rows = [
+        row
+        for root in robot.roots()
+        for row in (("", root, None), *((lines, edge.child, edge) for lines, edge in drawn(children, root, _child)))
+    ]
+    width = max((len(lines) + len(name) for lines, name, _ in rows), default=0)
+    owners = max((len(edge.owner) for _, _, edge in rows if edge), default=0)
+    lines = [_row(lines + name, edge, width, owners) for lines, name, edge in rows]
+    if columns is not None and _widest(lines) > columns:
+        lines = _fitted(rows, columns)
     return "".join(f"{line}\n" for line in lines)
+
+
+def _child(edge: Edge) -> str:
+    return edge.child
+
+
+def _widest(lines: Iterable[str]) -> int:
+    return max(map(len, lines), default=0)
 
 
 def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
     if edge is None:
         return name
-    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
     rest = "  ".join(fact for fact in (pose_text(edge), _switched(edge)) if fact)
-    return f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {rate:<6}  {rest}".rstrip()
+    return f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {_rate(edge):<6}  {rest}".rstrip()
 
 
-def _tight(name: str, edge: Edge | None) -> str:
-    if edge is None:
-        return name
-    kind = "" if edge.owner in {STATIC, JOINTS} else edge.kind
-    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    facts = (name, kind, edge.owner, rate, pose_text(edge), _switched(edge))
-    return "  ".join(fact for fact in facts if fact)
+def _fitted(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:
+    """Return the rows as lines of at most so many columns, where names are no longer than that."""
+    for kinds in ({"static", "joints", "dynamic"}, {"dynamic"}):
+        facts = [_facts(edge, kinds) if edge else [] for _, _, edge in rows]
+        drawing = [(lines, name, some) for (lines, name, _), some in zip(rows, facts, strict=True)]
+        found = [GAP.join([lines + name, *some]) for lines, name, some in drawing]
+        if _widest(found) <= columns:
+            return found
+    return [line for some in wrapped(drawing, columns) for line in some]
+
+
+def wrapped(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> list[list[str]]:
+    """Return lines of at most so many columns for each row of a drawing, where names are no longer than that.
+
+    A row is the lines that lead to a name, the name, and facts; those for which there is no room follow below. Where
+    names have no room either, a level takes two columns.
+    """
+    if _widest(lines + name for lines, name, _ in rows) > columns:
+        rows = [(_narrow(lines), name, facts) for lines, name, facts in rows]
+    below = [*(lines for lines, _, _ in rows[1:]), ""]
+    return [
+        list(_wrapped(lines, name, facts, columns, has_children=len(after) > len(lines)))
+        for (lines, name, facts), after in zip(rows, below, strict=True)
+    ]
+
+
+def _facts(edge: Edge, kinds: Collection[str]) -> list[str]:
+    """Return what is said of an edge; its kind if it is among these, and its owner does not say as much."""
+    kind = edge.kind if edge.kind in kinds and edge.owner not in {STATIC, JOINTS} else ""
+    facts = (kind, edge.owner, _rate(edge), *pose_text(edge).split(GAP), _switched(edge))
+    return [fact for fact in facts if fact]
+
+
+def _narrow(lines: str) -> str:
+    """Return the lines of a drawing with two columns a level, which are four."""
+    return lines.replace("│   ", "│ ").replace("    ", "  ").replace("── ", " ")
+
+
+def _wrapped(lines: str, name: str, facts: Iterable[str], columns: int, *, has_children: bool) -> Iterator[str]:
+    line = lines + name
+    more = lines.replace("├──", "│  ").replace("├ ", "│ ").replace("└", " ").replace("─", " ")
+    more += "│   " if has_children else "    "
+    for fact in facts:
+        if len(line) + len(GAP) + len(fact) > columns:
+            yield line
+            line = more + fact
+        else:
+            line += GAP + fact
+    yield line
+
+
+def _rate(edge: Edge) -> str:
+    return f"{number(edge.rate)} Hz" if edge.rate else ""
 
 
 def pose_text(edge: Edge) -> str:
@@ -59,9 +118,8 @@ def pose_text(edge: Edge) -> str:
 
 def edge_facts(edge: Edge) -> str:
     """Return kind, owner, rate and pose of an edge, in one line."""
-    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    facts = (edge.kind, f"by {edge.owner}", rate, pose_text(edge), _switched(edge))
-    return "  ".join(fact for fact in facts if fact)
+    facts = (edge.kind, f"by {edge.owner}", _rate(edge), pose_text(edge), _switched(edge))
+    return GAP.join(fact for fact in facts if fact)
 
 
 def _switched(edge: Edge) -> str:
@@ -77,7 +135,7 @@ def short_pose(pose: Pose) -> str:
     rpy = clean_rpy(pose.quat_xyzw)
     if any(rpy):
         parts.append(f"rpy {' '.join(number(round(math.degrees(value), 4)) for value in rpy)} deg")
-    return "  ".join(parts)
+    return GAP.join(parts)
 
 
 def graph_of(robot: Robot, *, poses: bool = False) -> Graph:
@@ -103,7 +161,6 @@ def _label(sensor: str, presets: dict[str, str]) -> str:
 
 
 def _arrows(edge: Edge, *, poses: bool) -> Iterator[Arrow]:
-    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    yield Arrow(edge.parent, edge.child, edge.kind, edge.owner, rate, pose_text(edge) if poses else "")
+    yield Arrow(edge.parent, edge.child, edge.kind, edge.owner, _rate(edge), pose_text(edge) if poses else "")
     for parent in edge.switched:
         yield Arrow(parent, edge.child, edge.kind, edge.owner, alternative=True)

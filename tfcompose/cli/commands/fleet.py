@@ -42,6 +42,9 @@ def arguments(parser: ArgumentParser) -> None:
     add_for(parser, "ps and doctor: listen for S seconds; default: until all is known, at most 3; echo: end after S")
     parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="echo: poses per second; default: 1")
     parser.add_argument("--once", action="store_true", help="echo: print one pose and exit")
+    parser.add_argument(
+        "--namespace", metavar="NAME", help="share: the namespace of the robot's /tf; default: that of fleet.yaml"
+    )
     add_format(parser)
 
 
@@ -59,7 +62,7 @@ def run(arguments: Namespace) -> int:
         return _lint_code(found)
     refuse_without_zenoh()
     if arguments.action == "share":
-        return _share(spec, names[0])
+        return _share(spec, names[0], arguments.namespace)
     from tfcompose.fleet.observe import FleetObserver
 
     observer = FleetObserver(spec)
@@ -108,7 +111,7 @@ def _lint_code(found: list[Finding]) -> int:
     return exit_code_of(errors) if errors else 0
 
 
-def _share(spec: FleetSpec, robot: str) -> int:
+def _share(spec: FleetSpec, robot: str, namespace: str | None) -> int:
     from tfcompose.cli.live import set_up_ros
     from tfcompose.findings import did_you_mean, finding
     from tfcompose.process import ready, say
@@ -124,7 +127,7 @@ def _share(spec: FleetSpec, robot: str) -> int:
     with Stop() as stop:
         try:
             ready()
-            share(spec, robot, stop, say)
+            share(spec, robot, spec.robots[robot].namespace if namespace is None else namespace, stop, say)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
     return 0
@@ -166,6 +169,7 @@ def _row(one: RobotStatus) -> tuple[str, ...]:
 
 def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespace) -> int:
     """Print poses until a signal comes; a link that is stale is named instead, once, and so is its return."""
+    from tfcompose.fleet.observe import StaleError
     from tfcompose.numbers import clean
     from tfcompose.render.pose import pose_json, pose_text
     from tfcompose.tf2 import TransformException
@@ -175,11 +179,11 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
     wrong, trouble, due = "", "", 0.0
     try:
         while (now := time.monotonic()) - begun < (arguments.duration or float("inf")):
-            wrong = _trouble(observer, target, source)
             try:
-                pose, stamp_ns = observer.buffer.latest(target, source)
-            except TransformException as error:
-                wrong = wrong or str(error)
+                pose, stamp_ns = observer.pose(target, source)
+                wrong = ""
+            except (StaleError, TransformException) as error:
+                wrong = str(error)
             waiting = not shown and now - begun < _OBSERVE_S
             if wrong != trouble and not (wrong and waiting):
                 warn(wrong or "the links are live again")
@@ -200,16 +204,3 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
         if not shown and wrong != trouble:  # also where it ended before it was sure
             warn(wrong)
     return 0 if shown else FAILED
-
-
-def _trouble(observer: FleetObserver, *frames: str) -> str:
-    """Return which links or edges are stale that a pose between the frames needs; empty: none."""
-    stale = []
-    for one in observer.status():
-        mine = {name for edge in one.edges for name in (edge.parent, edge.child)} - {*observer.fleet.shared_frames}
-        if mine.isdisjoint(frames):
-            continue
-        if one.state in {"stale", "unreachable"} and one.age_s is not None:
-            stale.append(f"the link to {one.robot} is stale")
-        stale += [f"{edge.parent} → {edge.child} of {one.robot} is stale" for edge in one.edges if edge.stale]
-    return stale[0] if stale else ""

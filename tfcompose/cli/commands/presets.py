@@ -60,7 +60,9 @@ def _show(facts: dict[str, Any], form: str) -> int:
     from tfcompose.cli import preset_page
 
     text_of = preset_page.node_text if facts["kind"] == "node" else preset_page.text
-    sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else text_of(facts))
+    columns = table_width(sys.stdout)
+    text = text_of(facts, columns and columns - 1)
+    sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else text)
     return 0
 
 

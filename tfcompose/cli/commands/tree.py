@@ -21,10 +21,11 @@ from tfcompose.cli.options import (
     settle_duration,
 )
 from tfcompose.cli.terminal import coloured, printable, table_width
-from tfcompose.render.text import RED, YELLOW
+from tfcompose.render.text import PLAIN, RED, YELLOW
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Iterator, Sequence
 
     from tfcompose.live.edges import Branch, Tree
     from tfcompose.model import Robot
@@ -129,15 +130,35 @@ def _print_published(arguments: Namespace) -> None:
 def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
     from tfcompose.cli.tables import Table
 
-    table = Table(right=frozenset({3, 4}), spare=(1, 4), least={5: 16, 2: 14, 0: 44}, colour=_colour)
-    rows = [_row(branch, plan=plan) for tree in trees for branch in tree.branches]
-    lines = iter(table.lines(rows, table_width(sys.stdout), coloured=coloured(sys.stdout)))
+    table = Table(right=frozenset({3, 4}), spare=(1, 4), colour=_colour)
+    branches = [branch for tree in trees for branch in tree.branches]
+    rows = [_row(branch, plan=plan) for branch in branches]
+    columns = table_width(sys.stdout)
+    lines = iter(table.lines(rows, columns, coloured=coloured(sys.stdout)))
+    if columns is not None and any(len(line) >= columns for line in table.lines(rows, columns)):
+        lines = iter(_wrapped(branches, rows, columns - 1))
     parts = []
     for tree in trees:
         loop = [f"a loop, which breaks tf2 lookups: {printable(' → '.join(tree.loop))}"] if tree.loop else []
         parts.append("\n".join([*loop, *(next(lines) for _ in tree.branches)]))
     head = [f"{len(trees)} disconnected trees:"] if len(trees) > 1 else []
     return "\n\n".join([*head, *parts]) + "\n"
+
+
+def _wrapped(branches: Sequence[Branch], rows: Sequence[tuple[str, ...]], columns: int) -> Iterator[str]:
+    """Yield the rows without their columns; what does not fit in a line goes on below."""
+    from tfcompose.cli.tables import shortened
+    from tfcompose.render.tree import wrapped
+
+    drawing = [
+        (branch.indent, row[0].removeprefix(branch.indent), [fact for fact in row[1:] if fact not in {"", "static"}])
+        for branch, row in zip(branches, rows, strict=True)
+    ]
+    for row, lines in zip(rows, wrapped(drawing, columns), strict=True):
+        shown = [shortened(line, columns, at_end=True) for line in lines]
+        if coloured(sys.stdout) and (colour := _colour(REMARK, row[REMARK])):
+            shown[-1] = shown[-1].replace(row[REMARK], f"{colour}{row[REMARK]}{PLAIN}")
+        yield "\n".join(shown)
 
 
 def _colour(column: int, text: str) -> str:

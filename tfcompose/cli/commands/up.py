@@ -31,6 +31,14 @@ def arguments(parser: ArgumentParser) -> None:
         help="run in the background, and return once every process is ready and every edge live",
     )  # fmt: skip
     parser.add_argument(
+        "--update", action="store_true", help="bring the robot that runs to this plan, and start none if it does not"
+    )
+    parser.add_argument(
+        "--build-dir",
+        metavar="DIR",
+        help="with --update: where the plan's paths begin; default: beside the plan",
+    )
+    parser.add_argument(
         "--timeout", type=positive, default=60.0, metavar="S",
         help="with --wait: exit 1 after S seconds, while the robot keeps running; default: 60",
     )  # fmt: skip

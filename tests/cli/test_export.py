@@ -63,7 +63,9 @@ def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
     words = ["--at", "/opt/rover", "--python", "/usr/bin/python3", "--setup", "/opt/ros/jazzy/setup.bash"]
     assert main(["export", "systemd", *words]) == 0
     unit = (robot / "build" / "rover" / "systemd" / "rover-static.service").read_text("utf-8")
-    assert "/opt/ros/jazzy/setup.bash -- /usr/bin/python3 -m tfcompose.launcher.exec /opt/rover/plan.json static\n" in unit
+    assert (
+        "/opt/ros/jazzy/setup.bash -- /usr/bin/python3 -m tfcompose.launcher.exec /opt/rover/plan.json static\n" in unit
+    )
     assert str(robot) not in unit
     assert "PATH" not in unit, "the setup file says it"
 

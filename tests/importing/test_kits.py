@@ -180,6 +180,7 @@ manipulators:
     parent: top
     xyz: [0.1, 0.0, 0.05]
     rpy: [0.0, 0.0, 0.0]
+    ip: 10.0.0.4
     gripper: {model: robotiq_2f_85, xyz: [0, 0, 0.01], rpy: [0, 0, 0]}
 """
 
@@ -197,6 +198,48 @@ def test_an_arm_of_clearpaths_has_its_gripper_at_its_end_and_what_is_not_enabled
     assert gripper["params"]["parent_link"] == "arm_0_end_effector_link"
     assert gripper["macro"] == "robotiq_2f_85"
     assert "robot.yaml:7" in places(printed_errors(capsys), "TF020")
+    arm = data["parts"]["arm_0"]["params"]
+    assert (arm["gripper_joint_name"], arm["robot_ip"]) == ("arm_0_gripper_robotiq_85_left_knuckle_joint", "10.0.0.4")
+
+
+USUAL = """serial_number: a200-0000
+platform:
+  attachments:
+  - {name: plate, type: top_plate}
+  - {name: front, type: a200.bumper}
+  - {name: arch, type: a200.sensor_arch}
+  - {name: fender, type: j100.fender}
+links:
+  mesh:
+  - {name: cover, visual: {package: covers, path: meshes/cover.stl}, offset_xyz: [0, 0, 1]}
+mounts:
+  post:
+  - {model: dual}
+sensors:
+  camera:
+  - {model: stereolabs_zed, ros_parameters: {stereolabs_zed: {general.camera_model: zed2i}}}
+"""
+
+
+def test_clearpaths_entries_have_what_its_generator_gives_them_unless_they_say_otherwise(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "robot.yaml"
+    source.write_text(USUAL, encoding="utf-8")
+    main(["import", str(source), "-o", str(tmp_path / "out.yaml")])
+    parts = yaml.safe_load((tmp_path / "out.yaml").read_text(encoding="utf-8"))["parts"]
+    params = {name: part["params"] for name, part in parts.items() if name != "platform"}
+    assert {name: one["parent_link"] for name, one in params.items()} == {
+        "plate": "default_mount", "front": "front_bumper_mount", "arch": "default_mount", "fender": "base_link",
+        "cover": "default_mount", "post_0": "default_mount", "camera_0": "default_mount",
+    }  # fmt: skip
+    models = {name: one["model"] for name, one in params.items() if "model" in one}
+    assert models == {
+        "plate": "default", "front": "default", "arch": "sensor_arch_300", "fender": "default", "post_0": "dual",
+        "camera_0": "zed2i",
+    }  # fmt: skip
+    assert params["cover"]["visual"] == "package://covers/meshes/cover.stl"
+    assert "robot.yaml:10" in places(printed_errors(capsys), "TF020")
 
 
 def test_another_yaml_file_is_refused(tmp_path: Path) -> None:

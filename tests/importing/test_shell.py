@@ -2,12 +2,20 @@
 
 import io
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.support.bringups import compiled, import_of, places, printed_errors
-from tfcompose.cli import main
+from tfcompose.cli import main, reading
+
+
+@pytest.fixture(autouse=True)
+def _input_of_its_own() -> Iterator[None]:
+    reading._standard_input.cache_clear()
+    yield
+    reading._standard_input.cache_clear()
 
 
 def script(folder: Path, text: str) -> Path:
@@ -87,6 +95,60 @@ def test_lines_come_from_standard_input(
     result = compiled(capsys.readouterr().out, tmp_path)
     assert result.robot
     assert [(edge.name, edge.pose.xyz) for edge in result.robot.edges] == [("base_link → a", (1, 0, 0))]
+
+
+PUBLISH = "ros2 run tf2_ros static_transform_publisher 0 0 1 0 0 0 base_link"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"  512  {PUBLISH} a",
+        f" 513* 2026-01-02 10:00:00 {PUBLISH} a",
+        f"me@host:~/ws$ {PUBLISH} a",
+        f"$ {PUBLISH} a",
+        f"nohup {PUBLISH} a >/dev/null 2>&1 &",
+        f"xterm -e {PUBLISH} a &",
+        f'gnome-terminal -- bash -c "{PUBLISH} a; exec bash"',
+        f"bash -c 'source /opt/ros/jazzy/setup.bash && {PUBLISH} a'",
+        '<node pkg="tf2_ros" exec="static_transform_publisher" args="0 0 1 0 0 0 base_link a"/>',
+    ],
+)
+def test_what_stands_around_a_command_in_a_terminal_is_no_part_of_it(
+    line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(f"{line}\n 600  history | grep static\n".encode())))
+    assert main(["import", "-"]) == 0
+    result = compiled(capsys.readouterr().out, tmp_path)
+    assert result.robot
+    assert [(edge.name, edge.pose.xyz) for edge in result.robot.edges] == [("base_link → a", (0, 0, 1))]
+    assert not [one.name for one in result.robot.processes if one.argv]
+
+
+def test_a_publisher_behind_an_unknown_program_is_named_and_prefixes_stay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = script(tmp_path, f"""export ROS_DOMAIN_ID=7
+{PUBLISH} a
+sudo {PUBLISH} b
+tmux send-keys -t tf "{PUBLISH} c" C-m
+nice -n 5 ros2 run drive node
+{PUBLISH} d 100
+""")  # fmt: skip
+    _, data = import_of(source)
+    assert set(data["frames"]) == {"base_link", "a"}
+    assert data["ros"] == {"domain_id": 7}
+    assert list(data["processes"].values()) == [
+        {"run": {"package": "drive", "executable": "node"}, "prefix": ["nice", "-n", "5"]}
+    ]
+    assert places(printed_errors(capsys), "TF020") == [f"start.sh:{line}" for line in (3, 4, 6)]
+
+
+def test_a_text_without_anything_of_ros_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "passwd"
+    source.write_text("root:x:0:0:root:/root:/bin/bash\n", encoding="utf-8")
+    assert main(["import", str(source)]) == 1
+    assert places(printed_errors(capsys), "TF002") == ["passwd:1"]
 
 
 @pytest.mark.parametrize("word", ["x:=1", "more.sh"])

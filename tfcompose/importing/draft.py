@@ -5,6 +5,7 @@ Readers of launch files, scripts and running robots fill it in the order of thei
 
 from __future__ import annotations
 
+import posixpath
 import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -60,7 +61,7 @@ class Draft:
 
     def todo(self, message: str, span: Span | None, at: Entry = ("", ""), advice: str = "") -> None:
         """Say that something of the source is not imported: in a comment, and as a finding."""
-        where = f"{span.file}:{span.line}: " if span and span.file else ""
+        where = f"{posixpath.basename(span.file)}:{span.line}: " if span and span.file else ""
         self.note(at, f"TODO {where}{message}")
         one = finding("TF020", message, span, help=advice)
         if one not in self.found:

@@ -33,6 +33,25 @@ _COMMON = "package://clearpath_platform_description/urdf/common.urdf.xacro"
 #: What of an entry the macro's call has, and not its parameters.
 _OF_CALL = frozenset({"parent", "xyz", "rpy", "name", "type", "enabled", "urdf_enabled"})
 _LINKS = ("box", "cylinder", "frame", "mesh", "sphere")
+#: Where everything is mounted that names no parent.
+_MOUNT = "default_mount"
+#: What attachments are unless the file says otherwise, by platform and type: the generator writes all of it.
+_ATTACHMENTS: dict[str, dict[str, Any]] = {
+    "a200.bumper": {"parent": "front_bumper_mount", "extension": 0.0},
+    "a200.sensor_arch": {"model": "sensor_arch_300"},
+    "j100.fender": {"parent": "base_link"},
+    "j100.top_plate": {"model": "ark_enclosure"},
+    **{f"{one}.top_plate": {"model": "pacs", "height": 0.1} for one in ("dd100", "dd150", "do100", "do150")},
+    "r100.fams": {"table_height": 0.3},
+    "r100.hams": {"table_height": 0.6, "mount_height": 0.3},
+    "r100.tower": {"left_height": 0.0, "right_height": 0.0},
+}
+#: The joint by which an arm of Kinova's knows its gripper, behind the gripper's name.
+_GRIPPER_JOINTS = {
+    "kinova_2f_lite": "_right_finger_bottom_joint",
+    "robotiq_2f_140": "_finger_joint",
+    "robotiq_2f_85": "_robotiq_85_left_knuckle_joint",
+}
 _NUMBERED = re.compile(r"([a-z]+[0-9]+)-")
 
 
@@ -167,7 +186,7 @@ class _Clearpath:
             for index, path, entry in self._entries("links", kind):
                 name = entry.get("name", f"{kind}_{index}")
                 file = f"clearpath_platform_description/urdf/links/{kind}.urdf.xacro"
-                self._part(name, file, kind, entry, path)
+                self._part(name, file, kind, self._link(name, entry, path), path)
         for kind in self._kinds("mounts"):
             for index, path, entry in self._entries("mounts", kind):
                 folder = "urdf/pacs" if kind in _PACS else "urdf"
@@ -180,7 +199,7 @@ class _Clearpath:
             self._manipulators(kind)
         known = {"serial_number", "version", "system", "platform", "links", "mounts", "sensors", "manipulators"}
         for key in self.data.keys() - known:
-            self.draft.todo(f"{key}", self.source.at_key((key,)))
+            self.draft.todo(f"{key} is not imported", self.source.at_key((key,)))
 
     def _kinds(self, section: str) -> list[str]:
         found = self.data.get(section)
@@ -206,7 +225,7 @@ class _Clearpath:
         for key in settings.keys() - {"namespace", "domain_id"}:
             self.draft.todo(f"system.ros2.{key}: {settings[key]}", self.source.at_key(("system", "ros2", key)))
         for key in system.keys() - {"ros2"} if isinstance(system, dict) else ():
-            self.draft.todo(f"system.{key}", self.source.at_key(("system", key)))
+            self.draft.todo(f"system.{key} is not imported", self.source.at_key(("system", key)))
 
     def _platform(self) -> None:
         platform = self.data.get("platform")
@@ -229,18 +248,32 @@ class _Clearpath:
             if entry.get("enabled") is False:
                 self.draft.todo(f"the attachment {entry.get('name')} is not enabled", self.source.at(path))
                 continue
-            file = f"clearpath_platform_description/urdf/{of or self.platform}/attachments/{kind}.urdf.xacro"
-            self._part(str(entry.get("name", f"{kind}_{index}")), file, kind, entry, path)
+            of = of or self.platform
+            file = f"clearpath_platform_description/urdf/{of}/attachments/{kind}.urdf.xacro"
+            usual = {"model": "default", **_ATTACHMENTS.get(f"{of}.{kind}", {})}
+            self._part(str(entry.get("name", f"{kind}_{index}")), file, kind, {**usual, **entry}, path)
         for key in given.keys() - {"attachments", "wheel"}:
-            self.draft.todo(f"platform.{key}", self.source.at_key(("platform", key)))
+            self.draft.todo(f"platform.{key} is not imported", self.source.at_key(("platform", key)))
 
     def _of_platform(self) -> str:
         return f"package://clearpath_platform_description/urdf/{self.platform}/{self.platform}.urdf.xacro"
 
+    def _link(self, name: str, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
+        """Return a link's entry with its mesh as an address; what its macro does not take is named."""
+        own = dict(entry)
+        mesh = own.get("visual")
+        if isinstance(mesh, dict):
+            package, file = mesh.get("package"), str(mesh.get("path", ""))
+            own["visual"] = f"package://{package}/{file.lstrip('/')}" if package else f"file://{file}"
+        for key in own.keys() & {"offset_xyz", "offset_rpy"}:
+            self.draft.todo(f"{name}: {key}, which Clearpath's macros do not take", self.source.at_key((*path, key)))
+            del own[key]
+        return own
+
     def _part(self, name: str, file: str, macro: str, entry: dict[str, Any], path: Steps) -> None:
         """Add what the generator calls a macro for."""
         at = self.source.at(path)
-        params: dict[str, Any] = {"name": name, "parent_link": entry.get("parent", "base_link")}
+        params: dict[str, Any] = {"name": name, "parent_link": entry.get("parent", _MOUNT)}
         origin = self._origin(entry, path)
         params |= {key: _words(value) for key, value in entry.items() if key not in _OF_CALL}
         params["origin"] = origin
@@ -268,7 +301,7 @@ class _Clearpath:
         if entry.get("urdf_enabled") is False:
             self.draft.todo(f"{name}, {model}: urdf_enabled is false", at)
             return
-        call = {key: value for key, value in entry.items() if key in _OF_CALL}
+        call = {key: value for key, value in entry.items() if key in _OF_CALL} | self._camera(model, entry)
         self._part(name, f"clearpath_sensors_description/urdf/{model}.urdf.xacro", model, call, path)
         given = entry.get("ros_parameters")
         if entry.get("launch_enabled") is not False:
@@ -277,11 +310,30 @@ class _Clearpath:
             advice = "sensors: {NAME: {preset: VENDOR/MODEL, …}} starts it; tfcompose presets lists them"
             self.draft.todo(message, at, ("parts", name), advice)
 
+    def _camera(self, model: str, entry: dict[str, Any]) -> dict[str, Any]:
+        """Return the parameter that says which camera of a family it is, where the macro's frames depend on it."""
+        if model != "stereolabs_zed":
+            return {}
+        node = (entry.get("ros_parameters") or {}).get(model)
+        known = node.get("general.camera_model") or (node.get("general") or {}).get("camera_model") if node else None
+        return {"model": known or "zed2"}
+
+    def _arm(self, name: str, model: str, entry: dict[str, Any]) -> dict[str, Any]:
+        """Return the parameters of an arm's macro."""
+        own = {key: value for key, value in entry.items() if key not in {"model", "ros_parameters", "gripper", "ip"}}
+        if "ip" in entry:
+            own["robot_ip" if model.startswith("kinova") else "ip"] = entry["ip"]
+        gripper = entry.get("gripper")
+        joint = _GRIPPER_JOINTS.get(str(gripper.get("model", ""))) if isinstance(gripper, dict) else None
+        if joint and model.startswith("kinova"):
+            own |= {"use_internal_bus_gripper_comm": True, "gripper_joint_name": f"{name}_gripper{joint}"}
+        return own
+
     def _manipulators(self, kind: str) -> None:
         for index, path, entry in self._entries("manipulators", kind):
             model, type_ = str(entry.get("model", "")), kind.removesuffix("s")
-            own = {key: value for key, value in entry.items() if key not in {"model", "ros_parameters", "gripper"}}
             name = f"{type_}_{index}"
+            own = self._arm(name, model, entry)
             self._part(name, f"clearpath_manipulators_description/urdf/{type_}/{model}.urdf.xacro", model, own, path)
             gripper = entry.get("gripper")
             if isinstance(gripper, dict):

@@ -27,6 +27,7 @@ from tfcompose.importing.programs import (
     Description,
     Program,
     add_program,
+    is_setting,
     isolated,
     one_clock,
     where,
@@ -52,8 +53,6 @@ _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
 #: The programs that are components, too, by their classes.
 _PUBLISHERS = {STATIC_PLUGIN: PROGRAM, "robot_state_publisher::RobotStatePublisher": STATE_PUBLISHER}
-#: What of the environment is a setting of all processes.
-_SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,16 +353,7 @@ class _Work:
 
     def _env(self, record: dict[str, Any]) -> dict[str, str]:
         """Return the process's variables, but for those that are settings of all."""
-        return {name: value for name, value in record.get("env", {}).items() if not self._is_setting(name, value)}
-
-    def _is_setting(self, name: str, value: str) -> bool:
-        if name not in _SETTINGS:
-            return False
-        known = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
-        wanted = known[_SETTINGS[name]]
-        ros = self.draft.sections["ros"]
-        allowed = wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
-        return allowed and ros.setdefault(_SETTINGS[name], wanted) == wanted
+        return {name: value for name, value in record.get("env", {}).items() if not is_setting(self.draft, name, value)}
 
     def _keys(self, record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
         keys: dict[str, Any] = {}

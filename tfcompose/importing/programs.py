@@ -44,8 +44,10 @@ _JOINTS_HZ = 10.0
 #: As what a path begins whose package is not found.
 PACKAGE = "package://"
 #: Words that stand before a program and leave it what it is.
-_BEFORE = frozenset({"exec", "nohup", "time", "stdbuf", "setsid"})
+BEFORE = frozenset({"exec", "nohup", "time", "stdbuf", "setsid"})
 _TF = ("/tf", "/tf_static")
+#: What of the environment is a setting of all processes.
+_SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,16 @@ def one_clock(draft: Draft) -> None:
                 del process["params"]
 
 
+def is_setting(draft: Draft, name: str, value: str) -> bool:
+    """Return whether a variable is a setting of the whole robot, which then has it: the first value counts."""
+    if name not in _SETTINGS:
+        return False
+    known = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
+    wanted = known[_SETTINGS[name]]
+    allowed = wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
+    return allowed and draft.sections["ros"].setdefault(_SETTINGS[name], wanted) == wanted
+
+
 def where(at: Span | None, what: str = "") -> str:
     """Return the place of a value as a comment has it."""
     place = f"{posixpath.basename(at.file)}:{at.line}" if at and at.file else ""
@@ -135,7 +147,7 @@ def _split(program: Program) -> Program:
 def _of_command(program: Program) -> Program:
     """Return the package's program that a command starts, if it starts one."""
     words = list(program.argv)
-    while words and words[0] in _BEFORE:
+    while words and words[0] in BEFORE:
         words.pop(0)
     match words:
         case ["ros2", "run", package, executable, *rest] if not package.startswith("-"):

@@ -6,12 +6,14 @@ can know, as ``$(…)`` and arithmetic, is not guessed.
 
 from __future__ import annotations
 
+import posixpath
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Span
-from tfcompose.importing.programs import Program, add_program, one_clock
+from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.importing.programs import BEFORE, Program, add_program, is_setting, one_clock
+from tfcompose.importing.static_transforms import PROGRAM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,8 +27,21 @@ _ASSIGNMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)=(.*)", re.DOTALL)
 _OF_SHELL = frozenset({
     "source", ".", "set", "echo", "printf", "wait", "trap", "exit", "true", ":", "shopt", "alias", "clear", "unset",
 })  # fmt: skip
-#: What a prompt of a terminal begins with.
-_PROMPTS = frozenset({"$", "%", ">"})
+#: What stands before a command in a terminal: a prompt, ``me@host:~$``, and the number and the time of ``history``.
+_PROMPT = re.compile(r"[$%>]|[^\s@=]+@[^\s=]*[$#%>]")
+_NUMBER = re.compile(r"\d+\*?")
+_TIME = re.compile(r"\d{1,4}[-/.]\d\d?[-/.]\d{1,4}|\d\d?:\d\d(:\d\d)?")
+#: What of lines shows that they are of ROS.
+_OF_ROS = re.compile(r"\b(ros2|rosrun|roslaunch|static_transform_publisher|robot_state_publisher|roscore)\b")
+#: Programs that start another one, which is all that counts here: its output is in its log.
+_TERMINALS = frozenset({
+    "xterm", "gnome-terminal", "x-terminal-emulator", "konsole", "terminator", "xfce4-terminal", "lxterminal",
+})  # fmt: skip
+_SHELLS = frozenset({"bash", "sh", "zsh", "dash"})
+#: Programs that start another one in some way, which ``prefix`` keeps.
+_PREFIXES = frozenset({"nice", "ionice", "taskset", "chrt", "gdb", "valgrind", "strace", "perf", "timeout", "numactl"})
+#: What a shell in a terminal does at last so that the terminal stays open.
+_STAYS_OPEN = frozenset({("exec", "bash"), ("bash",), ("read",), ("exec", "$SHELL"), ("$SHELL",)})
 _CONTROL = frozenset({
     "if", "then", "else", "elif", "fi", "for", "while", "until", "do", "done", "case", "esac", "function", "{", "}",
     "(", ")", "select", "cd", "sleep", "eval", "return", "local", "break", "continue", "((", "[[", "[", "test",
@@ -203,8 +218,8 @@ class _Script:
         self.draft.todo(f"{command.text}: {why}" if why else command.text, Span(self.file, command.line))
 
     def _command(self, command: Command, variables: dict[str, str]) -> None:
-        words = list(command.words)
-        while words and (words[0] in _LEADING or words[0] in _PROMPTS):
+        words = _without_prompt(list(command.words))
+        while words and words[0] in _LEADING:
             words.pop(0)
         if words[:1] == ["export"]:
             self._export(command, words[1:], variables)
@@ -222,13 +237,37 @@ class _Script:
             self._start(command, words, given)
 
     def _start(self, command: Command, words: list[str], given: dict[str, str]) -> None:
+        if words[0] in {"history", "grep", "tfcompose"} or tuple(words) in _STAYS_OPEN:
+            return
         if command.unknown:
             self._todo(command, f"only a shell knows {', '.join(dict.fromkeys(command.unknown))}")
         elif command.piped:
             self._todo(command, "a pipe")
         else:
-            argv, env = tuple(_without_redirections(words)), self.environment | given
-            add_program(self.draft, Program(Span(self.file, command.line), argv=argv, env=env), self.target)
+            self._add(command, _without_redirections(words), given)
+
+    def _add(self, command: Command, words: list[str], given: dict[str, str]) -> None:
+        """Add a command, or what it starts in a shell, in a terminal or behind a prefix."""
+        if words[0] in _TERMINALS | _SHELLS and "-c" in words[:-1]:
+            text = words[words.index("-c") + 1]
+            if _OF_ROS.search(text):
+                for inner in _Reader(text).commands():
+                    self._command(replace(inner, line=command.line), {})
+                return
+        begin = _program_at(words)
+        before, rest = words[:begin], words[begin:]
+        while before and before[0] in BEFORE:
+            before.pop(0)
+        if before and before[0] in _TERMINALS:
+            before = []
+        if (before and before[0] not in _PREFIXES) or (not begin and PROGRAM in " ".join(words[1:]) and words[0] not in
+                                                       {"ros2", "rosrun"}):  # fmt: skip
+            self._todo(command, f"what {words[0]} starts is not known here")
+            return
+        keys = {"prefix": before} if before else {}
+        env = {name: value for name, value in self.environment.items() if not is_setting(self.draft, name, value)}
+        program = Program(Span(self.file, command.line), argv=tuple(rest), env=env | given, keys=keys)
+        add_program(self.draft, program, self.target)
 
     def _assign(self, given: dict[str, str], command: Command, variables: dict[str, str]) -> None:
         for name, value in given.items():
@@ -246,6 +285,29 @@ class _Script:
                 self._todo(command, "only a shell knows the value")
             elif _NAME.fullmatch(word) and word in variables:
                 self.environment[word] = variables[word]
+
+
+def _without_prompt(words: list[str]) -> list[str]:
+    """Return the words of a command without what a terminal, or ``history``, puts in front of them."""
+    if len(words) > 1 and _NUMBER.fullmatch(words[0]):
+        words = words[1:]
+        while len(words) > 1 and _TIME.fullmatch(words[0]):
+            words = words[1:]
+    while words and _PROMPT.fullmatch(words[0]):
+        words = words[1:]
+    return words
+
+
+def _program_at(words: list[str]) -> int:
+    """Return where in a command the program of ROS begins that it starts, 0 for any other command."""
+    for index, word in enumerate(words):
+        if word in {"rosrun", "roslaunch"} or (
+            word == "ros2" and words[index + 1 : index + 2] in (["run"], ["launch"])
+        ):
+            return index
+        if posixpath.basename(word) == PROGRAM:
+            return index if "/" in word or index == 0 else 0
+    return 0
 
 
 def _assignments(words: list[str]) -> tuple[dict[str, str], list[str]]:
@@ -273,6 +335,13 @@ def _without_redirections(words: list[str]) -> list[str]:
 
 
 def add_script(draft: Draft, text: str, file: str, target: Target) -> None:
-    """Add what the commands of a script start to the draft."""
+    """Add what the commands of a script start to the draft.
+
+    Raises:
+        RejectedError: if it is no script by its name or first line, and nothing of ROS stands in it.
+    """
+    if not (file.endswith((".sh", ".bash")) or text.startswith("#!") or not text.strip() or _OF_ROS.search(text)):
+        advice = "commands of a terminal: ros2 run …, ros2 launch …, static_transform_publisher …"
+        raise RejectedError([finding("TF002", "no shell script, and nothing of ROS in it", Span(file), help=advice)])
     _Script(draft, target, file).add(text)
     one_clock(draft)

@@ -133,6 +133,10 @@ def _in_order(words: list[str], reader: Reader) -> StaticTransform:
             raise RefusedError(f"{len(kept)} arguments; tf's takes 9 or 10, of which the last is the period in ms")
         period = kept.pop()
         _number(period, "the period")
+    if not period and len(kept) > _WITH_ANGLES and _is_number(kept[-1]) and not _is_number(kept[-3]):
+        raise RefusedError(
+            f"{kept[-1]} behind the frames is the period of ROS 1's tf, which this program does not take"
+        )
     if len(kept) not in {_WITH_ANGLES, _WITH_QUATERNION}:
         raise RefusedError(f"{len(kept)} arguments; it takes 8, or 9 with a quaternion")
     parent, child = kept[-2:]
@@ -149,7 +153,7 @@ def _in_order(words: list[str], reader: Reader) -> StaticTransform:
 def _of(parent: str, child: str, xyz: Vector, rotation: tuple[float, ...], order: str) -> StaticTransform:
     parent, child = parent.removeprefix("/"), child.removeprefix("/")  # tf2 strips it
     if not parent or not child:
-        raise RefusedError("a frame has no name")
+        raise RefusedError(f"the {'child' if parent else 'parent'} frame has no name")
     if parent == child:
         raise RefusedError(f"{child} is its own parent")
     if len(rotation) == len(_ANGLES):

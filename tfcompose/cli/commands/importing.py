@@ -119,9 +119,9 @@ def _import_bringup(arguments: Namespace) -> int:
         _add_kits(draft, kit, arguments)
     elif arguments.file.endswith(_LAUNCH):
         _add_launch(draft, arguments, arguments.file)
-    elif arguments.file == STDIN and (ending := _ending_of(read_text(STDIN))):
+    elif arguments.file == STDIN and (ending := _ending_of(text := _with_root(read_text(STDIN)))):
         with NamedTemporaryFile("w", suffix=ending, encoding="utf-8") as file:
-            file.write(read_text(STDIN))
+            file.write(text)
             file.flush()
             _add_launch(draft, arguments, file.name, "<stdin>")
     else:
@@ -205,6 +205,11 @@ def _import_observed(arguments: Namespace) -> int:
     return _finish(draft, arguments)
 
 
+def _with_root(text: str) -> str:
+    """Return lines of a launch file in XML as one: from its first line on, elements without ``<launch>`` around."""
+    return f"<launch>{text}</launch>" if re.match(r"\s*<(node|include|arg|group|param|remap)\b", text) else text
+
+
 def _ending_of(text: str) -> str:
     """Return the ending that a launch file has with this text, empty where it is none."""
     if "def generate_launch_description" in text:
@@ -249,7 +254,7 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
     _write(text, arguments.output)
     print_findings(draft.found, sys.stderr)
     found = compiled.found if arguments.output else [replace(one, span=None, notes=()) for one in compiled.found]
-    print_findings(found, sys.stderr)
+    print_findings(list(dict.fromkeys(found)), sys.stderr)
     return FAILED if compiled.errors else 0
 
 

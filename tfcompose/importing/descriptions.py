@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import RejectedError
-from tfcompose.importing.programs import PACKAGE, where
+from tfcompose.importing.programs import PACKAGE, path_from, where
 from tfcompose.importing.robot_file import imported, put_into
 from tfcompose.urdf.lint import read_urdf
 from tfcompose.urdf.packages import Packages
@@ -52,8 +52,10 @@ def _add_part(draft: Draft, described: Description, workshop: Workshop) -> None:
     if package:
         address = f"{PACKAGE}{package}/{posixpath.relpath(path, folder)}"
         draft.sections["packages"][package] = workshop.target.from_folder(folder)
+    elif found := _installed(path, workshop.packages):
+        address = found
     else:
-        address = path if path.startswith(PACKAGE) else workshop.target.from_folder(path)
+        address = path if path.startswith(PACKAGE) else path_from(workshop.target, path)
     keys = {"xacro": address}
     keys |= {"args": dict(described.args)} if described.args else {}  # type: ignore[dict-item]
     keys |= {"prefix": described.prefix} if described.prefix else {}
@@ -61,6 +63,15 @@ def _add_part(draft: Draft, described: Description, workshop: Workshop) -> None:
     name = posixpath.basename(path).partition(".")[0].replace("-", "_") or "robot"
     draft.sections["parts"][name] = keys
     draft.note(("parts", name), where(described.at, "what robot_state_publisher is given"))
+
+
+def _installed(path: str, packages: Packages) -> str:
+    """Return the address of a file in a package that is installed, empty for any other."""
+    for prefix in packages.disk.prefixes if packages.disk else ():
+        share = prefix.rstrip("/") + "/share/"
+        if path.startswith(share) and path.count("/", len(share)):
+            return PACKAGE + path.removeprefix(share)
+    return ""
 
 
 def _add_links(draft: Draft, described: Description, workshop: Workshop) -> None:

@@ -30,6 +30,7 @@ from tfcompose.importing.programs import (
     is_setting,
     isolated,
     one_clock,
+    path_from,
     where,
 )
 from tfcompose.importing.static_transforms import PLUGIN as STATIC_PLUGIN
@@ -182,6 +183,8 @@ class _Work:
         self._components: list[tuple[str, str, Span]] = []
         self._only_when = ""
         self._arguments: dict[str, tuple[dict[str, Any], Span]] = {}
+        #: Those whose values are in frames.
+        self._read: set[str] = set()
 
     def add(self, record: dict[str, Any]) -> None:
         """Add one record."""
@@ -208,7 +211,7 @@ class _Work:
 
     def finish(self, decided: list[str]) -> None:
         """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
-        self._args(decided)
+        self._args({*decided, *self._read})
         self._into_containers()
         started = self.draft.started()
         for name, after in self._after:
@@ -229,16 +232,16 @@ class _Work:
     def _argument(self, record: dict[str, Any], span: Span) -> None:
         self._arguments[record["name"]] = (record, span)
 
-    def _args(self, decided: list[str]) -> None:
+    def _args(self, decided: set[str]) -> None:
         """Add the arguments that entries name, and say of the others which values they had."""
         used = arguments_in(self.draft.sections) | self._in_conditions()
         unread = {name: span for name, (_, span) in self._arguments.items() if name not in used and name not in decided}
         if unread:
             several = f"the launch argument{'' if len(unread) == 1 else 's'} {', '.join(unread)}"
             self.draft.todo(f"nothing that is imported reads {several}", next(iter(unread.values())))
+        fixed: dict[str, Span] = {}
         for name, (record, span) in self._arguments.items():
             value, at = record["value"], ("args", name)
-            explained = f" ({record['description'].strip()})" if record["description"].strip() else ""
             if name in used:
                 typed = scalar_of(value)
                 kind = {str: "string", float: "float"}.get(type(typed))
@@ -246,15 +249,20 @@ class _Work:
                 keys |= {"default": typed}
                 choices = [scalar_of(one) for one in record["choices"]]
                 keys |= {"choices": choices} if choices and {type(one) for one in choices} == {type(typed)} else {}
-                keys |= {"description": " ".join(record["description"].split())} if explained else {}
+                keys |= (
+                    {"description": " ".join(record["description"].split())} if record["description"].strip() else {}
+                )
                 keys |= {"env": record["env"]} if record["env"] else {}
                 self.draft.sections["args"][name] = keys
                 self.draft.note(at, where(span))
             if name in decided:
-                chosen = f"{shown(value)!r} here" if value != record["default"] else f"its default {shown(value)!r}"
-                message = f"the launch argument {name}{explained} has {chosen}"
-                more = " where its value decides what is started, or is computed with" if name in used else ""
-                self.draft.todo(f"{message}{more}", span, at if name in used else ("", ""), f"import … {name}:=VALUE")
+                fixed[f"{name}:={shown(value) or repr('')}"] = span
+                if name in used:
+                    self.draft.note(at, f"where it decides what is started, or is computed with, it is {value!r}")
+        if fixed:
+            several = f"{'this launch argument' if len(fixed) == 1 else 'these launch arguments'}: {' '.join(fixed)}"
+            advice = "import … NAME:=VALUE takes another value, --all-branches what conditions leave out"
+            self.draft.todo(f"what is imported holds for {several}", next(iter(fixed.values())), advice=advice)
 
     def _in_conditions(self) -> set[str]:
         texts = [keys["when"] for entries in self.draft.sections.values() for keys in entries.values()
@@ -328,6 +336,7 @@ class _Work:
         keys = self._keys(record, todo)
         argv = tuple(record.get("argv", ()))
         if record.get("executable") in _READ:
+            self._read |= arguments_in(list(argv))
             argv = tuple(map(with_values, argv))
         else:
             argv = tuple(_without_texts(word, todo) for word in argv)
@@ -360,7 +369,7 @@ class _Work:
         if record.get("lifecycle"):
             keys["lifecycle"] = record["lifecycle"]
         if record.get("cwd"):
-            keys["cwd"] = self.target.from_folder(record["cwd"])
+            keys["cwd"] = path_from(self.target, record["cwd"])
         if record.get("required"):
             keys["required"] = True
         if record.get("respawn"):

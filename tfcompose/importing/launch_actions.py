@@ -473,11 +473,20 @@ class IncludeLaunchDescription(Action):
         source = self.source
         location = source.location if isinstance(source, LaunchDescriptionSource) else source
         path = with_package(text_of(location, context))
-        given = {text_of(name, context): text_of(value, context) for name, value in self.launch_arguments}
+        given: dict[str, str] = {}
+        for name, value in self.launch_arguments:
+            try:
+                given[text_of(name, context)] = text_of(value, context)
+            except FailedError as error:  # the file has a default for it, or says what it cannot do without
+                context.todo(self.at, f"the argument {plain([name])} of {self.described(context)}: {error}")
         context.configurations |= given
         if path.startswith(PACKAGE):
-            given = {text_of(name, context): symbolic_text(value, context) for name, value in self.launch_arguments}
-            context.record("include", self.at, file=path, args=given, namespace=context.namespace,
+            symbolic = {
+                text_of(name, context): symbolic_text(value, context)
+                for name, value in self.launch_arguments
+                if text_of(name, context) in given
+            }
+            context.record("include", self.at, file=path, args=symbolic, namespace=context.namespace,
                            env=dict(context.variables), period=context.period_s,
                            after=dict(context.after))  # fmt: skip
             return
@@ -698,7 +707,8 @@ class LoadComposableNodes(Action):
 
     def described(self, context: Context) -> str:
         container = self.container.node if isinstance(self.container, Node) else self.container
-        return f"{len(list(self.components or ()))} components for {plain([container])}"
+        count = len(list(self.components or ()))
+        return f"{count} component{'' if count == 1 else 's'} for {plain([container])}"
 
 
 class Unknown(Action):

@@ -53,6 +53,8 @@ _REFUSED = frozenset({
 #: Packages of ROS's that the stand-in is in the place of, and what xacro and the ament index are.
 _LAUNCH = frozenset({"launch", "launch_ros", "launch_xml", "launch_yaml", "nav2_common", "ament_index_python", "xacro",
                      "lifecycle_msgs", "launch_param_builder", "moveit_configs_utils", "launch_testing"})  # fmt: skip
+#: Packages of which only programs are named, that are not run here.
+_TOOLS = {"xacro"}
 #: Those that are themselves where launch is installed.
 _INSTALLED = frozenset({"launch", "launch_ros", "launch_xml", "launch_yaml", "lifecycle_msgs"})
 
@@ -76,7 +78,7 @@ class Reader:
         key = f"{name} {Path(file).parent}"
         if key not in self._known:
             self._known[key] = self._find(name, file)
-            if self._known[key] is None and name not in self.missed:
+            if self._known[key] is None and name not in self.missed | _TOOLS:
                 self.missed.add(name)
                 at = place()
                 self.context.record("package", at if at[0] else self.context.at, name=name)

@@ -582,15 +582,13 @@ def parameters_of(given: Any, context: Context, at: Any) -> list[Any]:
     several: list[Any] = []
     for one in given or ():
         try:
-            several.append(_parameters(one, context))
+            several.append(dict(_flat(one, context, "", at)) if isinstance(one, Mapping) else _parameters(one, context))
         except FailedError as error:
             context.todo(at, f"parameters: {error}")
     return several
 
 
 def _parameters(one: Any, context: Context) -> Any:
-    if isinstance(one, Mapping):
-        return dict(_flat(one, context, ""))
     if isinstance(one, Parameter):
         return {text_of(one.name, context): one.perform(context)}
     if isinstance(one, ParameterFile):
@@ -598,13 +596,17 @@ def _parameters(one: Any, context: Context) -> Any:
     return with_package(text_of(one, context))
 
 
-def _flat(params: Mapping[Any, Any], context: Context, above: str) -> Iterable[tuple[str, Any]]:
+def _flat(params: Mapping[Any, Any], context: Context, above: str, at: Any) -> Iterable[tuple[str, Any]]:
+    """Yield parameters by their full names, without those that cannot be resolved, which are named."""
     for key, value in params.items():
         name = f"{above}{text_of(key, context)}"
         if isinstance(value, Mapping):
-            yield from _flat(value, context, f"{name}.")
-        else:
+            yield from _flat(value, context, f"{name}.", at)
+            continue
+        try:
             yield name, parameter_value(value, context)
+        except FailedError as error:
+            context.todo(at, f"the parameter {name}: {error}")
 
 
 def parameter_value(value: Any, context: Context) -> Any:

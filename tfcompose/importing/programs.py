@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from tfcompose.importing.static_transforms import PROGRAM, RefusedError, reader_of, static_transform
-from tfcompose.importing.yaml_text import Bare, parameter
+from tfcompose.importing.yaml_text import Bare, Expression, argument, arguments_in, parameter, with_values
 from tfcompose.numbers import number
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
@@ -110,15 +110,18 @@ def add_program(draft: Draft, program: Program, target: Target) -> str | None:
 
 
 def one_clock(draft: Draft) -> None:
-    """Let the robot's clock be the simulated one where parameters of nodes say so, and none says otherwise."""
+    """Let the robot's clock be what parameters of nodes say, or the argument that they name, if they all agree."""
     several = [process["params"] for process in draft.started().values() if "params" in process]
-    if {params.get("use_sim_time", True) for params in several} == {True} and any(
-        "use_sim_time" in params for params in several
-    ):
+    found = {params["use_sim_time"] for params in several if "use_sim_time" in params}
+    if found == {True}:
         draft.sections["ros"]["clock"] = "sim"
         for process in draft.started().values():
             if process.get("params", {}).pop("use_sim_time", None) and not process["params"]:
                 del process["params"]
+    elif len(found) == 1 and isinstance(text := found.pop(), str):
+        for name in arguments_in(text):
+            if text == argument(name, with_values(text)):
+                draft.sections["ros"]["clock"] = Expression(f"'sim' if args.{name} else 'wall'")
 
 
 def is_setting(draft: Draft, name: str, value: str) -> bool:
@@ -129,6 +132,13 @@ def is_setting(draft: Draft, name: str, value: str) -> bool:
     wanted = known[_SETTINGS[name]]
     allowed = wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
     return allowed and draft.sections["ros"].setdefault(_SETTINGS[name], wanted) == wanted
+
+
+def path_from(target: Target, path: str) -> str:
+    """Return a path as the robot file has it: from its folder, or absolute where they have but the root in common."""
+    begin = posixpath.normpath(posixpath.join(target.top, target.folder))
+    is_near = posixpath.commonpath([begin, posixpath.join(target.top, path)]) != "/"
+    return target.from_folder(path) if is_near else posixpath.normpath(posixpath.join(target.top, path))
 
 
 def where(at: Span | None, what: str = "") -> str:
@@ -186,7 +196,7 @@ def _without_ros_arguments(program: Program) -> Program:
             params.append({left: _yaml_value(right)})
         elif word == "--params-file":
             params.append(value)
-        elif word == "--log-level" and value in _LEVELS:
+        elif word == "--log-level" and with_values(value) in _LEVELS:
             keys["log_level"] = value
         else:
             kept += [word, value] if value else [word]
@@ -405,7 +415,7 @@ def _params(given: Sequence[Mapping[str, Any] | str], target: Target, node: str)
         elif one.startswith(PACKAGE):
             left.append(f"the parameters of {one}: the package is not found here")
         else:
-            files.append(target.from_folder(one))
+            files.append(path_from(target, one))
             known = _parameters_in(one, node) if own else set()
             if known is None:
                 left.append(f"{one} is laid over the parameters before it: here they are laid over the file")

@@ -11,6 +11,7 @@ from tests.support.tree_history import BEGUN_NS, END_NS, TreeHistory, sound_tree
 from tfcompose.cli import main
 from tfcompose.importing.draft import Draft
 from tfcompose.importing.observed import Observed, round_rate, started_by
+from tfcompose.live.publishers import Publisher
 from tfcompose.load import load
 
 
@@ -73,6 +74,16 @@ def test_a_second_publisher_is_named() -> None:
 )
 def test_rates_are_round_where_a_round_one_is_near(measured: float | None, meant: float | None) -> None:
     assert round_rate(measured) == meant
+
+
+def test_a_node_whose_name_is_another_one_at_each_start_is_said_to_be_so() -> None:
+    node = "static_transform_publisher_aB3dE6gH9jK2mN5p"
+    history = TreeHistory().takes(
+        ("base_link", "laser", 0, 0, 0.0, 0.0, 0.0, *UPRIGHT), b"s", BEGUN_NS, static=True
+    )  # fmt: skip
+    history.observer.take_graph([Publisher(b"s", f"/{node}", static=True)])
+    text = drafted(history).text()
+    assert "another name at each start" in text
 
 
 def test_a_command_line_names_its_package() -> None:

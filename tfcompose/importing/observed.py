@@ -154,6 +154,8 @@ class Observed:
             plain = node == f"/{name}"
             keys: dict[str, Any] = {"external": True} | ({} if plain else {"node": node})
             self._owners[node] = self.draft.process(name, keys, *self._notes(edge))
+            if _ANONYMOUS.fullmatch(base):
+                self.draft.note(("processes", self._owners[node]), _ANEW)
         return self._owners[node]
 
     def _notes(self, edge: EdgeState) -> Iterable[str]:
@@ -172,6 +174,11 @@ class Observed:
                 RECORDED, {"external": True}, "TODO a recording does not say who publishes: name the processes"
             )
         return RECORDED
+
+
+#: How ROS 2's static_transform_publisher names its node unless it is told.
+_ANONYMOUS = re.compile(r"static_transform_publisher_[A-Za-z0-9]{16}")
+_ANEW = "its node has another name at each start: name it by -r __node:=NAME, or remove owner and static at its frames"
 
 
 def _parents_first(edges: Sequence[EdgeState]) -> list[EdgeState]:

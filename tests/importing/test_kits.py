@@ -87,7 +87,9 @@ def test_a_single_vehicle_is_no_argument_and_one_of_several_kits_is_named(
     _, data = import_of(source, "sensor_model:=b")
     assert "args" not in data
     assert data["frames"]["gnss_link"]["calibration"].endswith("config/default/b/sensor_kit_calibration.yaml")
-    assert exit_code("import", str(tmp_path / "individual_params/config/default/a")) == 1
+    assert exit_code("import", str(tmp_path / "individual_params/config/default")) == 1
+    _, data = import_of(tmp_path / "individual_params/config/default/a")  # as in the description of a kit
+    assert list(data["frames"])[:3] == ["base_link", "sensor_kit_base_link", "camera0/camera_link"]
 
 
 def exit_code(*words: str) -> object:

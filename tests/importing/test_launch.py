@@ -180,6 +180,25 @@ def generate_launch_description():
 """
 
 
+def test_what_python_makes_at_random_is_the_same_at_each_import(tmp_path: Path) -> None:
+    file = source(tmp_path, "a.launch.py", RANDOM)
+    text, data = import_of(file)
+    assert len(data["processes"]["n"]["remap"]) == 8
+    assert text == import_of(file)[0]
+
+
+RANDOM = """
+import tempfile
+from launch import LaunchDescription
+from launch_ros.actions import Node
+from nav2_common.launch import ParseMultiRobotPose
+def generate_launch_description():
+    assert not ParseMultiRobotPose("robots").value()
+    return LaunchDescription([Node(package="p", executable="e", name="n", arguments=[tempfile.mktemp(suffix=".sdf")],
+                                   remappings={(word, f"other_{word}") for word in "abcdefgh"})])
+"""
+
+
 def test_an_argument_that_is_the_clock_of_all_nodes_is_the_robots(tmp_path: Path) -> None:
     file = source(tmp_path, "a.launch.py", CLOCK)
     text, _ = import_of(file)

@@ -76,7 +76,7 @@ def test_rates_are_round_where_a_round_one_is_near(measured: float | None, meant
     assert round_rate(measured) == meant
 
 
-def test_a_node_whose_name_is_another_one_at_each_start_is_said_to_be_so() -> None:
+def test_a_comment_names_a_node_whose_name_is_another_one_at_each_start() -> None:
     node = "static_transform_publisher_aB3dE6gH9jK2mN5p"
     history = TreeHistory().takes(
         ("base_link", "laser", 0, 0, 0.0, 0.0, 0.0, *UPRIGHT), b"s", BEGUN_NS, static=True

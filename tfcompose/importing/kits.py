@@ -75,7 +75,9 @@ def is_autoware(source: Source) -> bool:
 
 def add_autoware(draft: Draft, source: Source) -> None:
     """Add the frames of a calibration file."""
-    draft.note(("", ""), f"{source.file}: calibration: FILE at a frame reads its pose from the file instead")
+    draft.note(
+        ("", ""), "calibration: FILE at a frame, instead of xyz and rpy, reads its pose from the calibration file"
+    )
     for parent, children in source.data.items():
         for child, values in children.items():
             path: Steps = (parent, child)
@@ -102,6 +104,7 @@ def add_vehicles(
 ) -> None:
     """Add the calibrations of Autoware's individual parameters, in which each vehicle has a folder with its kits.
 
+    The folder of a kit's description has but those of the kit itself.
     The vehicle stays an argument of the robot file where there are several. ``given`` may choose ``vehicle_id`` and
     ``sensor_model``, as Autoware's launch files do.
 
@@ -109,6 +112,11 @@ def add_vehicles(
         RejectedError: if the folder holds no calibrations, or it is not said of which kit they are to be.
     """
     config = folder / "config" if (folder / "config").is_dir() else folder
+    own = sorted(config.glob("*_calibration.yaml"), key=lambda file: (file.name != _CALIBRATIONS[0], file.name))
+    if own:  # the description of one kit, whose calibrations are those of no vehicle
+        for file in own:
+            add_kit(draft, read(str(file)))
+        return
     kits: dict[str, list[str]] = {}
     for inner in sorted(config.glob("*/*")):
         if any((inner / name).is_file() for name in _CALIBRATIONS):

@@ -143,7 +143,7 @@ def _answered(launch: Launch, *, with_launch: bool) -> dict[str, Any]:
     try:
         done = subprocess.run(
             command, input=json.dumps(request).encode(), stdout=subprocess.PIPE, timeout=_MOST_WALL_S, check=False,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"},  # sets keep an order
         )  # fmt: skip
         answer: dict[str, Any] = json.loads(done.stdout)
     except subprocess.TimeoutExpired:

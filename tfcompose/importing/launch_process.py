@@ -225,6 +225,17 @@ class _Rewritten(substitutions.Substitution):
         return file
 
 
+class _RobotPoses:
+    """nav2_common's ParseMultiRobotPose: poses of robots, which it takes from the command line of ``ros2 launch``."""
+
+    def __init__(self, context: Context, argument: str) -> None:
+        context.todo(place(), f"the argument {argument}, which ParseMultiRobotPose takes from the command line")
+
+    def value(self) -> dict[str, Any]:
+        """Return no robots."""
+        return {}
+
+
 class _HasNode(substitutions.Substitution):
     """nav2_common's HasNodeParams: whether a parameter file has a node."""
 
@@ -276,7 +287,8 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         elif spec.name.startswith("nav2_common"):
             of = self.reader.recorder.as_substitution if self.reader.recorder else lambda kind: kind
             vars(module).update(RewrittenYaml=of(_Rewritten), ReplaceString=of(_Rewritten), HasNodeParams=of(_HasNode),
-                                LaunchConfigAsBool=of(substitutions.LaunchConfigAsBool))  # fmt: skip
+                                LaunchConfigAsBool=of(substitutions.LaunchConfigAsBool),
+                                ParseMultiRobotPose=functools.partial(_RobotPoses, self.reader.context))  # fmt: skip
         elif spec.name.startswith("moveit_configs_utils"):
             find, context = self.reader.share, self.reader.context
             vars(module)["MoveItConfigsBuilder"] = functools.partial(MoveItConfigsBuilder, find, context)
@@ -344,6 +356,14 @@ def _watch(context: Context, null: int) -> None:  # noqa: C901 (one hook after a
     def folder(path: Any, *_args: Any, **_more: Any) -> None:
         note(f"the folder {path} would be made")
 
+    def temporary(suffix: str = "", prefix: str = "tmp", dir: Any = None) -> str:  # noqa: A002 (as it is called)
+        count = len(made)
+        made.append(f"{dir or tempfile.gettempdir()}/{prefix}{count}{suffix}")
+        context.todo(place(), f"the temporary file {made[-1]}: its name is a new one at each launch")
+        return made[-1]
+
+    made: list[str] = []
+
     def opened(file: Any, mode: str = "r", *args: Any, **more: Any) -> Any:
         path = substitutions.with_package(os.fspath(file)) if isinstance(file, (str, os.PathLike)) else ""
         if path == os.devnull:
@@ -364,7 +384,7 @@ def _watch(context: Context, null: int) -> None:  # noqa: C901 (one hook after a
         (subprocess, "check_output", lambda *a, **k: run(*a, **k).stdout),
         (subprocess, "getoutput", lambda words, **k: run(words, text=True, **k).stdout),
         (os, "popen", lambda words, *_a, **_k: io.StringIO(run(words, text=True).stdout)),
-        (builtins, "open", opened), (Path, "read_text", read_text),
+        (builtins, "open", opened), (Path, "read_text", read_text), (tempfile, "mktemp", temporary),
     ]  # fmt: skip
     for owner, name, hook in hooks:
         setattr(owner, name, hook)

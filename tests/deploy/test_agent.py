@@ -128,6 +128,7 @@ def test_a_python_that_is_too_old_says_so(version: str) -> None:
     assert (done.stdout, "older than 3.10" in done.stderr) == ("runs\n" if runs else "", not runs), done
 
 
+@pytest.mark.slow
 def test_wheels_are_installed_into_a_python_of_the_release(agent: Agent, tmp_path: Path) -> None:
     wheel = tmp_path / "answer-1-py3-none-any.whl"
     with zipfile.ZipFile(wheel, "w") as archive:

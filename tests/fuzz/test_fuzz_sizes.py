@@ -109,6 +109,7 @@ def lines_run(words: list[str]) -> int:
     return count
 
 
+@pytest.mark.slow
 @for_each(CASES)
 def test_a_command_takes_in_proportion_to_the_size(make: Callable[[int], str], words: list[str]) -> None:
     counts = []

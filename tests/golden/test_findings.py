@@ -7,7 +7,7 @@ After an intended change: ``python -m tests.golden.test_findings --write``, and 
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
@@ -28,6 +28,8 @@ from tfcompose.findings import Edit, Finding, RejectedError, Span
 from tfcompose.language import profiles_in, set_value, validate_node_preset
 from tfcompose.load import Source, load
 from tfcompose.resolve import Library
+from tfcompose.urdf.packages import Packages
+from tfcompose.urdf.xacro import Expansion, Use
 
 ROOT = Path(__file__).parents[2]
 #: A case's name, the file that it is about, and what is found.
@@ -62,9 +64,26 @@ def within(text: str, file: str, texts: dict[str, str] | None = None, **more: An
     def is_file(name: str) -> bool:
         return name in known or Path(name).is_file()
 
-    files = replace(disk(), read=read, is_file=is_file)
+    files = replace(disk(), read=read, is_file=is_file, expand=expanded)
     compiled = compile_robot(text, file, presets(), read=read, disk=files, **more)
     return [*compiled.found, *(unused_allows(compiled.allows, set(compiled.used)) if not more else [])]
+
+
+def expanded(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None) -> Expansion:
+    """Expand a file with xacro, once for all mutations that leave it and its use as they are."""
+    key = repr((Path(file).absolute(), arguments, use))
+    if key not in _expansions:
+        try:
+            _expansions[key] = disk().expand(file, packages, arguments, use)
+        except RejectedError as error:
+            _expansions[key] = error
+    answer = _expansions[key]
+    if isinstance(answer, RejectedError):
+        raise answer
+    return answer
+
+
+_expansions: dict[str, Expansion | RejectedError] = {}
 
 
 @cache

@@ -131,7 +131,14 @@ def heard_until(child: str, x: float, times: int = 20) -> list[float]:
         return found
 
 
-@pytest.mark.parametrize("guard", ["mode: watch", "mode: strict", "mode: strict, fence: remap"])
+@pytest.mark.parametrize(
+    "guard",
+    [
+        "mode: strict",
+        pytest.param("mode: watch", marks=pytest.mark.slow),
+        pytest.param("mode: strict, fence: remap", marks=pytest.mark.slow),
+    ],
+)
 def test_of_two_with_the_owners_name_the_stranger_is_accused_and_the_owner_is_heard(
     run: Callable[..., Liars], guard: str
 ) -> None:

@@ -57,6 +57,7 @@ def test_a_mount_that_is_moved_in_the_browser_is_saved_as_one_line(rover: Path, 
     assert tfcompose_in(rover.parent, "lint", rover.name).returncode == 0
 
 
+@pytest.mark.slow
 def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(rover: Path, server: viser.ViserServer) -> None:
     session = session_of(rover)
     panel = Panel(server, session, edit=True)
@@ -138,6 +139,7 @@ def rows(page: Page) -> list[str]:
     return [str(frame) for frame in frames]
 
 
+@pytest.mark.slow
 def test_a_click_selects_a_body_and_owners_can_be_hidden(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
@@ -170,6 +172,7 @@ def test_the_tree_selects_closes_and_hides_what_is_below_a_frame(rover: Path, se
         page.locator("[data-frame=lidar_imu] input:checked").wait_for()
 
 
+@pytest.mark.slow
 def test_arrow_keys_lead_through_the_tree(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
@@ -191,6 +194,7 @@ def test_arrow_keys_lead_through_the_tree(rover: Path, server: viser.ViserServer
         assert panel.selected == "lidar_sensor", "keys are the scene's"
 
 
+@pytest.mark.slow
 def test_a_search_keeps_what_is_above_and_selects_the_one_that_is_found(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
@@ -208,6 +212,7 @@ def test_a_search_keeps_what_is_above_and_selects_the_one_that_is_found(rover: P
         assert until(lambda: rows(page) == everything)
 
 
+@pytest.mark.slow
 def test_names_are_text_wherever_the_panel_has_them(tmp_path: Path, server: viser.ViserServer) -> None:
     name = "<img src=x onerror='window.isHit = true'>"
     text = f"""tfcompose: 1
@@ -259,6 +264,7 @@ def clicked_body(page: Page, panel: Panel) -> str:
     return str(panel.selected)
 
 
+@pytest.mark.slow
 def test_a_sweep_moves_every_joint_until_it_is_switched_off(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     joints = dict(panel.positions)

@@ -132,6 +132,18 @@ def test_its_calibrated_robot_is_linted_and_explained_as_printed(tmp_path: Path)
     assert run(*command.removeprefix("$ tfcompose ").split(), cwd=tmp_path).stdout == printed
 
 
+def test_its_preset_of_ones_own_has_no_findings(tmp_path: Path) -> None:
+    (preset,) = blocks("yaml", PAGES["presets"])
+    file = tmp_path / "presets/waterlinked/dvl-a50.yaml"
+    file.parent.mkdir(parents=True)
+    file.write_text(preset, encoding="utf-8")
+    robot = "tfcompose: 1\nrobot: r\npreset_path: [presets]\nlinks: {base_link: {}}\n"
+    dvl = "sensors: {dvl: {preset: waterlinked/dvl-a50, parent: base_link}}\n"
+    (tmp_path / "robot.yaml").write_text(robot + dvl, encoding="utf-8")
+    done = run("lint", "--fail-on", "warning", cwd=tmp_path)
+    assert (done.returncode, "[TF" in done.stdout) == (0, False), done.stdout
+
+
 @for_each(COMMANDS)
 def test_each_command_says_what_it_does_and_what_its_arguments_are(command: str) -> None:
     parser = parser_of(command)

@@ -6,6 +6,7 @@ code is in ``tfcompose.pages``.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -298,8 +299,10 @@ def code_of(word: str) -> str | None:
     return upper if upper in CATALOGUE else next((code.code for code in CATALOGUE.values() if code.name == word), None)
 
 
-def codes_and_names() -> list[str]:
-    """Return every word that ``code_of`` knows."""
+def similar_words(word: str) -> list[str]:
+    """Return the codes and names that an unknown word may be a slip of: none if it is a whole code, as TF999 is."""
+    if re.fullmatch(r"TF\d{3}", word.upper()):
+        return []
     return [*CATALOGUE, *(code.name for code in CATALOGUE.values())]
 
 

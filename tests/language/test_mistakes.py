@@ -41,6 +41,13 @@ MISTAKES = [
     (PROCESS % "remap: [[a, b]]", "6:33 TF103", "remap: {a: b}"),
     (PROCESS % "params: nav2.yaml", "6:34 TF103", "params: {file: nav2.yaml}"),
     (PROCESS % "cmd: [a]", "6:26 TF101", "run:"),
+    (PROCESS % "owns: [odom]", "6:26 TF101", "owner:"),
+    (PROCESS % "simulate: fixed", "6:36 TF103", "{fixed:"),
+    (BASE + "guard: strict\n", "4:8 TF103", "{mode: strict}"),
+    (BASE + "rules: {TF999: off}\n", "4:9 TF017", "a code that lint prints"),
+    (CAM % "params: {a: 1}", "5:53 TF101", "driver: params:"),
+    (BASE + "parts:\n  arm: {file: arm.yaml, parent: base_link}\n", "5:9 TF101", "spec: arm.yaml urdf: xacro:"),
+    (SHAPE.replace("{box: [1, 1, 1], %s}", "{cylinder: {radius: 1, width: 1}}"), "3:52 TF101", "length"),
     (BASE + "processes:\n  a: {external: yes}\n", "5:17 TF106", "true"),
     (CAM % "driver: {serial: 1}", "5:62 TF101", "options: {serial:"),
     (CAM % "serial: 1", "5:53 TF101", "options: {serial:"),
@@ -253,3 +260,19 @@ def test_a_process_that_was_refused_is_no_unknown_owner(tmp_path: Path) -> None:
         printed = tfcompose_in(tmp_path, "lint").stdout
         assert printed.count("error[") == 1, printed
         assert "TF302" not in printed
+
+
+def test_the_numbers_of_a_part_are_judged_with_the_robot_that_holds_it(tmp_path: Path) -> None:
+    limit = "limit: {lower: -170, upper: 3, velocity: 1, effort: 1}"
+    joint = f"joints: {{j: {{type: revolute, parent: base, child: tip, axis: [0, 0, 1], {limit}}}}}\n"
+    arm = (
+        "tfcompose: 1\nrobot: arm\nlinks: {base: {}, tip: {}}\n"
+        + joint
+        + "frames: {far: {parent: tip, xyz: [0, 250, 0]}}\n"
+    )
+    parts = "parts:\n  left: {spec: arm.yaml, prefix: left_, parent: base_link}\n"
+    (tmp_path / "arm.yaml").write_text(arm, "utf-8")
+    (tmp_path / "robot.yaml").write_text(BASE + parts, "utf-8")
+    printed = tfcompose_in(tmp_path, "lint", "robot.yaml").stdout
+    assert "arm.yaml:4:88: warning[TF410]" in printed
+    assert "arm.yaml:5:38: warning[TF414]" in printed

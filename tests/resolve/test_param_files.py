@@ -2,12 +2,14 @@
 
 import contextlib
 import json
+from pathlib import Path
 
 import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.cli import tfcompose_in
 from tests.support.texts import reader
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
@@ -59,6 +61,18 @@ def test_a_file_may_be_named_as_everywhere_else() -> None:
     assert source_text('{file: "${file(p.yaml)}"}') == source_text("{file: p.yaml}")
     (missing,) = compiled('{file: "${file(q.yaml)}"}').errors
     assert (missing.code, "q.yaml" in str(missing.span), "${" in str(missing.span)) == ("TF001", True, False)
+
+
+def test_a_file_may_be_in_a_package(tmp_path: Path) -> None:
+    (tmp_path / "nav").mkdir()
+    (tmp_path / "nav/p.yaml").write_text(FILE, "utf-8")
+    named = PLANNER.replace("PARAMS", "{file: package://nav/p.yaml}")
+    robot = HEAD.replace("processes:", "packages: {nav: nav}\nprocesses:") + named
+    (tmp_path / "robot.yaml").write_text(robot, "utf-8")
+    assert tfcompose_in(tmp_path, "build").returncode == 0
+    assert '"common": 1' in (tmp_path / "build/r/params/planner.yaml").read_text("utf-8")
+    (tmp_path / "robot.yaml").write_text(HEAD + named, "utf-8")
+    assert "robot.yaml:6:62: error[TF724]" in tfcompose_in(tmp_path, "lint").stdout
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.catalogue import CATALOGUE, can_be_allowed, code_of, codes_and_names
+from tfcompose.catalogue import CATALOGUE, can_be_allowed, code_of, similar_words
 from tfcompose.check import (
     bodies,
     joints,
@@ -133,7 +133,7 @@ def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     for word, at in rules.items():
         code = code_of(word)
         if code is None:
-            advice = did_you_mean(word, codes_and_names(), "write a code that lint prints, such as TF401")
+            advice = did_you_mean(word, similar_words(word), "write a code that lint prints, such as TF401")
             found.append(finding("TF017", f"unknown code {word} under rules", at, help=advice))
         elif not can_be_allowed(code):
             found.append(

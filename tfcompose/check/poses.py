@@ -38,7 +38,7 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
     revolute = {edge.joint.name for edge in robot.edges if edge.joint and edge.joint.type == "revolute"}
     for value in robot.source_numbers:
         is_limit = value.key == "limit"
-        if value.key not in {"rpy", "look", "axis_angle", "limit"} or (is_limit and value.entry not in revolute):
+        if value.key not in {"rpy", "look", "axis_angle", "limit"} or (is_limit and value.name not in revolute):
             continue
         for index, (number, with_unit) in enumerate(zip(value.numbers, value.with_unit, strict=True)):
             size = abs(number)
@@ -210,7 +210,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
     for value in robot.source_numbers:
         if value.path[2:] != ("xyz",) or norm(value.numbers) <= limit or value.path[0] == "processes":
             continue
-        child = named.get(value.path[0], {}).get(value.entry, value.entry)
+        child = named.get(value.path[0], {}).get(value.name, value.name)
         distance = norm(tuple(n for n, unit in zip(value.numbers, value.with_unit, strict=True) if not unit))
         if child in below and distance > limit:
             message = f"{value.entry} is {distance:g} m away; the rest of the robot is within {limit:.3g} m"

@@ -50,7 +50,14 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
         ("box cylinder sphere mesh shape", (("visual", "a shape belongs under visual: {box: [0.5, 0.4, 0.15]}"),)),
         ("mass inertia density", (("inertial", _MASS),)),
         ("ixx iyy izz ixy ixz iyz", (("inertia", "it belongs under inertia: {ixx: 0.1, iyy: 0.1, izz: 0.1}"),)),
-        ("filename file", (("uri", "the file is uri"), ("mesh", "a file is mesh: meshes/base.stl"))),
+        (
+            "filename file",
+            (
+                ("uri", "the file is uri"),
+                ("mesh", "a file is mesh: meshes/base.stl"),
+                ("spec", "another robot file is spec: VALUE; URDF is urdf: FILE, and xacro is xacro: FILE"),
+            ),
+        ),
         ("depends_on requires wait_for needs", (("after", "what it waits for is after: {NAME: ready}"),)),
         ("respawn", (("restart", "restart: on-failure, or always, starts it again"),)),
         ("respawn_delay", (("restart_delay", "how long after its end is restart_delay: 2 s"),)),
@@ -72,7 +79,17 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
             ),
         ),
         ("remappings remaps", (("remap", "other names are remap: {scan: front/scan}"),)),
-        ("parameters ros__parameters", (("params", "parameters are params: {use_sim_time: false}"),)),
+        (
+            "parameters ros__parameters params",
+            (
+                ("params", "parameters are params: {use_sim_time: false}"),
+                ("driver", "parameters are those of its driver: driver: {params: {use_sim_time: false}}"),
+            ),
+        ),
+        (
+            "owns",
+            (("run", "an edge names its owner: frames: {base_link: {parent: odom, owner: base_drive}}"),),
+        ),
         ("command cmd exec entrypoint", (("run", "the command is run: [program, argument]"),)),
         ("topic topics", (("remap", "other names are remap: {scan: front/scan}"), ("driver", _TOPIC))),
         (
@@ -103,7 +120,7 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
         ("min minimum", (("lower", "the least is lower"),)),
         ("max maximum", (("upper", "the most is upper"),)),
         ("units unit", (("vars", "each value has its unit: 30 cm, 15 deg; bare numbers are metres and radians"),)),
-        ("height", (("length", "the height of a cylinder is length"),)),
+        ("height width", (("length", "the WORD of a cylinder is length"),)),
         ("diameter", (("radius", "half of the diameter is radius"),)),
         ("type model", (("preset", "the model is preset: realsense/d435i; tfcompose presets lists them"),)),
     )

@@ -229,9 +229,7 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
         advice = f"for example {path[-1]}: {field.examples[0]}" if field.examples else ""
         return Refusal("TF102", path[:-1], f"{path[-1]} is missing", advice, on_key=True)
     if kind == "literal_error":
-        allowed = [
-            str(word) for one in kinds_of(at(model, path)) if get_origin(one) is Literal for word in get_args(one)
-        ]
+        allowed = [str(word) for word in _words_allowed(model, path)]
         advice = f"one of: {', '.join(allowed)}"
         advice = did_you_mean(usual_value(value, allowed), allowed, advice) if isinstance(value, str) else advice
         return Refusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
@@ -242,15 +240,32 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
         advice = f"write {_SWITCHES[str(value).lower()]}"
     elif kind in {"model_type", "dataclass_type"}:
         keys = fields_of(mapping_at(model, path))
-        required = [name for name, field in keys.items() if field.is_required()]
-        advice = f"its keys can be: {', '.join(keys)}"
-        if isinstance(value, str) and len(required) == 1:
-            advice = f"for example {{{required[0]}: {value}}}"
+        advice = _example(model, path, value)
         if path and path[-1] in keys:
             advice = f"{path[-1]} belongs to the entry above: indent it more than the name of that"
     elif kind == "dict_type":
         advice = _as_mapping(model, path, value)
     return Refusal(code, path, message.format(value=shown(value), **context), advice, on_key)
+
+
+def _example(model: type[Spec], path: Path, value: Any) -> str:
+    """Return the help for what stands where a mapping with known keys belongs: an example, with the value in it."""
+    keys = fields_of(mapping_at(model, path))
+    required = [name for name, field in keys.items() if field.is_required()]
+    of_word = [name for name in keys if value in _words_allowed(model, (*path, name))]
+    chosen = of_word or [name for name in keys if name == value] or required
+    if isinstance(value, str) and value not in keys and len(chosen) == 1:
+        return f"for example {{{chosen[0]}: {value}}}"
+    examples = [(name, keys[name].examples) for name in chosen]
+    pairs = [f"{name}: {_in_yaml(those[0])}" for name, those in examples if those]
+    if not chosen or len(pairs) < len(chosen):
+        return f"its keys can be: {', '.join(keys)}"
+    return f"for example {{{', '.join(pairs)}}}"
+
+
+def _words_allowed(model: type[Spec], path: Path) -> list[Any]:
+    """Return the words that may stand at a path, where these are listed."""
+    return [word for one in kinds_of(at(model, path)) if get_origin(one) is Literal for word in get_args(one)]
 
 
 #: Words that YAML 1.1 reads as true and false, and YAML 1.2 as strings.

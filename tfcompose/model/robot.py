@@ -82,13 +82,15 @@ class SourceNumbers:
     """The numbers of one pose or joint limit as the source file gives them, in SI, each with its place.
 
     ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each number whether it stands
-    there with a unit, and ``place`` where the number of an index stands.
+    there with a unit, and ``place`` where the number of an index stands. ``in_part`` is the entry's name in the
+    whole robot where the file is that of a part.
     """
 
     path: tuple[str | int, ...]
     numbers: tuple[float, ...]
     with_unit: tuple[bool, ...]
     place: Callable[[int], Span] = field(compare=False, repr=False)
+    in_part: str = ""
 
     @property
     def key(self) -> str:
@@ -97,8 +99,13 @@ class SourceNumbers:
 
     @property
     def entry(self) -> str:
-        """The name of the frame, link, joint, sensor or process that the value belongs to."""
+        """The name of the frame, link, joint, sensor or process that the value belongs to, as in its file."""
         return str(self.path[1])
+
+    @property
+    def name(self) -> str:
+        """The entry's name in the robot."""
+        return self.in_part or self.entry
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from tfcompose.urdf.packages import Disk, Packages
     from tfcompose.urdf.xacro import Expansion
 
-_PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
-
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
@@ -60,7 +58,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     spec = part.declared
     key = "urdf" if spec.urdf is not None else "xacro"
     at = part.source.at((*part.at, key))
-    file = _address(spec.urdf or spec.xacro or "", at, packages)
+    file = packages.path_of(spec.urdf or spec.xacro or "", at)
     files: tuple[str, ...] = (file,)
     bolted = _bolted(part, read(file)) if spec.macro is not None else {}
     if spec.urdf is not None:
@@ -95,17 +93,6 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
 def _with_base(robot: Robot) -> Robot:
     roots = robot.roots()
     return replace(robot, base=roots[0] if len(roots) == 1 else None)
-
-
-def _address(named: str, at: Span, packages: Packages) -> str:
-    """Return the path of a file, relative to the robot file or in a package."""
-    found = _PACKAGE.fullmatch(named)
-    if found is None:
-        return path_named(named, at)
-    folder = packages.folder(found[1], at.file)
-    if folder is None:
-        raise RejectedError([replace(packages.not_found(found[1], at), severity="error")])
-    return f"{folder}/{found[2]}"
 
 
 def _expanded(part: PartEntry, file: str, at: Span, packages: Packages, bolted: Mapping[str, str]) -> Expansion:
@@ -181,7 +168,7 @@ def _use(part: PartEntry, file: str, packages: Packages, disk: Disk, bolted: Map
     if spec.macro is None:
         return Use(part.source.at((*at, "xacro")))
     places = (part.source.at((*at, "include", index)) for index in range(len(spec.include)))
-    files = (*(_address(one, place, packages) for one, place in zip(spec.include, places, strict=True)), file)
+    files = (*(packages.path_of(one, place) for one, place in zip(spec.include, places, strict=True)), file)
     words: dict[str, str] = {name: value for name, value in bolted.items() if name != _ORIGIN}
     blocks = [bolted[_ORIGIN]] if _ORIGIN in bolted else []
     for name, value in spec.params.items():

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, finding, nearest
 from tfcompose.language.variables import OF_FILES
-from tfcompose.load import path_named
 from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
 from tfcompose.model import AsInFile
 from tfcompose.resolve.processes import FILE_KEY, full_name, names_files
@@ -19,16 +18,17 @@ if TYPE_CHECKING:
     from tfcompose.findings import Span
     from tfcompose.load import Source
     from tfcompose.model import Node, Process, Robot
+    from tfcompose.urdf.packages import Packages
 
 
 def with_param_files(
-    robot: Robot, own: Container[str], source: Source, read: Callable[[str], str] | None
+    robot: Robot, own: Container[str], source: Source, read: Callable[[str], str] | None, packages: Packages
 ) -> tuple[Robot, list[Finding]]:
     """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these.
 
-    ``own`` are the processes of the source; those of parts have theirs.
+    ``own`` are the processes of the source; those of parts have theirs. A file may be in a package.
     """
-    work = _Work(source, read, robot.ros.namespace)
+    work = _Work(source, read, packages, robot.ros.namespace)
     processes = tuple(work.process(one) if one.name in own else one for one in robot.processes)
     source_data = robot.source_data | ({"parameter files": work.digests} if work.digests else {})
     return replace(robot, processes=processes, source_data=source_data), work.found
@@ -38,6 +38,7 @@ def with_param_files(
 class _Work:
     source: Source
     read: Callable[[str], str] | None
+    packages: Packages
     namespace: str
     found: list[Finding] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
@@ -77,7 +78,11 @@ class _Work:
     def _params_in(self, file: str, at: Span, node: Node, process: Process, without: list[Finding]) -> dict[str, Any]:
         """Return what a file says to the node, in words; ``without`` gets a finding if it says nothing to it."""
         call = OF_FILES.fullmatch(file)
-        path = path_named(call[2] if call else file, at)
+        try:
+            path = self.packages.path_of(call[2] if call else file, at)
+        except RejectedError as error:
+            self.found += error.findings
+            return {}
         loaded = self._load(path, at)
         if loaded is None:
             return {}

@@ -106,11 +106,14 @@ def sensor_of(name: str, spec: SensorSpec, library: Library, source: Source) -> 
     return sensor, found
 
 
+_OWN = "tfcompose help presets shows how to write one"
+
+
 def _no_preset(name: str, library: Library, span: Span) -> Finding:
     names = library.names
     vendor = name.partition("/")[0]
     same = [one for one in names if one.startswith(f"{vendor}/")]
-    there = f"of {vendor} there is {', '.join(same)}" if same else "tfcompose presets lists them"
+    there = f"of {vendor} there is {', '.join(same)}" if same else f"tfcompose presets lists them; {_OWN}"
     models = [one for one in names if one.rpartition("/")[2] == name.rpartition("/")[2].lower()]
     advice = f"did you mean {' or '.join(models)}?" if models and not same else did_you_mean(name, same or names, there)
     return finding("TF601", f"unknown preset {name}", span, help=advice)

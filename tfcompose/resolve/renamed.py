@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         Process,
         Robot,
         Shape,
+        SourceNumbers,
         Zone,
     )
     from tfcompose.model.hardware import Block, Hardware
@@ -73,7 +74,14 @@ def renamed(robot: Robot, names: Names) -> Robot:
         hardware=tuple(_hardware(hardware, names, again) for hardware in robot.hardware),
         blocks=tuple(_blocks(robot, names)),
         zones=tuple(_zone(zone, robot, names) for zone in robot.zones),
+        source_numbers=tuple(_numbers(one, names) for one in robot.source_numbers),
     )
+
+
+def _numbers(numbers: SourceNumbers, names: Names) -> SourceNumbers:
+    section = numbers.path[0]
+    again = names.process if section in {"sensors", "parts", "processes"} else names.frame
+    return replace(numbers, in_part=names.joint(numbers.name) if section == "joints" else again(numbers.name))
 
 
 def _link(link: Link, names: Names) -> Link:

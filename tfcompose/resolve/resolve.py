@@ -119,7 +119,7 @@ class _Work:
             from tfcompose.resolve.param_files import with_param_files
 
             own_names = frozenset(one.name for one in own)
-            robot = self._take(with_param_files(robot, own_names, self.source, self.read))
+            robot = self._take(with_param_files(robot, own_names, self.source, self.read, packages))
         if self.spec.ros2_control or self.spec.xml:
             from tfcompose.resolve.blocks import with_blocks
 
@@ -199,7 +199,7 @@ class _Work:
         places = [self.source.at(("preset_path", index)) for index in range(len(self.spec.preset_path))]
         folders = [path_named(folder, at) for folder, at in zip(self.spec.preset_path, places, strict=True)]
         self.found += [
-            finding("TF001", f"preset_path: no folder {folder}", at)
+            finding("TF001", f"preset_path: no folder {folder}", at, help="make it; it holds VENDOR/MODEL.yaml")
             for folder, at in zip(folders, places, strict=True)
             if not self.library.storage.is_folder(folder)
         ]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
@@ -26,6 +26,8 @@ _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
 #: What others write for a file in a package: xacro and launch files, and those who forget a slash.
 _MEANT = re.compile(r"(?:(?:file://)?\$\(find(?:-pkg-share)?\s+([\w.-]+)\s*\)|package:/?([\w.-]+))/+(.+)")
+#: A file in a package: package://NAME/PATH, or as xacro and launch files write it.
+_IN_PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
 _NEAR = 0.8  # many packages end in _description
 FETCH = "run git lfs pull to fetch the file"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
@@ -89,6 +91,20 @@ class Packages:
         way_out = f"did you mean {near}?" if near else self.advice.format(name=name)
         advice = f"{searched}; {'correct the folder that it is given' if name in self.named else way_out}"
         return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
+
+    def path_of(self, named: str, at: Span) -> str:
+        """Return the path of a file that is named at a place: in a package, or relative to the file there.
+
+        Raises:
+            RejectedError: if the package is not found.
+        """
+        found = _IN_PACKAGE.fullmatch(named)
+        if found is None:
+            return path_named(named, at)
+        folder = self.folder(found[1], at.file)
+        if folder is None:
+            raise RejectedError([replace(self.not_found(found[1], at), severity="error")])
+        return posixpath.join(folder, found[2])
 
     def asset(self, uri: str, at: Span, document: str = "") -> tuple[Asset, Finding | None]:
         """Return the file that is addressed at a place, and what is wrong with the address, if anything is.

@@ -139,7 +139,7 @@ def change_of(
     """
     mount = mount_of(robot, source, child)
     tolerance = ROUNDING / max(1.0, norm(mount.child_from_place.xyz))
-    computed = {one.path: one.numbers for one in robot.source_numbers}
+    computed = {one.path: one.numbers for one in robot.source_numbers if not one.in_part}
     return _Change(mount, source, texts, tolerance, computed).of(mount.given(parent_from_child))
 
 

@@ -67,13 +67,13 @@ def _explain_frames(file: str, a: str, b: str, arguments: Namespace) -> None:
 
 
 def _explain_code(word: str) -> None:
-    from tfcompose.catalogue import CATALOGUE, code_of, codes_and_names
+    from tfcompose.catalogue import CATALOGUE, code_of, similar_words
     from tfcompose.findings import did_you_mean
     from tfcompose.pages import page
 
     code = code_of(word)
     if code is None:
-        advice = did_you_mean(word, codes_and_names(), "lint prints codes: TF301")
+        advice = did_you_mean(word, similar_words(word), "lint prints codes: TF301")
         fail(f"no code {word}; {advice}", UNREADABLE)
     sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{page(code)}\n")
 

@@ -567,7 +567,7 @@ files set holds on their host; ros: {domain_id: N, discovery: subnet} holds on a
 A release is kept only once every edge of every host is live, as the launcher and the guard on each host say. Else every
 host goes back to the release before; the notes say which, and what the unit printed. tfcompose logs --all-hosts shows
 more.""",
-    "TF920": """A command needs Zenoh, but eclipse-zenoh is not installed.
+    "TF920": """A command, or a robot of a fleet, needs Zenoh, but eclipse-zenoh is not installed.
 
 pip install 'tfcompose[fleet]' brings it. It needs no ROS, but for fleet share, which reads the robot's TF.""",
 }

@@ -1,4 +1,4 @@
-"""How long a deployment to three hosts takes, from nothing and when nothing is to change.
+"""How long a deployment to three hosts takes: from nothing, with nothing to change, and with one process changed.
 
 ``python -m tests.benchmarks.bench_deploy``: three computers made of namespaces, each with an sshd of its own, and a
 stand-in for systemd. It needs the right to make them. The three share the processors of this machine.
@@ -35,8 +35,8 @@ processes:
   rear_drive: {simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: rear}
   arm_drive: {simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: arm}
 """
-
-
+#: What is different in the third deployment: where one process says that its frame is.
+CHANGE = ("[0, 0, 1]}, rate: 20 Hz}, host: arm", "[0, 0, 2]}, rate: 20 Hz}, host: arm")
 RUNS = 5
 
 
@@ -45,13 +45,19 @@ def main() -> None:
     if lacking := missing():
         sys.exit(lacking)
     load = os.getloadavg()[0]
-    first, again = [], []
+    first, again, changed = [], [], []
     for _ in range(RUNS):
         with tempfile.TemporaryDirectory() as folder, Computers(Path(folder), NAMES) as computers:
             Path(folder, "robot.yaml").write_text(ROBOT)
             first.append(_seconds(computers))
             again.append(_seconds(computers))
-    rows = {"from nothing until every edge of every host is live": first, "again, with nothing to change": again}
+            Path(folder, "robot.yaml").write_text(ROBOT.replace(*CHANGE))
+            changed.append(_seconds(computers))
+    rows = {
+        "from nothing until every edge of every host is live": first,
+        "again, with nothing to change": again,
+        "one process changed, on one host": changed,
+    }
     record("deploy", {row: [f"{statistics.median(seconds):.1f} s"] for row, seconds in rows.items()}, load)
 
 

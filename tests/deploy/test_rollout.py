@@ -1,6 +1,7 @@
 """What a deployment decides, with hosts that answer as the test has them answer."""
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,6 +12,8 @@ from tests.support.plans import compiled_plan
 from tfcompose.deploy.connection import LostError, RefusedError
 from tfcompose.deploy.rollout import Rollout, target_of
 from tfcompose.findings import Finding, RejectedError
+from tfcompose.plan import PlanProcess
+from tfcompose.plan.fleet import SHARE_COMMAND
 
 
 def examined(*hosts: StandInHost, **options: Any) -> list[Finding]:
@@ -119,6 +122,17 @@ def test_hosts_that_are_unfit_or_apart_are_found() -> None:
     assert not examined(*pair, text=apart), "hosts of one computer"
     expect(examined(StandInHost("main"), StandInHost("jetson", offset_s=-2))[0], "TF834", "2 s", "main", "jetson")
     assert not examined(StandInHost("main"), StandInHost("jetson", offset_s=0.05))
+
+
+def test_only_the_host_that_shares_with_the_fleet_needs_zenoh() -> None:
+    probes = {name: {"zenoh": False} for name in ("main", "jetson")}
+    rollout = rollout_to(StandInHost("main"), StandInHost("jetson"), probes=probes)
+    assert not asyncio.run(rollout.examine())
+    share = PlanProcess("fleet_share", "run", argv=(*SHARE_COMMAND, "r1", "fleet.yaml"), host="jetson")
+    plan = replace(rollout.target.plan, processes=(*rollout.target.plan.processes, share))
+    rollout.target = replace(rollout.target, plan=plan)
+    (found,) = asyncio.run(rollout.examine())
+    expect(found, "TF914", "jetson", "eclipse-zenoh", "fleet_share")
 
 
 def test_a_robot_that_was_started_by_hand_is_found() -> None:

@@ -41,12 +41,21 @@ def test_a_sound_fleet_has_edges_with_rates_and_names_of_its_own() -> None:
     assert [fleet.final("r2", name) for name in ("map", "odom", "r2/odom")] == ["map", "r2/odom", "r2/odom"]
 
 
+@pytest.mark.parametrize("text", ["odom → base_link at 2 Hz", "odom->base_link  at  2", "odom -> base_link at 2Hz"])
+def test_the_rate_may_stand_behind_the_edge(text: str) -> None:
+    fleet = validate_fleet(load(SOUND.replace("{edge: odom -> base_link, rate: 5 Hz}", text), "fleet.yaml"))
+    assert [(one.ends, one.rate) for one in fleet.edges_of("r1")][1] == (("odom", "base_link"), 2.0)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
         ("tcp/10.0.0.11:7447", "10.0.0.11", [("TF106", 6)]),
         ("map → odom", "map odom", [("TF106", 3)]),
         ("rate: 5 Hz", "rate: 5 m", [("TF104", 4)]),
+        ("map → odom", "map → odom at 5 m", [("TF104", 3)]),
+        ("map → odom", "map → odom at", [("TF106", 3)]),
+        ("map → odom", "{edge: map → odom at 5 Hz}", [("TF106", 3)]),
         ("router:", "ruter:", [("TF101", 6), ("TF102", 6)]),
         ("namespace: robot2", "prefix: r1/", [("TF880", 7)]),
         ("share: [map → base_link]", "share: []", [("TF881", 7)]),

@@ -12,6 +12,7 @@ from tfcompose.findings import Finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.plan.fleet import SHARE_COMMAND
 from tfcompose.ros.environment import child_environment
 
 
@@ -108,6 +109,17 @@ def test_a_folder_that_is_not_there_is_found_before_anything_is_started(tmp_path
     expect(found, "TF810", folder, "lidar")
     commands, found_of_optional = inspect(tmp_path, replace(process, required=False))
     assert (commands["lidar"].missing, found_of_optional) == (found.message, [])
+
+
+def test_sharing_with_a_fleet_needs_zenoh_before_anything_is_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    share = PlanProcess("fleet_share", "run", argv=(*SHARE_COMMAND, "r1", "fleet.yaml"), required=False)
+    own = replace(share, name="own", argv=("sh", "-c", "tfcompose fleet share"))
+    monkeypatch.setattr("tfcompose.plan.fleet.find_spec", lambda _: None)
+    commands, (found,) = inspect(tmp_path, share, own)
+    expect(found, "TF920", "fleet_share", "tfcompose[fleet]")
+    assert set(commands) == {"own"}
 
 
 def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:

@@ -85,7 +85,8 @@ def test_what_is_wrong_with_the_fleets_file_is_found(text: str, fleet: str, file
     assert [(one.code, one.span and one.span.file) for one in found] == [(code, file)]
 
 
-def test_edges_are_not_missed_in_a_robot_that_is_refused() -> None:
-    found = compiled(ROBOT.replace("parent: odom", "parnt: odom"))
+@pytest.mark.parametrize("edit", [("parent: odom", "parnt: odom"), ("frames:", "frames: {gps: {}}\nframes:")])
+def test_edges_are_not_missed_in_a_robot_that_is_refused(edit: tuple[str, str]) -> None:
+    found = compiled(ROBOT.replace(*edit))
     assert "TF887" not in {one.code for one in found.found}
     assert found.errors

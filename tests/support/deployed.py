@@ -32,7 +32,7 @@ processes:
 NOWHERE = ROBOT.replace("static: {host: main}", "static: {}").replace("main: {}, ", "")
 PROBE: dict[str, Any] = {
     "python": "3.12.3", "tfcompose": "0.1.0", "executable": "/usr/bin/python3", "problems": [], "env": {},
-    "machine": "a", "lingers": True, "base": "/home/pi/.local/share/tfcompose/x", "setup": [],
+    "machine": "a", "lingers": True, "zenoh": True, "base": "/home/pi/.local/share/tfcompose/x", "setup": [],
 }  # fmt: skip
 RUNNING: dict[str, Any] = {"missing": [], "silent": [], "processes": [], "launcher": 7}
 LATE: dict[str, Any] = {

@@ -44,13 +44,15 @@ MOST_TEXT = 200_000
 #: Prints what the host's Python has, with the setup files sourced.
 _PROBE = """
 import json, os, sys
+from importlib.util import find_spec
 try:
     from tfcompose import __version__ as version
 except ImportError:
     version = None
 names = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_DISTRO")
 env = {name: os.environ[name] for name in names if os.environ.get(name)}
-print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env}))
+print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env,
+                  "zenoh": find_spec("zenoh") is not None}))
 """
 
 
@@ -95,7 +97,8 @@ class Agent:
 
     def probe(self) -> dict[str, Any]:
         """Return what the host has: Python, tfcompose, the environment of setup files, systemd, where it is."""
-        found: dict[str, Any] = {"tfcompose": None, "executable": sys.executable, "env": {}, "problems": []}
+        found: dict[str, Any] = {"tfcompose": None, "executable": sys.executable, "zenoh": False, "env": {}}
+        found["problems"] = []
         missing = [file for file in self.setup if not Path(file).expanduser().is_file()]
         if missing:
             found["problems"].append(f"there is no {missing[0]}, which setup names")

@@ -24,6 +24,7 @@ from tfcompose.deploy.release import name_of
 from tfcompose.deploy.unit import Unit
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.plan.file import read_plan
+from tfcompose.plan.fleet import INSTALL, is_fleet_share
 from tfcompose.plan.hosts import hosts_of, share_of, without_computer
 from tfcompose.text import counted, duration, listed
 
@@ -139,6 +140,11 @@ class Rollout:
         if probe["tfcompose"] is None and not probe["problems"] and not share.unit.has_wheels:
             advice = f"install it there, name its Python, hosts: {{{name}: {{python: FILE}}}}, or give --wheels FOLDER"
             yield finding("TF914", f"{name} has no tfcompose for {probe['executable']}", at, help=advice)
+        elif not probe["zenoh"] and not probe["problems"] and not share.unit.has_wheels:
+            for process in self.target.plan.managed:
+                if process.host == name and is_fleet_share(process):
+                    message = f"{name} has no eclipse-zenoh for {probe['executable']}, and {process.name} needs it"
+                    yield finding("TF914", message, at, help=f"there: {INSTALL}")
 
     async def compare(self, release: Release) -> None:
         """Learn what each host has, and what it would have with this release."""

@@ -18,7 +18,13 @@ _ARROW = re.compile(r"\s*(?:→|->)\s*")
 RobotName = Annotated[
     Text, Matches(r"[A-Za-z][A-Za-z0-9_-]*", "a robot's name: a letter, then letters, digits, _ and -")
 ]
-Edge = Annotated[Text, Matches(r"[^\s→>]+\s*(→|->)\s*[^\s→>]+", "an edge: parent → child, or parent -> child")]
+Edge = Annotated[
+    Text,
+    Matches(
+        r"[^\s→>]+\s*(→|->)\s*[^\s→>]+",
+        "an edge: parent → child (or ->); as an entry of share also parent → child at 5 Hz",
+    ),
+]
 
 
 class SharedEdge(Spec):
@@ -35,7 +41,11 @@ class SharedEdge(Spec):
 
 
 def _by_name(value: Any) -> Any:
-    return {"edge": value} if isinstance(value, str) else value
+    """Return ``parent → child``, or ``parent → child at 5 Hz``, as the mapping that it stands for."""
+    if not isinstance(value, str):
+        return value
+    edge, at, rate = value.partition(" at ")
+    return {"edge": edge.strip(), "rate": rate.strip()} if at else {"edge": edge}
 
 
 Shared = Annotated[SharedEdge, BeforeValidator(_by_name, Text | SharedEdge)]
@@ -78,9 +88,7 @@ class FleetSpec(Spec):
     robots: dict[RobotName, FleetRobot] = key(
         ..., "the robots by name", {"r1": {"router": "tcp/10.0.0.11:7447"}, "r2": {"router": "tcp/10.0.0.12:7447"}}
     )
-    share: tuple[Shared, ...] = key(
-        (), "the edges that leave each robot", ["map → odom", {"edge": "odom → base_link", "rate": "5 Hz"}]
-    )
+    share: tuple[Shared, ...] = key((), "the edges that leave each robot", ["map → odom", "odom → base_link at 5 Hz"])
     shared_frames: Texts = key(("map",), "frames that are the same for all robots, and get no prefix", ["map", "dock"])
 
     def edges_of(self, robot: str) -> tuple[SharedEdge, ...]:

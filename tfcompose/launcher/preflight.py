@@ -23,6 +23,7 @@ from tfcompose.launcher.child import Command
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
 from tfcompose.launcher.schedule import refused_schedule
 from tfcompose.plan.components import load_request
+from tfcompose.plan.fleet import missing_zenoh
 from tfcompose.ros.environment import missing_composition
 from tfcompose.variables import REMAPPED
 
@@ -103,6 +104,9 @@ def _command_of(
     base: Mapping[str, str],
     environment: Environment,
 ) -> Command | NotFound | Finding:
+    trouble = missing_zenoh(process)
+    if trouble:
+        return trouble
     own = process.kind != "run"
     env = environment(base, ros, own=own) | own_env(process, *files)
     argv = filled_in(process, *files)

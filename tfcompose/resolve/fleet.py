@@ -10,6 +10,7 @@ from tfcompose.fleet.check import check_fleet
 from tfcompose.language.validate import validate_fleet
 from tfcompose.load import load, path_named
 from tfcompose.model import Process
+from tfcompose.plan.fleet import SHARE_COMMAND
 from tfcompose.resolve.processes import added, says_how
 from tfcompose.text import listed
 
@@ -41,12 +42,12 @@ def own_share(spec: RobotSpec, source: Source) -> list[Process]:
     if spec.fleet is None or not is_own_share(SHARE, declared, spec):
         return []
     file = path_named(spec.fleet.file, source.at(("fleet", "file")))
-    words = ("fleet", "share", _name(spec), f"${{file:{file}}}", *_below(spec))
+    words = (*SHARE_COMMAND, _name(spec), f"${{file:{file}}}", *_below(spec))
     process = Process(
         SHARE,
         "run",
         at=source.at_key(("processes", SHARE) if declared else ("fleet",)),
-        argv=("${python}", "-m", "tfcompose", *words),
+        argv=words,
         restart="on-failure",
         required=False,
     )
@@ -91,9 +92,9 @@ def wrong_membership(robot: Robot, spec: RobotSpec, source: Source, read: Callab
 def _unknown_edges(robot: Robot, name: str, fleet: FleetSpec, fleet_source: Source, source: Source) -> list[Finding]:
     """Return a finding for each edge that the fleet's file has the robot share, and that the robot does not have.
 
-    Where entries of the robot were refused, nobody knows which edges it was meant to have.
+    Where entries of the robot were refused, or a key stands twice, nobody knows which edges it was meant to have.
     """
-    if robot.broken:
+    if robot.broken or any(one.code == "TF003" for one in source.found):
         return []
     edges = {(robot.final(edge.parent), robot.final(edge.child)) for edge in robot.edges}
     named = [f"{parent} → {child}" for parent, child in edges]

@@ -60,7 +60,7 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
         _add_codes(own["properties"]["rules"], definitions)
         _add_presets(own, definitions, presets)
         for kind in ("NamedNode", "NodeSpec"):
-            definitions[kind]["properties"]["preset"] |= {"enum": sorted(nodes)}
+            definitions[kind]["properties"]["preset"] |= {"anyOf": [{"enum": sorted(nodes)}, _COMPUTED]}
         _add_profiles(own, definitions, at="#/$defs/Robot" if language == "overlay" else "#")
     if language == "overlay":
         definitions["Robot"], profile = own, definitions["Profile"]
@@ -246,13 +246,17 @@ def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict
     return made | {"properties": {name: optional(name, value) for name, value in schema["properties"].items()}}
 
 
+#: A name in which something is computed.
+_COMPUTED = {"pattern": r"\$\{"}
+
+
 def _add_presets(own: dict[str, Any], definitions: dict[str, Any], presets: Mapping[str, PresetSpec]) -> None:
     """Let ``preset`` know the presets, and ``options`` those of the one that is chosen.
 
     A name that is not known can only be a user's own, from ``preset_path`` or an included file that has one.
     """
     sensor = definitions["SensorSpec"]
-    sensor["properties"]["preset"] |= {"anyOf": [{"enum": sorted(presets)}, {"pattern": "^[^/]+/[^/]+$"}]}
+    sensor["properties"]["preset"] |= {"anyOf": [{"enum": sorted(presets)}, {"pattern": "^[^/]+/[^/]+$"}, _COMPUTED]}
     by_options: dict[str, list[str]] = {}
     schemas: dict[str, dict[str, Any]] = {}
     for name, preset in sorted(presets.items()):
@@ -270,7 +274,7 @@ def _add_presets(own: dict[str, Any], definitions: dict[str, Any], presets: Mapp
         ]
     }
     vendors = sorted({re.escape(name.partition("/")[0]) for name in presets})
-    known = {"anyOf": [{"enum": sorted(presets)}, {"pattern": f"^(?!({'|'.join(vendors)})/)"}]}
+    known = {"anyOf": [{"enum": sorted(presets)}, {"pattern": f"^(?!({'|'.join(vendors)})/)"}, _COMPUTED]}
     own["if"] = {"anyOf": [{"required": ["preset_path"]}, {"required": ["include"]}]}
     own["else"] = {
         "properties": {"sensors": {"additionalProperties": {"properties": {"preset": known}}}},

@@ -423,7 +423,10 @@ class RobotSpec(Spec):
         {}, "the computers that processes name as their host", {"brain": {"ssh": "robot@10.0.0.2"}}
     )
     fleet: Member | None = key(
-        None, "the fleet that it shares edges with, by a process fleet_share", {"file": "fleet.yaml", "robot": "r1"}
+        None,
+        "the fleet that it shares edges with, by a process fleet_share",
+        "fleet.yaml",
+        {"file": "fleet.yaml", "robot": "r1"},
     )
     profiles: Parameters = key(
         {}, "named overlays, chosen with --profile", {"demo": {"sensors": {"laser": {"driver": "none"}}}}

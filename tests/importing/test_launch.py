@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.support.bringups import compiled, import_of, places, printed_errors
+from tests.support.bringups import compiled, import_of, places, printed_errors, started_with
 from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
 from tfcompose.importing import launch
@@ -196,6 +196,30 @@ def generate_launch_description():
     assert not ParseMultiRobotPose("robots").value()
     return LaunchDescription([Node(package="p", executable="e", name="n", arguments=[tempfile.mktemp(suffix=".sdf")],
                                    remappings={(word, f"other_{word}") for word in "abcdefgh"})])
+"""
+
+
+def test_a_number_with_a_point_stays_a_double_as_a_parameter_and_keeps_its_text_in_a_command(tmp_path: Path) -> None:
+    file = source(tmp_path, "a.launch.py", DOUBLE)
+    text, data = import_of(file)
+    assert data["processes"]["n"]["run"]["args"] == ["--rate=10.0"]
+    assert data["processes"]["n"]["params"] == {"rate": "${args.rate}", "topic": "10.0_hz"}
+    for rate in ("10", "7"):
+        robot = compiled(text, tmp_path, rate=rate).robot
+        assert robot
+        assert started_with(robot)["n"]["params"]["rate"] == f"{rate}.0"
+
+
+DOUBLE = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+def generate_launch_description():
+    rate = LaunchConfiguration("rate")
+    return LaunchDescription([DeclareLaunchArgument("rate", default_value="10.0"),
+        Node(package="p", executable="e", name="n", arguments=[["--rate=", rate]],
+             parameters=[{"rate": rate, "topic": [rate, "_hz"]}])])
 """
 
 

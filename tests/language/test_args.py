@@ -266,3 +266,11 @@ def test_what_a_profile_replaced_in_an_entry_that_a_loop_makes_is_noted() -> Non
     (far,) = [one for one in built(text, profiles=("high",)).found if one.code == "TF414"]
     assert far.span
     assert (far.span.line, [note.span.line for note in far.notes if note.span]) == (5, [4])
+
+
+@pytest.mark.parametrize(("declared", "type_"), [("{type: float, default: 3}", float), ("3.0", float), ("3", int)])
+def test_a_parameter_has_the_type_of_its_argument_whatever_the_form_of_the_value(declared: str, type_: type) -> None:
+    text = f'args: {{rate: {declared}}}\nprocesses: {{n: {{run: [n], params: {{rate: "${{args.rate}}"}}}}}}\n'
+    for given in ({}, {"rate": "7"}):
+        (process,) = (one for one in robot(built(text, given)).processes if one.name == "n")
+        assert type(process.ros_nodes[0].params["rate"]) is type_

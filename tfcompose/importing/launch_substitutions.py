@@ -57,6 +57,18 @@ def symbolic_text(value: Any, context: Context) -> str:
         context.symbolic = before
 
 
+def _parameter_text(value: Any, context: Context) -> str:
+    """Return the same for a parameter: an argument that is all of it has a type, and may be 10.0, which texts lose."""
+    context.typed = True
+    try:
+        text = symbolic_text(value, context)
+    finally:
+        context.typed = False
+    names = arguments_in(text)
+    is_one = any(text == argument(name, with_values(text)) for name in names)
+    return text if is_one or not names else symbolic_text(value, context)
+
+
 def scalar_of(text: str) -> Any:
     """Return what a launch argument is: true or false, a number as it is written, or the text."""
     if text.lower() in {"true", "false"}:
@@ -103,6 +115,8 @@ class Context:
         #: Those whose value decided something that stands in the robot file as it is now.
         self.decided: set[str] = set()
         self.symbolic = False
+        #: Whether what is asked for is a parameter, and has a type.
+        self.typed = False
         self.whens: list[str] = []
 
     @property
@@ -252,7 +266,10 @@ class LaunchConfiguration(Substitution):
             value = context.configurations[name]
             if name not in context.declared:
                 return value
-            is_kept = str(scalar_of(value)).lower() == value  # True would become true
+            typed = scalar_of(value)
+            is_kept = str(typed).lower() == value  # True would become true
+            if isinstance(typed, float) and typed.is_integer() and not context.typed:
+                is_kept = False  # 10.0 would become 10
             if context.symbolic and (is_kept or context.declared[name] == "string"):
                 return argument(name, value)
             context.decided.add(name)
@@ -532,7 +549,7 @@ class ParameterValue:
 
     def _symbolic(self, context: Context) -> str | None:
         """Return the text in which arguments stand for themselves, if these have the value's type."""
-        text = symbolic_text(self.value, context)
+        text = _parameter_text(self.value, context)
         names = arguments_in(text)
         alone = [name for name in names if text == argument(name, with_values(text))]
         kinds = {bool: "bool", int: "int", float: "float", str: "string"}
@@ -565,7 +582,7 @@ def _typed(text: str) -> Any:
 
 def _typed_or_symbolic(value: Any, context: Context) -> Any:
     """Return the value that YAML reads in a text; arguments stand for themselves where they are read alike."""
-    text = symbolic_text(value, context)
+    text = _parameter_text(value, context)
     plain_value, names = with_values(text), arguments_in(text)
     if marks(plain_value) or plain_value == text:
         return plain_value if marks(plain_value) else _typed(plain_value)

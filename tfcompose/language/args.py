@@ -171,7 +171,7 @@ class ArgSpec(Checked):
             return Quantity(int(number.value))
         if number and kind == "float":
             self._refuse_dimension(number, given)
-            return number
+            return Quantity(float(number.value)) if number.dimension == NUMBER else number  # a node's double
         advice = {"bool": "true or false", "string": "put it in quotes"}.get(kind, "")
         raise ArgError("TF103", f"{shown(given)} is not {_CALLED[kind]}", advice)
 

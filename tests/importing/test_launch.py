@@ -223,6 +223,24 @@ def generate_launch_description():
 """
 
 
+def test_a_root_key_that_a_parameter_file_would_be_put_below_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, _ = import_of(source(tmp_path, "a.launch.py", ROOT_KEY), code=None)
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:6"]
+    assert "below front" in text
+
+
+ROOT_KEY = """
+from launch import LaunchDescription
+from launch_ros.actions import Node
+from nav2_common.launch import RewrittenYaml
+def generate_launch_description():
+    params = RewrittenYaml(source_file="a.yaml", root_key="front", param_rewrites={}, convert_types=True)
+    return LaunchDescription([Node(package="p", executable="e", name="n", parameters=[params])])
+"""
+
+
 def test_an_argument_that_is_the_clock_of_all_nodes_is_the_robots(tmp_path: Path) -> None:
     file = source(tmp_path, "a.launch.py", CLOCK)
     text, _ = import_of(file)

@@ -220,6 +220,8 @@ class _Rewritten(substitutions.Substitution):
         several = ", ".join(
             f"{substitutions.text_of(key, context)}: {substitutions.text_of(value, context)}" for key, value in items
         )
+        root = substitutions.text_of(self.kwargs.get("root_key") or "", context).strip("/")
+        several = ", ".join(one for one in (f"all is put below {root}" if root else "", several) if one)
         if several:
             context.todo(self.at, f"changes in {Path(file).name}: {several}")
         return file

@@ -124,6 +124,7 @@ def test_what_would_change_is_listed_and_shown_and_changes_nothing(computers: Co
     assert done.returncode == 1, done
     assert {f"{name}: plan.json: changed" for name in NAMES} <= set(done.stdout.splitlines())
     assert any(line.startswith("+") and "0.4" in line for line in done.stdout.splitlines())
+    assert {f"+++ {name}/plan.json (here)" for name in NAMES} <= set(done.stdout.splitlines())
     assert current(computers) == before
     (computers.computers["arm"].base / "rover.arm/current/plan.json").write_text("{}")
     drifted = deploy(computers, ROBOT, "--check")

@@ -217,9 +217,9 @@ class Rollout:
                 if before is None and after is None:
                     lines.append(f"{share.name}/{path}: differs, and is no text")
                     continue
-                names = (f"{share.name}/{path}", f"{share.name}/{path}")
+                names = (f"{share.name}/{path} (there)", f"{share.name}/{path} (here)")
                 lines += difflib.unified_diff(
-                    (before or "").splitlines(), (after or "").splitlines(), *names, "there", "here", lineterm=""
+                    (before or "").splitlines(), (after or "").splitlines(), *names, lineterm=""
                 )
         return lines
 

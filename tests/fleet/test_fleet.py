@@ -151,6 +151,10 @@ def test_a_router_that_is_not_there_is_named_and_found_when_it_comes(
     router = f"tcp/127.0.0.1:{free_port()}"
     observer = observe({"r1": router})
     assert [one.code for one in observer.findings()] == ["TF882"]
+    with pytest.raises(StaleError, match="r1 is unreachable"):
+        observer.pose("map", "r1/base_link")
+    with pytest.raises(TransformException):
+        observer.pose("map", "r1/nothing")
     with session("router", listen=[router]):
         assert until(lambda: [one.code for one in observer.findings()] == ["TF883"])
         robot = SimulatedRobot(fleet_of({"r1": router}), "r1", 0.0)

@@ -33,7 +33,7 @@ LinkState = Literal["live", "stale", "silent", "unreachable"]
 
 
 class StaleError(Exception):
-    """Raised where a pose needs a link or an edge that is stale; the message names the first of them."""
+    """Raised where a pose needs a link or an edge that is stale, or never came; the message names the first of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,12 +127,16 @@ class FleetObserver:
         """Return the newest pose of ``source`` in ``target``, and its stamp as ``PoseBuffer.latest`` does.
 
         Raises:
-            StaleError: if a link or an edge between the two is stale; the buffer still has its last pose.
+            StaleError: if a link or an edge between the two is stale, of which the buffer still has the last pose; or
+                nothing came from a robot.
             TransformException: if there is none.
         """
         needed = self._between(target, source)
+        is_shared = {target, source} <= self._parents.keys() | set(self._parents.values())
         for one in self.status():
             edges = [edge for edge in one.edges if edge.child in needed]
+            if edges and one.age_s is None and is_shared:
+                raise StaleError(f"{one.robot} is {one.state}: nothing came from it (tfcompose fleet doctor)")
             if edges and one.age_s is not None and one.age_s > STALE_S:
                 raise StaleError(f"the link to {one.robot} is stale")
             for edge in edges:

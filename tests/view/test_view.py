@@ -380,7 +380,8 @@ def test_a_mount_inside_a_part_cannot_be_saved_here_and_stays_moved() -> None:
         edge.child for edge in session.state.robot.edges if edge.child.startswith("rover1/") and edge.kind == "static"
     )
     session.move(child, Pose((1, 2, 3)))
-    assert session.save().elsewhere
+    (elsewhere,) = session.save().elsewhere
+    assert f"view {file.with_name('rover.yaml')} --edit" in elsewhere.reason
     assert session.moved == {child: Pose((1, 2, 3))}
 
 

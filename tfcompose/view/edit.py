@@ -8,6 +8,7 @@ then an overlay can replace it.
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -197,7 +198,10 @@ class _Change:
         if measured is not None:
             raise _ElsewhereError(f"the pose is measured, in the calibration {measured.at.file}", measured.at)
         if self._is_in_part():
-            raise _ElsewhereError(f"the pose is given in the part {self.mount.entry[1]}", edge.at)
+            reason = f"the pose is given in the part {self.mount.entry[1]}"
+            if edge.at.file.endswith((".yaml", ".yml")):
+                reason += f"; tfcompose view {shlex.quote(edge.at.file)} --edit changes it for all that use the file"
+            raise _ElsewhereError(reason, edge.at)
         if not self.mount.data:
             raise _ElsewhereError(f"the pose is that of the preset of {edge.sensor}", edge.at)
 

@@ -79,6 +79,14 @@ ros2 run tf2_ros static_transform_publisher 0 0 2 0 0 0 base_link a
         assert f"start.sh:{line}: " in text
 
 
+def test_a_program_that_only_shows_or_runs_once_is_no_process(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data = import_of(script(tmp_path, "ls -la\nmkdir -p log\npkill gzserver\nros2 run drive node\n"))
+    assert list(data["processes"]) == ["node"]
+    assert places(printed_errors(capsys), "TF020") == ["start.sh:2", "start.sh:3"]
+
+
 def test_degrees_are_not_guessed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = script(tmp_path, "ros2 run tf2_ros static_transform_publisher 0 0 1 90 0 0 base_link a\n")
     _, data = import_of(source)

@@ -23,10 +23,13 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ASSIGNMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)=(.*)", re.DOTALL)
-#: What prepares a shell, and starts nothing of a robot.
+#: What prepares a shell or shows something, and starts nothing of a robot.
 _OF_SHELL = frozenset({
     "source", ".", "set", "echo", "printf", "wait", "trap", "exit", "true", ":", "shopt", "alias", "clear", "unset",
+    "ls", "cat", "less", "head", "tail", "grep", "find", "pwd", "which", "man", "date", "history", "tfcompose",
 })  # fmt: skip
+#: What changes files or ends processes; whether the robot needs it is for its owner to say.
+_ONCE = frozenset({"mkdir", "cp", "mv", "rm", "ln", "touch", "chmod", "chown", "kill", "pkill", "killall", "git"})
 #: What stands before a command in a terminal: a prompt, ``me@host:~$``, and the number and the time of ``history``.
 _PROMPT = re.compile(r"[$%>]|[^\s@=]+@[^\s=]*[$#%>]")
 _NUMBER = re.compile(r"\d+\*?")
@@ -233,11 +236,13 @@ class _Script:
         elif words[0] in _CONTROL:
             if words[0] not in _ENDS:
                 self._todo(command, "only a shell can do that")
+        elif words[0] in _ONCE:
+            self._todo(command, f"{words[0]} runs once, and starts nothing")
         elif words[0] not in _OF_SHELL:
             self._start(command, words, given)
 
     def _start(self, command: Command, words: list[str], given: dict[str, str]) -> None:
-        if words[0] in {"history", "grep", "tfcompose"} or tuple(words) in _STAYS_OPEN:
+        if tuple(words) in _STAYS_OPEN:
             return
         if command.unknown:
             self._todo(command, f"only a shell knows {', '.join(dict.fromkeys(command.unknown))}")
@@ -260,8 +265,8 @@ class _Script:
             before.pop(0)
         if before and before[0] in _TERMINALS:
             before = []
-        if (before and before[0] not in _PREFIXES) or (not begin and PROGRAM in " ".join(words[1:]) and words[0] not in
-                                                       {"ros2", "rosrun"}):  # fmt: skip
+        starts_publisher = not begin and words[0] not in {"ros2", "rosrun"} and PROGRAM in " ".join(words[1:])
+        if starts_publisher or (before and before[0] not in _PREFIXES):
             self._todo(command, f"what {words[0]} starts is not known here")
             return
         keys = {"prefix": before} if before else {}

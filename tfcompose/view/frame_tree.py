@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from tfcompose.model import Robot
 
+#: How far rows are indented by a level, in em; deeper levels than these stay in their column.
+_INDENT_EM, _DEEPEST = 0.85, 14
 #: So many rows are open at first: whole levels of the tree, two at least.
 _OPEN_ROWS = 40
 
@@ -23,6 +25,11 @@ class Row:
     frame: str
     depth: int
     is_open: bool | None
+
+    @property
+    def style(self) -> str:
+        """How a page indents it."""
+        return f"padding-left: {min(self.depth, _DEEPEST) * _INDENT_EM:.2f}em"
 
 
 class FrameTree:

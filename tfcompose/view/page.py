@@ -22,7 +22,6 @@ _STYLE = """<style>
 .tf-frames i { display: inline-block; width: 0.8em; height: 0.8em; margin: 0 0.5em; border-radius: 0.2em }
 .tf-frames div { padding: 0.3em 0 0.5em }
 </style>"""
-_INDENT_EM, _DEEPEST = 0.85, 14
 _TITLE = "<title>Viser</title>"
 
 
@@ -42,7 +41,7 @@ def page_of(scene: str, robot: Robot, sources: Sequence[Source], colours: Mappin
         edge = robot.parent_edge(row.frame)
         first, *further = map(escape, facts_of(robot, sources, row.frame))
         rows.append(
-            f'<details style="padding-left: {min(row.depth, _DEEPEST) * _INDENT_EM:.2f}em">'
+            f'<details style="{row.style}">'
             f"<summary>{_swatch(colours[edge.owner]) if edge else ''}{escape(row.frame)}</summary>"
             f"<p>{'<br>'.join([first, *further])}</p></details>"
         )

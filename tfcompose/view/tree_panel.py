@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     Colour = tuple[int, int, int]
 
 _WIDTH_PX = 300
-#: How far rows are indented by a level, in em; deeper levels than these stay in their column.
-_INDENT_EM, _DEEPEST = 0.85, 14
 _STYLE = """<style>
 div:has(> div > .tf-frames) > div:first-child {
   position: sticky; top: 0; z-index: 1; padding-top: 0.5em; background: var(--mantine-color-body) }
@@ -241,7 +239,7 @@ class TreePanel:
         expanded = "" if row.is_open is None else f' aria-expanded="{str(row.is_open).lower()}"'
         return (
             f'<div class="{classes}" role="treeitem" aria-level="{row.depth + 1}" aria-selected="{selected}"{expanded} '
-            f'data-frame="{escape(frame)}" style="padding-left: {min(row.depth, _DEEPEST) * _INDENT_EM:.2f}em">'
+            f'data-frame="{escape(frame)}" style="{row.style}">'
             f'<i>{opens}</i><input type="checkbox" data-does="show"{"" if is_hidden else " checked"} '
             f'style="accent-color: rgb{self._colours[frame]}" title="show it and what is below">'
             f'<button data-does="select" title="{title}">{_marked(frame, words)}{moved}</button></div>'

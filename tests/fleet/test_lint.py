@@ -67,6 +67,12 @@ def test_what_is_wrong_is_found_at_its_place(old: str, new: str, expected: list[
     assert found(SOUND.replace(old, new, 1)) == expected
 
 
+def test_a_file_that_begins_as_a_robots_does_is_answered_with_how_a_fleets_begins() -> None:
+    with pytest.raises(RejectedError) as raised:
+        validate_fleet(load(SOUND.replace("fleet: 1", "tfcompose: 1"), "fleet.yaml"))
+    assert any(one.code == "TF101" and "fleet: 1" in one.help for one in raised.value.findings)
+
+
 def test_the_command_lints_and_needs_a_robot_that_is_there(tmp_path: Path) -> None:
     (tmp_path / "fleet.yaml").write_text(SOUND, encoding="utf-8")
     for words, code in ((["lint"], 0), (["share", "r3"], 2), (["echo", "a"], 2), (["lint", "no.yaml"], 2)):

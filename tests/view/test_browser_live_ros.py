@@ -54,6 +54,7 @@ def steady_red_pixels(page: Page) -> int:
     return counts[-1]
 
 
+@pytest.mark.slow
 def test_a_rogue_publisher_makes_its_edge_red_within_a_second(tmp_path: Path, nodes: Any) -> None:
     (tmp_path / "r.yaml").write_text(EXTERNAL, "utf-8")
     nodes.latched(nodes.node("tfcompose_static"), ("base_link", "lidar", (0.0, 0.0, 0.3), (0.0, 0.0, 0.0, 1.0)))

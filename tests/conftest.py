@@ -18,29 +18,39 @@ from tests.support.domains import Domain, reserved_domain
 from tests.support.processes import Started
 from tests.support.skips import unexpected
 from tests.support.waiting import TIMEOUT_S
-from tfcompose.geometry import Pose
-from tfcompose.plan import Clock, Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.plan.file import write_plan
-from tfcompose.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES, missing_ros
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.plan import Clock, Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.plan.file import write_plan
+from tfcompose.tf.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES, missing_ros
 
 NO_ROS = missing_ros()
 collect_ignore_glob = ["*_ros.py"] if NO_ROS else []
 
-# The same examples at each run, however long they take: what fails once fails again, and a busy machine fails none.
-# pytest --hypothesis-profile=default looks for others.
-settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# The same examples at each run, however long they take: what fails once fails again, and a busy
+# machine fails none. pytest --hypothesis-profile=default looks for others.
+settings.register_profile(
+    "same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("same")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     # rclpy's generator package imports an old lark, which imports what Python 3.11 deprecates.
-    config.addinivalue_line("filterwarnings", "ignore:module 'sre_.*' is deprecated:DeprecationWarning")
+    config.addinivalue_line(
+        "filterwarnings", "ignore:module 'sre_.*' is deprecated:DeprecationWarning"
+    )
     # The xacro package has an enumeration whose private name Python 3.10 warns of.
-    config.addinivalue_line("filterwarnings", "ignore:private variables, such as:DeprecationWarning")
+    config.addinivalue_line(
+        "filterwarnings", "ignore:private variables, such as:DeprecationWarning"
+    )
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--fail-on-skips", action="store_true", help="fail where a test is skipped that need not be")
+    parser.addoption(
+        "--fail-on-skips",
+        action="store_true",
+        help="fail where a test is skipped that need not be",
+    )
 
 
 @pytest.hookimpl(trylast=True)
@@ -64,13 +74,17 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: item.get_closest_marker("ros") is None)  # those that wait come first, and end with all
+    items.sort(
+        key=lambda item: item.get_closest_marker("ros") is None
+    )  # those that wait come first, and end with all
     with_ros = [item for item in items if item.get_closest_marker("ros")]
     if NO_ROS:
         for item in with_ros:
             item.add_marker(pytest.mark.skip(reason=NO_ROS))
-    elif with_ros:  # a node of a test's that leaves slowly on a busy machine does not end all tests
-        from tfcompose.ros import node  # noqa: PLC0415 (ROS, which is there)
+    elif (
+        with_ros
+    ):  # a node of a test's that leaves slowly on a busy machine does not end all tests
+        from tfcompose.tf.ros import node  # noqa: PLC0415 (ROS, which is there)
 
         node.LEAVE_S = 2 * TIMEOUT_S
 
@@ -92,12 +106,12 @@ def _all_processes() -> Iterator[None]:
 def _fastdds_profile(request: pytest.FixtureRequest) -> None:
     """Have nodes of this process announce themselves as tfcompose's own do, whichever test makes the first of them.
 
-    Fast DDS reads its profiles once in a process, with the first node. Stock nodes are found at their next announcement
-    only, up to 3 s later.
+    Fast DDS reads its profiles once in a process, with the first node. Stock nodes are found at
+    their next announcement only, up to 3 s later.
     """
     if NO_ROS or not any(item.get_closest_marker("ros") for item in request.session.items):
         return
-    from tfcompose.ros.node import open_node  # noqa: PLC0415 (ROS, which is there)
+    from tfcompose.tf.ros.node import open_node  # noqa: PLC0415 (ROS, which is there)
 
     with reserved_domain() as number, pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_DOMAIN_ID", str(number))
@@ -108,7 +122,9 @@ def _fastdds_profile(request: pytest.FixtureRequest) -> None:
 
 
 @pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Domain]:
+def domain(
+    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Domain]:
     """A domain of the test's own, on the loopback interface, in this process's environment too.
 
     Runs and logs are kept in folders of the test's own.
@@ -127,7 +143,8 @@ def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFac
 def node(domain: Domain) -> Iterator[Any]:
     """A node of this process in a domain of its own."""
     assert domain
-    from tfcompose.ros.node import open_node  # noqa: PLC0415 (tests without ROS share this file)
+    # Tests without ROS share this file.
+    from tfcompose.tf.ros.node import open_node  # noqa: PLC0415
 
     with open_node("of_the_test", "/test") as opened:
         yield opened
@@ -176,7 +193,9 @@ def python() -> Callable[[str], str]:
 def edge() -> Callable[..., PlanEdge]:
     """Make a plan's edge from "parent child", owner and kind."""
 
-    def make(names: str, owner: str = "static", pose: Pose | None = None, joint: Joint | None = None) -> PlanEdge:
+    def make(
+        names: str, owner: str = "static", pose: Pose | None = None, joint: Joint | None = None
+    ) -> PlanEdge:
         parent, child = names.split()
         kind = "joint" if joint else "static" if owner == "static" else "dynamic"
         node = f"/rover/{owner}"
@@ -192,7 +211,9 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 
     def make(edges: list[PlanEdge], *processes: PlanProcess, clock: Clock = "wall") -> Path:
         named = tuple(p if p.nodes else _with_node(p) for p in processes)
-        plan = Plan("rover", "0", "base_link", RosSettings("/rover", clock=clock), tuple(edges), named)
+        plan = Plan(
+            "rover", "0", "base_link", RosSettings("/rover", clock=clock), tuple(edges), named
+        )
         file = tmp_path / "rover.plan.json"
         file.write_text(write_plan(plan), encoding="utf-8")
         (tmp_path / plan.description).write_text("<robot name='rover'/>", encoding="utf-8")
@@ -202,4 +223,6 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 
 
 def _with_node(process: PlanProcess) -> PlanProcess:
-    return PlanProcess(process.name, process.kind, nodes=(f"/rover/{process.name}",), simulate=process.simulate)
+    return PlanProcess(
+        process.name, process.kind, nodes=(f"/rover/{process.name}",), simulate=process.simulate
+    )

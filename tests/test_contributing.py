@@ -13,15 +13,15 @@ from tests.support.skips import ACCEPTED
 TEXT = GUIDE.read_text("utf-8")
 #: What the examples would add.
 NEW = {
-    "tfcompose/presets/hokuyo/uam-05lp.yaml",
+    "tfcompose/data/presets/hokuyo/uam-05lp.yaml",
     "tfcompose/cli/commands/frames.py",
-    "tfcompose/export/procfile.py",
+    "tfcompose/tools/exporters/procfile.py",
 }
 
 
 def test_the_drawing_is_that_of_the_imports() -> None:
     assert with_drawing(TEXT) == TEXT, "python -m tests.support.house --write"
-    assert "  launcher --> ros\n" in mermaid()
+    assert "  launcher --> tf\n" in mermaid()
 
 
 def test_each_function_on_the_way_of_a_file_is_there() -> None:
@@ -30,7 +30,9 @@ def test_each_function_on_the_way_of_a_file_is_there() -> None:
     for name in names:
         module, _, function = name.rpartition(".")
         tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text("utf-8"))
-        assert function in {node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}, name
+        assert function in {
+            node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))
+        }, name
 
 
 def test_each_file_that_it_names_is_there() -> None:

@@ -9,218 +9,158 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
-from tests.support.house import PACKAGE, ROOT, imports_of, part_of
+from tests.support.house import PACKAGE, ROOT, imports_of, part_of, room_of
 from tests.support.tables import for_each
 
-FOUNDATIONS = {"__init__", "catalogue", "findings", "geometry", "model", "plan"}
-STAGES = {"load", "language", "resolve", "check"}
-
-#: Which parts of the package each part may import, besides itself.
+#: The nine wings, and which other wings each may import.
 MAY_IMPORT: dict[str, set[str]] = {
-    "__init__": set(),
-    "catalogue": set(),
-    "signals": set(),
-    "findings": {"catalogue"},
-    "geometry": set(),
-    "numbers": {"geometry"},
-    "tree": set(),
-    "plan": {"findings", "geometry"},
-    "ipc": {"findings", "plan"},
-    "model": {"findings", "plan", "geometry", "tree", "units"},
-    "files": {"model"},
-    "load": {"findings", "text"},
-    "render": {"catalogue", "draw", "findings", "geometry", "model", "numbers", "text", "tree"},
-    "units": {"findings"},
-    "language": {"catalogue", "findings", "geometry", "load", "model", "plan", "units"},
-    "resolve": {
-        "catalogue",
-        "findings",
-        "fleet",
-        "geometry",
-        "language",
-        "load",
-        "model",
-        "plan",
-        "text",
-        "units",
-        "urdf",
-    },
-    "meshes": {"geometry"},
-    "rays": {"geometry", "meshes", "model"},
-    "check": {"catalogue", "findings", "geometry", "load", "model", "rays", "text", "tree", "units"},
-    "draw": {"text"},
-    "urdf": {"catalogue", "check", "files", "findings", "geometry", "load", "meshes", "model", "numbers", "text"},
-    "export": {"emit", "files", "numbers", "plan"},
-    "emit": {"draw", "files", "geometry", "model", "numbers", "plan", "render", "urdf"},
-    "text": set(),
-    "ros": {"findings", "plan", "geometry", "signals"},
-    "live": {"geometry", "plan", "ros", "signals", "tf2", "tree"},
-    "bags": {"geometry", "live", "plan", "ros", "tf2"},
-    "verdict": {"catalogue", "findings", "geometry", "live", "plan", "ros", "text", "tree"},
-    "variables": set(),
-    "fleet": {"findings", "geometry", "language", "load", "plan", "ros", "signals", "tf2"},
-    "process": {"findings", "plan", "ros", "signals", "variables"},
-    "guard": {
-        "findings",
-        "geometry",
-        "ipc",
-        "live",
-        "plan",
-        "process",
-        "ros",
-        "signals",
-        "text",
-        "variables",
-        "verdict",
-    },
-    "launcher": {"findings", "ipc", "plan", "ros", "signals", "text", "variables"},
-    "publishers": {"files", "geometry", "plan", "process", "ros", "signals", "text"},
-    "tf2": {"geometry", "ros"},
-    "compile": FOUNDATIONS | STAGES,
-    "deploy": {"emit", "export", "files", "findings", "launcher", "model", "plan", "ros", "text"},
-    "provenance": {"load", "model"},
-    "pages": {"catalogue", "check"},
-    "importing": {
-        "compile",
-        "files",
-        "findings",
-        "geometry",
-        "language",
-        "live",
-        "load",
-        "model",
-        "numbers",
-        "resolve",
-        "text",
-        "urdf",
-    },
-    "view": {
-        "bags",
-        "compile",
-        "findings",
-        "geometry",
-        "language",
-        "live",
-        "load",
-        "meshes",
-        "model",
-        "numbers",
-        "plan",
-        "provenance",
-        "rays",
-        "ros",
-        "text",
-        "tf2",
-        "tree",
-        "units",
-        "urdf",
-        "verdict",
-    },
-    "cli": {"*"},
-    "__main__": {"cli"},
+    "foundation": set(),
+    "model": {"foundation"},
+    "spec": {"foundation", "model"},
+    "compiler": {"foundation", "model", "spec"},
+    "tf": {"foundation", "model"},
+    "guard": {"foundation", "model", "tf"},
+    "launcher": {"foundation", "model", "tf"},
+    "cli": {"foundation", "model", "spec", "compiler", "tf", "guard", "launcher", "tools"},
+    "tools": {"foundation", "model", "spec", "compiler", "tf", "guard", "launcher", "cli"},
 }
+#: What is no wing: the program, and files that are no modules.
+TOP_FLOOR = {"__init__.py", "__main__.py", "py.typed", "data"}
 
-#: Packages from elsewhere, and the only parts that may import them.
+#: Packages from elsewhere, and the only rooms that may import them.
 ONLY_IN: dict[str, set[str]] = {
-    "yaml": {"export", "importing", "load"},  # importing: launch reads parameters as YAML
-    "launch_xml": {"importing"},
-    "launch_yaml": {"importing"},
-    "asyncssh": {"deploy"},
+    "yaml": {
+        "spec.load",
+        "tools.exporters",
+        "tools.importers",
+    },  # importers: launch reads parameters as YAML
+    "launch_xml": {"tools.importers"},
+    "launch_yaml": {"tools.importers"},
+    "asyncssh": {"tools.deploy"},
     "markdown_it": {"cli"},
-    "pydantic": {"language"},
-    "pydantic_core": {"language", "units"},
-    "typing_extensions": {"language"},
-    "numpy": {"publishers", "rays", "ros", "tf2", "urdf", "view"},  # rays and urdf: what trimesh gives are its arrays
-    "xacro": {"urdf"},
-    "trimesh": {"meshes", "rays", "view"},
-    "viser": {"view"},
-    "watchfiles": {"view"},
-    "websockets": {"view"},
-    "yourdfpy": {"urdf"},
-    "pypdfium2": {"draw"},
+    "pydantic": {"spec.language"},
+    "pydantic_core": {"spec.language", "foundation.units"},
+    "typing_extensions": {"spec.language"},
+    # compiler: what trimesh gives are its arrays
+    "numpy": {
+        "compiler.rays",
+        "compiler.urdf",
+        "launcher.publishers",
+        "tf.ros",
+        "tf.tf2",
+        "tools.view",
+    },
+    "xacro": {"compiler.urdf"},
+    "trimesh": {"compiler.meshes", "compiler.rays", "tools.view"},
+    "viser": {"tools.view"},
+    "watchfiles": {"tools.view"},
+    "websockets": {"tools.view"},
+    "yourdfpy": {"compiler.urdf"},
+    "pypdfium2": {"compiler.draw"},
     "regex": {"launcher"},
     "rich": {"cli"},
-    "rclpy": {"ros"},
-    "zenoh": {"fleet", "ros"},
-    "xxhash": {"ros"},
-    "rosbags": {"bags"},
-    "tf2_msgs": {"ros"},
-    "geometry_msgs": {"ros"},
-    "sensor_msgs": {"ros"},
-    "nav_msgs": {"ros"},
-    "lifecycle_msgs": {"ros"},
-    "composition_interfaces": {"ros"},
-    "rcl_interfaces": {"ros"},
-    "launch": {"importing", "launcher"},
-    "launch_ros": {"importing", "launcher"},
-    "std_msgs": {"ros"},
-    "builtin_interfaces": {"ros"},
-    "rosgraph_msgs": {"ros"},
+    "rclpy": {"tf.ros"},
+    "zenoh": {"tf.ros", "tools.fleet"},
+    "xxhash": {"tf.ros"},
+    "rosbags": {"tf.bags"},
+    "tf2_msgs": {"tf.ros"},
+    "geometry_msgs": {"tf.ros"},
+    "sensor_msgs": {"tf.ros"},
+    "nav_msgs": {"tf.ros"},
+    "lifecycle_msgs": {"tf.ros"},
+    "composition_interfaces": {"tf.ros"},
+    "rcl_interfaces": {"tf.ros"},
+    "launch": {"launcher", "tools.importers"},
+    "launch_ros": {"launcher", "tools.importers"},
+    "std_msgs": {"tf.ros"},
+    "builtin_interfaces": {"tf.ros"},
+    "rosgraph_msgs": {"tf.ros"},
     "diagnostic_msgs": {"guard"},
-    "rosidl_generator_py": {"ros"},
-    "rosidl_parser": {"ros"},
-    "ament_index_python": {"ros"},
+    "rosidl_generator_py": {"tf.ros"},
+    "rosidl_parser": {"tf.ros"},
+    "ament_index_python": {"tf.ros"},
 }
 
 
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
-def test_every_part_of_the_package_is_in_the_table() -> None:
-    assert {part_of(file) for file in FILES} == set(MAY_IMPORT)
+def is_in(room: str, rooms: set[str]) -> bool:
+    """Return whether a room is one of these, or inside one."""
+    return any(room == other or room.startswith(f"{other}.") for other in rooms)
 
 
-ROOMS = sorted(file for file in PACKAGE.glob("*/__init__.py"))
+def test_the_package_is_nine_wings_with_nothing_else_on_the_top_floor() -> None:
+    names = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    assert names == MAY_IMPORT.keys() | TOP_FLOOR
+    assert not list((PACKAGE / "data").rglob("*.py"))
 
 
-@for_each(ROOMS)
-def test_a_room_says_what_it_is_for_and_what_it_must_not_import(file: Path) -> None:
-    """The sentence that begins with "Must not import" names parts and packages that the tables do not allow."""
-    part, docstring = part_of(file), ast.get_docstring(ast.parse(file.read_text("utf-8"))) or ""
-    if part == "cli":
-        return
+def test_the_arrows_between_wings_lead_downwards() -> None:
+    graphlib.TopologicalSorter(
+        {wing: others - {"tools"} for wing, others in MAY_IMPORT.items()}
+    ).prepare()
+
+
+@for_each(sorted(MAY_IMPORT.keys() - {"tools"}))
+def test_a_wing_says_what_it_must_not_import(wing: str) -> None:
+    """The sentence that begins with "Must not import" names wings and packages that the tables do not allow."""
+    docstring = (
+        ast.get_docstring(ast.parse((PACKAGE / wing / "__init__.py").read_text("utf-8"))) or ""
+    )
     _, says, rest = docstring.partition("Must not import")
-    assert says, part
-    names = re.findall(r"``(\w+)``", re.split(r"[:.]", rest)[0])
-    assert len(names) >= 3, part
-    allowed = MAY_IMPORT[part] | {name for name, parts in ONLY_IN.items() if part in parts}
-    assert not set(names) & allowed, part
-    assert set(names) <= MAY_IMPORT.keys() | ONLY_IN.keys(), part
+    assert says
+    names = set(re.findall(r"``(\w+)``", re.split(r"[:.]", rest)[0]))
+    assert names >= MAY_IMPORT.keys() - MAY_IMPORT[wing] - {wing}
+    allowed = {
+        package
+        for package, rooms in ONLY_IN.items()
+        if any(room.startswith(wing) for room in rooms)
+    }
+    assert not names & (MAY_IMPORT[wing] | allowed)
+    assert names <= MAY_IMPORT.keys() | ONLY_IN.keys()
 
 
 @for_each(FILES)
-def test_a_file_imports_only_what_its_part_may(file: Path) -> None:
-    part, allowed = part_of(file), MAY_IMPORT[part_of(file)]
+def test_a_file_imports_only_what_its_wing_may(file: Path) -> None:
+    wing = part_of(file)
+    if wing in {"__init__", "__main__"}:
+        assert imports_of(file) <= {"sys", "tfcompose.cli"}
+        return
     for name in imports_of(file):
         first, _, rest = name.partition(".")
-        if first == "tfcompose":
-            other = rest.partition(".")[0] or "__init__"
-            assert other in {part, "__init__", *allowed} or "*" in allowed, f"{part} imports {name}"
+        if first == "tfcompose" and rest:
+            assert rest.partition(".")[0] in {wing, *MAY_IMPORT[wing]}, f"{wing} imports {name}"
     for name in imports_of(file, for_types=False):
         first = name.partition(".")[0]
         if first not in {*sys.stdlib_module_names, "tfcompose"}:
-            assert part in ONLY_IN.get(first, set()), f"{part} imports {name}"
+            assert is_in(room_of(file), ONLY_IN.get(first, set())), (
+                f"{room_of(file)} imports {name}"
+            )
+
+
+#: The rooms that are stages: what they keep in their files is their own.
+STAGES = {"spec.load", "spec.language", "compiler.resolve", "compiler.check"}
 
 
 @for_each(FILES)
 def test_a_stage_is_imported_by_its_own_name_from_outside(file: Path) -> None:
-    """What a stage keeps in its files is its own: outside, ``from tfcompose.check import check``."""
-    if part_of(file) in {*STAGES, "cli", "importing"}:
+    """Outside, ``from tfcompose.compiler.check import check``."""
+    if part_of(file) in {"spec", "compiler", "cli", "tools"}:
         return
     for name in imports_of(file):
-        steps = name.split(".")
-        assert not (len(steps) > 2 and steps[0] == "tfcompose" and steps[1] in STAGES), name
+        assert not any(name.startswith(f"tfcompose.{stage}.") for stage in STAGES), name
 
 
-def test_launcher_guard_and_publishers_do_not_know_each_other() -> None:
-    """They are processes of their own: what they tell each other stands in ``ipc``."""
-    rooms = ("tfcompose.launcher", "tfcompose.guard", "tfcompose.publishers")
-    for room in rooms:
-        files = list((PACKAGE.parent / room.replace(".", "/")).rglob("*.py"))
-        assert files
-        for file in files:
-            others = [other for other in rooms if other != room]
-            assert not [name for name in imports_of(file) if name.startswith(tuple(others))], file
+def test_launcher_and_publishers_do_not_know_each_other() -> None:
+    """They are processes of their own: what they tell each other stands in ``model.messages``."""
+    launcher = [file for file in FILES if is_in(room_of(file), {"launcher"})]
+    assert any(is_in(room_of(file), {"launcher.publishers"}) for file in launcher)
+    for file in launcher:
+        publishes = is_in(room_of(file), {"launcher.publishers"})
+        for name in imports_of(file):
+            if name.startswith("tfcompose.launcher."):
+                assert name.startswith("tfcompose.launcher.publishers") is publishes, file
 
 
 def test_a_command_is_imported_by_the_parser_alone() -> None:
@@ -234,7 +174,10 @@ def test_a_command_is_imported_by_the_parser_alone() -> None:
 
 
 def test_no_module_imports_itself_by_way_of_others_not_even_for_its_types() -> None:
-    modules = {".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): file for file in FILES}
+    modules = {
+        ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): file
+        for file in FILES
+    }
     graph: dict[str, set[str]] = {}
     for module, file in modules.items():
         tree = ast.parse(file.read_text("utf-8"))
@@ -246,12 +189,26 @@ def test_no_module_imports_itself_by_way_of_others_not_even_for_its_types() -> N
         }
         submodules = {name for name in names if name in modules}
         # A package that is named for one of its modules is not what is imported.
-        graph[module] = {name for name in submodules if not any(one.startswith(f"{name}.") for one in submodules)}
+        graph[module] = {
+            name
+            for name in submodules
+            if not any(one.startswith(f"{name}.") for one in submodules)
+        }
     graphlib.TopologicalSorter(graph).prepare()
 
 
 #: Parts that import in a function what is optional, or heavy and rarely needed.
-LATE_IMPORTS = {"bags", "cli", "findings", "guard", "publishers", "rays", "resolve", "ros", "tf2"}
+LATE_IMPORTS = {
+    *(
+        "cli",
+        "compiler.rays",
+        "compiler.resolve",
+        "foundation.findings",
+        "guard",
+        "launcher.publishers",
+    ),
+    *("tf.bags", "tf.ros", "tf.tf2"),
+}
 
 
 def test_nothing_is_imported_inside_a_function() -> None:
@@ -262,7 +219,8 @@ def test_nothing_is_imported_inside_a_function() -> None:
         for function in ast.walk(ast.parse(file.read_text("utf-8")))
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
         for node in ast.walk(function)
-        if isinstance(node, (ast.Import, ast.ImportFrom)) and part_of(file) not in LATE_IMPORTS
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        and not is_in(room_of(file), LATE_IMPORTS)
     ]
     assert not inside
 
@@ -278,7 +236,11 @@ def loaded_by(code: str) -> set[str]:
 def foreign(modules: set[str], before: set[str]) -> set[str]:
     """Return the first names of modules that are neither the standard library's nor there without any import."""
     first = {name.partition(".")[0] for name in modules - before}
-    return {name for name in first if name not in sys.stdlib_module_names and not name.startswith(("_", "tfcompose"))}
+    return {
+        name
+        for name in first
+        if name not in sys.stdlib_module_names and not name.startswith(("_", "tfcompose"))
+    }
 
 
 def command(*words: str) -> str:
@@ -291,22 +253,33 @@ def bare() -> set[str]:
     return loaded_by("pass")
 
 
-def parts_in(modules: set[str]) -> set[str]:
+def wings_in(modules: set[str]) -> set[str]:
     return {name.split(".")[1] for name in modules if name.startswith("tfcompose.")}
+
+
+def rooms_in(modules: set[str], rooms: set[str]) -> set[str]:
+    return {name for name in modules if is_in(name.removeprefix("tfcompose."), rooms)}
 
 
 def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> None:
     loaded = loaded_by(command("--help")) - bare
     assert not foreign(loaded, bare)
-    assert parts_in(loaded) == {"cli", "geometry", "render", "signals", "text"}
-    assert {name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name} == {
+    assert wings_in(loaded) == {"cli", "compiler", "foundation"}
+    assert not rooms_in(
+        loaded, {"foundation.findings", "foundation.catalogue", "foundation.units"}
+    )
+    assert {
+        name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name
+    } == {
         f"tfcompose.cli.{name}"
         for name in ("command_parser", "documentation", "options", "parser", "schemas", "terminal")
     }
     assert not loaded & {"dataclasses", "difflib", "html", "socket", "subprocess"}
 
 
-@pytest.mark.parametrize("words", [("ps",), ("down",), ("logs",), ("up", "plan.json", "--dry-run")])
+@pytest.mark.parametrize(
+    "words", [("ps",), ("down",), ("logs",), ("up", "plan.json", "--dry-run")]
+)
 def test_commands_after_the_plan_load_nothing_from_elsewhere_and_no_compiler(
     words: tuple[str, ...], bare: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -314,32 +287,45 @@ def test_commands_after_the_plan_load_nothing_from_elsewhere_and_no_compiler(
     built = "tests/golden/my_robot/plan.json"
     loaded = loaded_by(command(*(built if word == "plan.json" else word for word in words)))
     assert not foreign(loaded, bare)
-    assert {"launcher", "plan"} & parts_in(loaded)
-    assert not parts_in(loaded) & {*STAGES, "compile", "emit"}
+    assert {"launcher", "model"} & wings_in(loaded)
+    assert not rooms_in(
+        loaded, {"spec", "compiler.resolve", "compiler.check", "compiler.compile", "compiler.emit"}
+    )
 
 
-@pytest.mark.parametrize("words", [("lint",), ("tree",), ("build", "-o")], ids=lambda words: words[0])
+@pytest.mark.parametrize(
+    "words", [("lint",), ("tree",), ("build", "-o")], ids=lambda words: words[0]
+)
 def test_commands_before_the_plan_load_yaml_and_pydantic_and_nothing_else_from_elsewhere(
     words: tuple[str, ...], bare: set[str], tmp_path: Path
 ) -> None:
     more = [str(tmp_path)] if "-o" in words else []
     robot = "robots/autonomous_robot.yaml"
     loaded = loaded_by(command(words[0], robot, *words[1:], *more))
-    pydantic = {"pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection"}
+    pydantic = {
+        "pydantic",
+        "pydantic_core",
+        "annotated_types",
+        "typing_extensions",
+        "typing_inspection",
+    }
     assert foreign(loaded, bare) - {"cython_runtime"} == {"yaml", *pydantic}
-    assert not loaded & {f"tfcompose.{name}" for name in ("ros", "process", "publishers", "launcher", "guard", "live")}
+    assert not wings_in(loaded) & {"tf", "launcher", "guard"}
 
 
 def test_reading_and_supervising_a_plan_loads_no_compiler_and_regex_alone_from_elsewhere(
     bare: set[str],
 ) -> None:
-    loaded = loaded_by("import tfcompose.plan.file, tfcompose.launcher.supervisor")
+    loaded = loaded_by("import tfcompose.model.plan.file, tfcompose.launcher.supervisor")
     assert foreign(loaded, bare) - {"cython_runtime"} == {"regex"}
-    assert not {name for name in loaded for stage in (*STAGES, "emit") if name.startswith(f"tfcompose.{stage}")}
+    assert wings_in(loaded) == {"foundation", "launcher", "model", "tf"}
 
 
 def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_requested(bare: set[str]) -> None:
-    one = "from tfcompose.tf2 import Buffer; from tfcompose.geometry import Pose; b = Buffer(); "
+    one = (
+        "from tfcompose.tf.tf2 import Buffer; from tfcompose.foundation.geometry import Pose; b ="
+        " Buffer(); "
+    )
     one += "b.set('a', 'b', Pose(), 1, static=False); b.lookup_transform('a', 'b', 0)"
     assert not foreign(loaded_by(one), bare)
     assert "numpy" in foreign(loaded_by(one + "; b.lookup_many('a', 'b', [1])"), bare)
@@ -347,14 +333,27 @@ def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_requested(bare:
 
 def test_the_buffer_stands_on_its_own() -> None:
     """It needs the geometry and nothing else of the package; what needs ROS are listeners and nodes."""
-    loaded = {name.removeprefix("tfcompose.") for name in loaded_by("import tfcompose.tf2") if "tfcompose." in name}
-    assert {name.partition(".")[0] for name in loaded} == {"tf2", "geometry"}
+    loaded = {
+        name.removeprefix("tfcompose.")
+        for name in loaded_by("import tfcompose.tf.tf2")
+        if "tfcompose." in name
+    }
+    assert {name for name in loaded if not is_in(name, {"tf.tf2"})} == {
+        "foundation",
+        "foundation.geometry",
+        "tf",
+    }
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("module", ["publishers.static", "publishers.simulate", "guard.process"])
+@pytest.mark.parametrize(
+    "module", ["launcher.publishers.static", "launcher.publishers.simulate", "guard.process"]
+)
 def test_processes_that_need_no_arrays_load_no_numpy_and_no_pydantic(module: str) -> None:
     """Each is a fifth of their memory."""
-    loaded = loaded_by(f"import tfcompose.{module}, tfcompose.publishers.description, tfcompose.ros.clock")
+    loaded = loaded_by(
+        f"import tfcompose.{module}, tfcompose.launcher.publishers.description,"
+        " tfcompose.tf.ros.clock"
+    )
     assert not {"numpy", "pydantic", "pydantic_core"} & loaded
     assert "rclpy" in loaded

@@ -12,10 +12,10 @@ from tests.benchmarks import results
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
-from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import library
 from tfcompose.cli.documentation import FOLDER, TOPICS, for_terminal, page, topic
 from tfcompose.cli.parser import COMMANDS, parser_of
+from tfcompose.foundation.catalogue import CATALOGUE
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -105,7 +105,9 @@ def test_its_robot_gives_the_edges_and_owners_that_up_prints(rover: Path) -> Non
     done = run("tree", "rover.yaml", "-p", "demo", cwd=rover)
     owners = Counter(words[2] for words in map(str.split, _edges(done.stdout)))
     printed = re.findall(r"live  (\S+) \(\S+\): (\d+ edges|\S+ → \S+)  ", blocks("console")[0])
-    assert {owner: int(edges.split()[0]) if "edges" in edges else 1 for owner, edges in printed} == owners
+    assert {
+        owner: int(edges.split()[0]) if "edges" in edges else 1 for owner, edges in printed
+    } == owners
     assert f"tree complete: {owners.total()} edges" in README
 
 
@@ -116,10 +118,16 @@ def _edges(tree: str) -> list[str]:
 def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
     (block,) = (one for one in blocks("console") if one.startswith("$ tfcompose lint"))
     shown = block.removeprefix("$ tfcompose lint rover.yaml\n")
-    broken = blocks("yaml")[0].replace("owner: base_drive", "owner: base_driv").replace("15 deg}  ", "15 degr} ", 1)
+    broken = (
+        blocks("yaml")[0]
+        .replace("owner: base_drive", "owner: base_driv")
+        .replace("15 deg}  ", "15 degr} ", 1)
+    )
     (rover / "rover.yaml").write_text(broken, encoding="utf-8")
     printed = run("lint", "rover.yaml", cwd=rover).stdout
-    assert [line.rstrip() for line in printed.splitlines()] == [line.rstrip() for line in shown.splitlines()]
+    assert [line.rstrip() for line in printed.splitlines()] == [
+        line.rstrip() for line in shown.splitlines()
+    ]
 
 
 def test_its_calibrated_robot_is_linted_and_explained_as_printed(tmp_path: Path) -> None:
@@ -194,7 +202,8 @@ def test_every_file_of_figures_is_printed_and_says_where_it_is_from() -> None:
         assert {"processor", "cores", "memory_gb", "system", "python"} == found["machine"].keys()
 
 
-#: Measures of time, memory and processors, as prose and tables write them; what an example prints stands in blocks.
+#: Measures of time, memory and processors, as prose and tables write them; what an example prints
+#: stands in blocks.
 FIGURE = r"\d[\d,.]* (?:µs|ms|MB)\b|\d % of a core|\d times as (?:long|fast)|\d times faster"
 #: Figures that are settings or limits of the program, and no measurements.
 SET = {"8 MB", "1 MB", "100 ms"}
@@ -203,11 +212,18 @@ SET = {"8 MB", "1 MB", "100 ms"}
 def test_no_other_figure_is_printed() -> None:
     prose = re.sub(r"^```.*?^```", "", EVERYTHING, flags=re.MULTILINE | re.DOTALL)
     recorded = "".join(str(results.recorded(name)["rows"]) for name in results.named(EVERYTHING))
-    assert [figure for figure in re.findall(FIGURE, prose) if figure not in SET and figure not in recorded] == []
+    assert [
+        figure
+        for figure in re.findall(FIGURE, prose)
+        if figure not in SET and figure not in recorded
+    ] == []
 
 
 def test_its_python_programs_run_and_give_what_they_say() -> None:
     imports, program = blocks("python", PAGES["python"])[:2]
-    after = "print(round(pose.xyz[0], 9), stamp_ns, xyz.shape, quat_xyzw.shape, round(points[0, 0], 9))"
+    after = (
+        "print(round(pose.xyz[0], 9), stamp_ns, xyz.shape, quat_xyzw.shape, round(points[0,"
+        " 0], 9))"
+    )
     done = processes.run([sys.executable, "-c", imports + program + after], check=True)
     assert done.stdout == "4.7 9000000000 (80, 3) (80, 4) 3.7\n"

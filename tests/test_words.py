@@ -14,8 +14,13 @@ ROOT = Path(__file__).parents[1]
 GLOSSARY = {
     # the tree
     "frame": "a named coordinate frame of TF; frame_id in messages",
-    "edge": "a parent frame, a child frame and the pose of the child in the parent; static, dynamic or a joint's",
-    "parent, child": "the two ends of an edge; parent_from_child is the pose that maps the child's points",
+    "edge": (
+        "a parent frame, a child frame and the pose of the child in the parent; static, dynamic or"
+        " a joint's"
+    ),
+    "parent, child": (
+        "the two ends of an edge; parent_from_child is the pose that maps the child's points"
+    ),
     "root": "a frame without a parent; base is the root of the URDF",
     "mount": "the frame with which a sensor is bolted to the robot",
     "optical frame": "a camera's frame with z forward, x right, y down (REP-103)",
@@ -31,14 +36,19 @@ GLOSSARY = {
     "overlay, profile": "a file, or a section of it, that is merged over a robot file",
     "robot": "the resolved model: all edges, links, joints and processes",
     "plan": "what launcher, publishers, guard and live tools know of a robot: plan.json",
-    "place": "the key of the language that names the frame to which a pose applies; and where a finding points",
+    "place": (
+        "the key of the language that names the frame to which a pose applies; and where a finding"
+        " points"
+    ),
     "finding": "a code, a message, a span, notes, help and edits",
     "severity": "error, warning or note",
     "rule": "a check of the robot model, with its code; its docstring is its page",
     # who publishes
     "owner": "the process that publishes an edge; each edge has exactly one",
     "publisher, subscriber": "an endpoint of a topic in the ROS graph, with its GID",
-    "claim": "an edge that a node publishes by its parameters, and the parameter that switches it off",
+    "claim": (
+        "an edge that a node publishes by its parameters, and the parameter that switches it off"
+    ),
     "stamp": "the time in a message's header",
     "latched": "transient local durability: late subscribers get the last message",
     "guard": "the process that reports or blocks whoever publishes another's edge",
@@ -47,9 +57,13 @@ GLOSSARY = {
     "process": "a program that the launcher starts, or that runs elsewhere: external",
     "node": "a ROS node; a process has one or more",
     "supervisor": "the part of the launcher that starts, watches and restarts processes",
-    "event, state, transition": "the process machine: a state, an event, and the next state with its effects",
+    "event, state, transition": (
+        "the process machine: a state, an event, and the next state with its effects"
+    ),
     "backoff": "the growing delay before a restart",
-    "readiness": "when a process counts as started: at a topic, a service, a lifecycle state or a log line",
+    "readiness": (
+        "when a process counts as started: at a topic, a service, a lifecycle state or a log line"
+    ),
     "runtime directory": "where a running robot keeps its socket, its lock and its state",
     "lock": "the file lock by which one launcher holds a robot",
     # what is observed
@@ -136,24 +150,40 @@ class Exempt:
 EXEMPT = (
     Exempt(
         frozenset({"look", "Look", "LookAngles", "_look_form"}),
-        "tfcompose/(language/pose|resolve/poses)",
+        "tfcompose/(spec/language/pose|compiler/resolve/poses)",
         "look: is the key of the language that gives a camera its direction",
     ),
-    Exempt(frozenset({"look"}), "tests/presets/.*", "the same key, as an argument of a helper that writes it"),
+    Exempt(
+        frozenset({"look"}),
+        "tests/compiler/presets/.*",
+        "the same key, as an argument of a helper that writes it",
+    ),
     Exempt(
         frozenset({"EyeInHand", "EyeOnBase"}),
-        "tfcompose/language/calibration",
+        "tfcompose/spec/language/calibration",
         "hand-eye calibration has these two set-ups, by these names",
     ),
-    Exempt(frozenset({"camera_looks_away"}), "tfcompose/check/poses", "a rule's function has the rule's name"),
+    Exempt(
+        frozenset({"camera_looks_away"}),
+        "tfcompose/compiler/check/poses",
+        "a rule's function has the rule's name",
+    ),
     Exempt(
         frozenset({"seen"}),
-        "(tfcompose/(ipc|launcher/answers|cli/console|cli/runs)|tests/launcher/test_gates_ros)",
+        "(tfcompose/(model/messages|launcher/answers|cli/console|cli/runs)|tests/launcher/test_gates_ros)",
         "a key of ps --format json and of the launcher's events",
     ),
-    Exempt(frozenset({"look_at"}), "(tfcompose|tests)/view/.*", "viser's name of the point that a camera faces"),
+    Exempt(
+        frozenset({"look_at"}),
+        "(tfcompose|tests)/tools/view/.*",
+        "viser's name of the point that a camera faces",
+    ),
     Exempt(frozenset({"eye"}), "tests/.*", "numpy's name of the identity matrix"),
-    Exempt(frozenset({"quiet"}), "tests/benchmarks/.*", "an argument of the standard library's compileall"),
+    Exempt(
+        frozenset({"quiet"}),
+        "tests/benchmarks/.*",
+        "an argument of the standard library's compileall",
+    ),
 )
 
 
@@ -173,9 +203,18 @@ def names_in(tree: ast.AST) -> Iterator[tuple[str, int]]:
     """Yield every name that the module defines or uses, with its line."""
     for node in ast.walk(tree):
         match node:
-            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+            case (
+                ast.FunctionDef(name=name)
+                | ast.AsyncFunctionDef(name=name)
+                | ast.ClassDef(name=name)
+            ):
                 yield name, node.lineno
-            case ast.arg(arg=name) | ast.Name(id=name) | ast.Attribute(attr=name) | ast.keyword(arg=str(name)):
+            case (
+                ast.arg(arg=name)
+                | ast.Name(id=name)
+                | ast.Attribute(attr=name)
+                | ast.keyword(arg=str(name))
+            ):
                 yield name, node.lineno
             case ast.alias(name=name, asname=other):
                 yield other or name, node.lineno
@@ -200,7 +239,9 @@ def test_no_name_contains_a_forbidden_word(folder: str) -> None:
 
 
 def test_every_exemption_is_needed() -> None:
-    modules = [file.relative_to(ROOT).with_suffix("").as_posix() for file in ROOT.glob("t*/**/*.py")]
+    modules = [
+        file.relative_to(ROOT).with_suffix("").as_posix() for file in ROOT.glob("t*/**/*.py")
+    ]
     for one in EXEMPT:
         files = [ROOT / f"{path}.py" for path in modules if re.fullmatch(one.files, path)]
         used = {name for file in files for name, _ in names_in(ast.parse(file.read_text("utf-8")))}

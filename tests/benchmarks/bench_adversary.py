@@ -1,9 +1,10 @@
 """What liars can do to a robot: ``python tests/benchmarks/bench_adversary.py [accusations [TRIES] | flood]``.
 
-``accusations`` starts strange publishers, of all kinds in turn, beside a robot that each way of guarding watches, and
-counts who was named: with its process, without, somebody else, nobody in time. ``flood`` measures a plan of 50 edges at
-50 Hz beside a node that sends 10,000 new frames at 20 Hz: how late strict's owned edges come at a listener, and what
-the guard takes. Delays are from stamp to arrival in the listener's DDS, so that they hold nothing of its Python.
+``accusations`` starts strange publishers, of all kinds in turn, beside a robot that each way of
+guarding watches, and counts who was named: with its process, without, somebody else, nobody in
+time. ``flood`` measures a plan of 50 edges at 50 Hz beside a node that sends 10,000 new frames at
+20 Hz: how late strict's owned edges come at a listener, and what the guard takes. Delays are from
+stamp to arrival in the listener's DDS, so that they hold nothing of its Python.
 """
 
 from __future__ import annotations
@@ -22,19 +23,23 @@ import psutil
 
 from tests.support.adversary import GUARDS, OTHER_X, Child, Robot, flood, foreign, node, running
 from tests.support.waiting import complete_lines, until
-from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.tf_codec import decode
-from tfcompose.signals import Stop
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import TFSubscription, open_node, wait
+from tfcompose.tf.ros.tf_codec import decode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-#: Kinds of strangers: their command, and what they are called in findings; one that is no ROS node has no process.
+#: Kinds of strangers: their command, and what they are called in findings; one that is no ROS node
+#: has no process.
 KINDS = {
     "a stranger": (node("stranger", OTHER_X, "map odom"), "/stranger"),
     "the owner's name": (node("slam", OTHER_X, "map odom"), "another /slam"),
     "the other owner's name": (node("drive", OTHER_X, "map odom"), "/drive"),
-    "the owner's name below it": (node("slam", OTHER_X, "map odom", namespace="/slam"), "/slam/slam"),
+    "the owner's name below it": (
+        node("slam", OTHER_X, "map odom", namespace="/slam"),
+        "/slam/slam",
+    ),
     "the guard's name": (node("tfcompose_guard", OTHER_X, "map odom"), "/tfcompose_guard"),
     "an undeclared edge": (node("slam", OTHER_X, "odom extra"), "/slam"),
     "another parent": (node("stranger", OTHER_X, "odom map"), "/stranger"),
@@ -49,7 +54,9 @@ def accusations(tries: int) -> dict[str, Counter[str]]:
     for guard in GUARDS:
         with tempfile.TemporaryDirectory() as folder, running(Path(folder), guard, {}) as robot:
             robot.says("tree complete")
-            found[guard] = Counter(_tried(robot, kind) for kind in islice(cycle(KINDS), -(-tries // len(GUARDS))))
+            found[guard] = Counter(
+                _tried(robot, kind) for kind in islice(cycle(KINDS), -(-tries // len(GUARDS)))
+            )
             sys.stdout.write(f"{guard}: {dict(found[guard])}\n")
             sys.stdout.flush()
     return found
@@ -65,7 +72,9 @@ def _tried(robot: Robot, kind: str) -> str:
         return "\n".join(complete_lines(robot.output)[after:])
 
     def reported() -> bool:
-        return bool(re.search(r"\[TF8\d\d\]", text())) and ("no ROS node" in text() or "runs on this" in text())
+        return bool(re.search(r"\[TF8\d\d\]", text())) and (
+            "no ROS node" in text() or "runs on this" in text()
+        )
 
     named = until(reported, REPORTED_WITHIN_S)
     time.sleep(1.0)  # somebody else may be accused with it
@@ -76,7 +85,9 @@ def _tried(robot: Robot, kind: str) -> str:
     if pids - {one.pid}:
         result = "somebody else"
     if result != "named" or not over:
-        sys.stdout.write(f"{robot.guard}, {kind}: {result}, {'over' if over else 'not over'}\n{text()}\n")
+        sys.stdout.write(
+            f"{robot.guard}, {kind}: {result}, {'over' if over else 'not over'}\n{text()}\n"
+        )
     return result
 
 
@@ -136,14 +147,17 @@ def main(words: Sequence[str]) -> None:
                 delays, gap, memory, part = floods(guard, flooded=flooded)
                 p99[guard, flooded] = quantiles(delays, n=100)[98]
                 sys.stdout.write(
-                    f"{guard}{' beside a flood' if flooded else ''}: median {median(delays):.2f} ms, 99th percentile "
-                    f"{p99[guard, flooded]:.2f} ms, longest gap {gap:.3f} s, {len(delays)} of {ROUND_S * HERTZ:.0f}; "
-                    f"guard {memory:.0f} MB, {100 * part:.0f} % of a core\n"
+                    f"{guard}{' beside a flood' if flooded else ''}: median {median(delays):.2f}"
+                    f" ms, 99th percentile {p99[guard, flooded]:.2f} ms, longest gap {gap:.3f} s,"
+                    f" {len(delays)} of {ROUND_S * HERTZ:.0f}; guard {memory:.0f} MB,"
+                    f" {100 * part:.0f} % of a core\n"
                 )
                 sys.stdout.flush()
         for guard in ("strict", "remap"):
             added = p99[guard, True] - p99["watch", True]
-            sys.stdout.write(f"{guard} adds {added:.2f} ms at the 99th percentile beside a flood\n")
+            sys.stdout.write(
+                f"{guard} adds {added:.2f} ms at the 99th percentile beside a flood\n"
+            )
 
 
 if __name__ == "__main__":

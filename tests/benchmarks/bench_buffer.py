@@ -1,7 +1,7 @@
 """What the buffer costs: ``python -m tests.benchmarks.bench_buffer``, or name the file to pytest.
 
-The measure for single lookups is the way a program would do it by hand, edge by edge with ``Pose``; that for
-trajectories is as many single lookups.
+The measure for single lookups is the way a program would do it by hand, edge by edge with
+``Pose``; that for trajectories is as many single lookups.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tests.benchmarks.results import record
-from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.ros.tf_codec import Decoder, Transform, encode
-from tfcompose.tf2 import Buffer
+from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.tf.ros.tf_codec import Decoder, Transform, encode
+from tfcompose.tf.tf2 import Buffer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +37,9 @@ def chain(moving: int, fixed: int) -> tuple[Buffer, str]:
     for index in range(moving + fixed):
         parent, child = f"f{index}", f"f{index + 1}"
         if index >= moving:
-            buffer.set(parent, child, Pose((0.1, 0.2, 0.3), quat_from_rpy(0.1, 0.2, 0.3)), 0, static=True)
+            buffer.set(
+                parent, child, Pose((0.1, 0.2, 0.3), quat_from_rpy(0.1, 0.2, 0.3)), 0, static=True
+            )
             continue
         for step in range(HISTORY_S * HZ + 1):
             pose = Pose((0.01 * step, 0.2, 0.3), quat_from_rpy(0.1, 0.2, 0.02 * step + index))
@@ -154,7 +156,10 @@ def rows() -> Rows:
     by_hand = f"{one['10 fixed edges, by hand']:.1f} µs by hand, with `Pose`"
     return {
         "`lookup_transform` through 10 fixed edges": [f"{one['10 fixed edges']:.1f} µs", by_hand],
-        "… through 10 edges of which 3 are interpolated": [f"{one['3 moving edges of 10']:.1f} µs", ""],
+        "… through 10 edges of which 3 are interpolated": [
+            f"{one['3 moving edges of 10']:.1f} µs",
+            "",
+        ],
         "… through 10 edges, all interpolated": [f"{one['10 moving edges']:.1f} µs", ""],
         "`lookup_many`, 10,000 times through 3 moving and 7 fixed edges": [
             f"{at_once:.2f} ms",

@@ -1,8 +1,9 @@
 """What building costs, beside xacro: ``python -m tests.benchmarks.bench_compile``, or name the file to pytest.
 
-The same robot is written for both, for xacro as calls of a macro: bodies on moving joints with inertia that is
-computed; or plain ones, boxes with a collision and a mass on fixed joints. Whole processes take turns; the least of the
-processor's time for each counts, which a busy machine changes little; compiled files are there before the first one.
+The same robot is written for both, for xacro as calls of a macro: bodies on moving joints with
+inertia that is computed; or plain ones, boxes with a collision and a mass on fixed joints. Whole
+processes take turns; the least of the processor's time for each counts, which a busy machine
+changes little; compiled files are there before the first one.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ ROOT = Path(__file__).parents[2]
 RUNS = 3
 #: Robots: bodies on moving joints, and plain boxes on fixed ones.
 KINDS = ("jointed", "plain")
-#: Frames, and how many times as long as building xacro is to take. At 1,000 that is not reached: half of a build is
-#: starting Python and the language's models, which is a third of what xacro takes for all.
+#: Frames, and how many times as long as building xacro is to take. At 1,000 that is not reached:
+#: half of a build is starting Python and the language's models, which is a third of what xacro
+#: takes for all.
 TIMES_FASTER = {1_000: 3.0, 5_000: 10.0}
 MOST_GROWTH = 12.0  # from 1,000 frames to 10,000
 MOST_MB = 1_000.0
@@ -89,7 +91,8 @@ def xacro_of(frames: int, kind: str) -> str:
         )
         return PLAIN_XACRO + "".join(plain) + "</robot>\n"
     calls = (
-        f'  <xacro:segment name="{name}" parent="{parent}" length="0.{1 + n % 9}" angle="{n % 90}"/>\n'
+        f'  <xacro:segment name="{name}" parent="{parent}" length="0.{1 + n % 9}"'
+        f' angle="{n % 90}"/>\n'
         for name, parent, n in names(frames)
     )
     return XACRO + "".join(calls) + "</robot>\n"
@@ -99,20 +102,27 @@ def spec_of(frames: int, kind: str) -> str:
     """Return the same robot as a spec."""
     if kind == "plain":
         plain = (
-            f"  {name}: {{parent: {parent}, xyz: [0.1, 0, 0.1], visual: {{box: [0.{1 + n % 9}, 0.1, 0.1]}}, "
-            "collision: same, inertial: {mass: 1.5 kg}}"
+            f"  {name}: {{parent: {parent}, xyz: [0.1, 0, 0.1], visual: {{box: [0.{1 + n % 9},"
+            " 0.1, 0.1]}, collision: same, inertial: {mass: 1.5 kg}}"
             for name, parent, n in names(frames)
         )
         return "\n".join(["tfcompose: 1", "robot: bench", "links:", "  base_link: {}", *plain, ""])
     lines = ["tfcompose: 1", "robot: bench", "x-bodies:"]
     lines += [
-        f"  - &body{n} {{visual: {{box: [0.{n}, 0.1, 0.1]}}, collision: same, inertial: {{mass: 1.5 kg}}}}"
+        f"  - &body{n} {{visual: {{box: [0.{n}, 0.1, 0.1]}}, collision: same, inertial: {{mass:"
+        " 1.5 kg}}"
         for n in range(1, 10)
     ]
-    lines += ["links:", "  base_link: {}", *(f"  {name}: *body{1 + n % 9}" for name, _, n in names(frames)), "joints:"]
+    lines += [
+        "links:",
+        "  base_link: {}",
+        *(f"  {name}: *body{1 + n % 9}" for name, _, n in names(frames)),
+        "joints:",
+    ]
     lines += [
         f"  {name}_joint: {{type: revolute, parent: {parent}, child: {name}, "
-        f'xyz: ["${{0.{1 + n % 9} / 2}}", 0, 0.1], rpy: [0, 0, {n % 90} deg], axis: [0, 0, 1], limit: '
+        f'xyz: ["${{0.{1 + n % 9} / 2}}", 0, 0.1], rpy: [0, 0, {n % 90} deg], axis: [0, 0, 1],'
+        " limit: "
         + ("&limit {lower: -1, upper: 1, effort: 10, velocity: 1}}" if n == 0 else "*limit }")
         for name, parent, n in names(frames)
     ]
@@ -148,9 +158,15 @@ def measure(runs: int = RUNS) -> dict[str, tuple[float, float]]:
                 # xacro takes tens of seconds for a large robot, and as long each time.
                 with_xacro = frames == 1_000 or (frames in TIMES_FASTER and number == 0)
                 for command, words in commands(one).items():
-                    if with_xacro if command == "xacro" else command == "tfcompose" or kind == "jointed":
+                    if (
+                        with_xacro
+                        if command == "xacro"
+                        else command == "tfcompose" or kind == "jointed"
+                    ):
                         taken.setdefault(f"{command} {one}", []).append(cost(words, folder))
-    return {name: (min(t for t, _ in costs), max(m for _, m in costs)) for name, costs in taken.items()}
+    return {
+        name: (min(t for t, _ in costs), max(m for _, m in costs)) for name, costs in taken.items()
+    }
 
 
 #: What is measured: a kind of robot, and how many frames it has.
@@ -185,13 +201,18 @@ def test_building_is_faster_than_xacro_and_grows_with_the_robot() -> None:
         assert faster(found, f"jointed{frames}") >= times, found
         assert faster(found, f"plain{frames}") >= times, found
         assert reading(found, frames) <= MOST_OF_READING, found
-    assert found["tfcompose jointed10000"][0] <= MOST_GROWTH * found["tfcompose jointed1000"][0], found
+    assert found["tfcompose jointed10000"][0] <= MOST_GROWTH * found["tfcompose jointed1000"][0], (
+        found
+    )
     assert found["tfcompose jointed10000"][1] <= MOST_MB, found
 
 
 def rows(found: dict[str, tuple[float, float]]) -> Rows:
     """Return what the README prints: both robots, in both sizes."""
-    whats = {"jointed": "inertia that is computed, on moving joints", "plain": "boxes with a mass, on fixed joints"}
+    whats = {
+        "jointed": "inertia that is computed, on moving joints",
+        "plain": "boxes with a mass, on fixed joints",
+    }
     made: Rows = {}
     for kind, frames in ROBOTS:
         if frames not in TIMES_FASTER:
@@ -199,7 +220,10 @@ def rows(found: dict[str, tuple[float, float]]) -> Rows:
         one = f"{kind}{frames}"
         ours, theirs = found[f"tfcompose {one}"][0], found[f"xacro {one}"][0]
         ratio = faster(found, one)
-        made[f"{frames:,} links: {whats[kind]}"] = [f"{ours:.2f} s", f"{theirs:.2f} s: {ratio:.1f} times as long"]
+        made[f"{frames:,} links: {whats[kind]}"] = [
+            f"{ours:.2f} s",
+            f"{theirs:.2f} s: {ratio:.1f} times as long",
+        ]
     return made
 
 
@@ -210,7 +234,10 @@ if __name__ == "__main__":
         sys.stdout.write(f"{name:22} {seconds:7.2f} s {megabytes:6.0f} MB\n")
     for frames in TIMES_FASTER:
         part = reading(figures, frames)
-        sys.stdout.write(f"reading the result back costs {part:.2f} of yourdfpy alone, at most {MOST_OF_READING:g}\n")
+        sys.stdout.write(
+            f"reading the result back costs {part:.2f} of yourdfpy alone, at most"
+            f" {MOST_OF_READING:g}\n"
+        )
     growth = figures["tfcompose jointed10000"][0] / figures["tfcompose jointed1000"][0]
     sys.stdout.write(f"10,000 frames cost {growth:.1f} times 1,000, at most {MOST_GROWTH:g}\n")
     record("compile", rows(figures), before)

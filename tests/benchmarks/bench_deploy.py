@@ -1,7 +1,8 @@
 """How long a deployment to three hosts takes: from nothing, with nothing to change, and with one process changed.
 
-``python -m tests.benchmarks.bench_deploy``: three computers made of namespaces, each with an sshd of its own, and a
-stand-in for systemd. It needs the right to make them. The three share the processors of this machine.
+``python -m tests.benchmarks.bench_deploy``: three computers made of namespaces, each with an sshd
+of its own, and a stand-in for systemd. It needs the right to make them. The three share the
+processors of this machine.
 """
 
 import os
@@ -58,7 +59,11 @@ def main() -> None:
         "again, with nothing to change": again,
         "one process changed, on one host": changed,
     }
-    record("deploy", {row: [f"{statistics.median(seconds):.1f} s"] for row, seconds in rows.items()}, load)
+    record(
+        "deploy",
+        {row: [f"{statistics.median(seconds):.1f} s"] for row, seconds in rows.items()},
+        load,
+    )
 
 
 def _seconds(computers: Computers) -> float:

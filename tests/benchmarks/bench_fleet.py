@@ -1,8 +1,9 @@
 """Twenty robots of a fleet on loopback: ``python -m tests.benchmarks.bench_fleet [--record]``, or name it to pytest.
 
-Each robot is a process with the code of ``fleet share``, fed with 50 transforms a second of odom → base_link instead of
-by ROS, and has a Zenoh router, in a process for all of them. How old a pose between two robots is depends on the rate:
-half a period at the median, and what it takes on the way.
+Each robot is a process with the code of ``fleet share``, fed with 50 transforms a second of odom →
+base_link instead of by ROS, and has a Zenoh router, in a process for all of them. How old a pose
+between two robots is depends on the rate: half a period at the median, and what it takes on the
+way.
 """
 
 from __future__ import annotations
@@ -18,15 +19,18 @@ import psutil
 from tests.benchmarks.results import Rows, record
 from tests.support.fleets import RobotProcesses
 from tests.support.waiting import until
-from tfcompose.fleet.observe import FleetObserver
+from tfcompose.tools.fleet.observe import FleetObserver
 
 ROBOTS, SECONDS = 20, 10.0
 RATES = ("5 Hz", "10 Hz", "20 Hz")
-#: A pose between two robots at 10 Hz is no older at the median, in seconds; a robot costs no more of a core.
+#: A pose between two robots at 10 Hz is no older at the median, in seconds; a robot costs no more
+#: of a core.
 LIMIT_S, LIMIT_CORE = 0.1, 0.05
 
 
-def measure(rate: str, robots: int = ROBOTS, seconds: float = SECONDS) -> tuple[list[float], float]:
+def measure(
+    rate: str, robots: int = ROBOTS, seconds: float = SECONDS
+) -> tuple[list[float], float]:
     """Return the ages of poses between neighbours, in seconds, and what a robot costs, as a part of a core."""
     with RobotProcesses(robots, rate) as running, ExitStack() as stack:
         fleet = running.fleet
@@ -68,7 +72,11 @@ def main() -> None:
     rows: Rows = {}
     for rate in RATES:
         ages, core = measure(rate)
-        cells = [f"{1e3 * median(ages):.0f} ms", f"{1e3 * quantiles(ages, n=20)[-1]:.0f} ms", f"{core:.1%}"]
+        cells = [
+            f"{1e3 * median(ages):.0f} ms",
+            f"{1e3 * quantiles(ages, n=20)[-1]:.0f} ms",
+            f"{core:.1%}",
+        ]
         rows[f"each edge at {rate}"] = cells
     record("fleet", rows, load)
 

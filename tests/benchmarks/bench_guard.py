@@ -1,8 +1,8 @@
 """What the guard costs: ``python -m tests.benchmarks.bench_guard``, or name the file to pytest.
 
-One owner sends 1,000 edges at 50 Hz in messages of 100. What is measured is the processor time of the guard's own
-process, as a part of one core, in rounds of some seconds; and beside it, in the same rounds, that of a plain rclpy node
-that decodes the same messages.
+One owner sends 1,000 edges at 50 Hz in messages of 100. What is measured is the processor time of
+the guard's own process, as a part of one core, in rounds of some seconds; and beside it, in the
+same rounds, that of a plain rclpy node that decodes the same messages.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ import psutil
 import pytest
 
 from tests.benchmarks.results import record
-from tfcompose.geometry import Pose
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.plan.file import write_plan
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.plan.file import write_plan
 
 EDGES, TOGETHER, HERTZ = 1000, 100, 50.0
 ROUNDS, ROUND_S = 3, 4.0
@@ -29,8 +29,8 @@ LIMIT = 0.10
 DOMAIN = "101"
 OWNER = f"""
 import time
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Template
+from tfcompose.tf.ros.node import TFPublisher, open_node
 with open_node("owner", "/bench") as node:
     publisher = TFPublisher(node, static=False)
     names = [("base", f"frame_{{n}}_link") for n in range({EDGES})]
@@ -48,8 +48,8 @@ with open_node("owner", "/bench") as node:
 #: A plain node that hears the same messages, and decodes them.
 LISTENER = """
 import rclpy
-from tfcompose.ros.tf_codec import Decoder
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.tf_codec import Decoder
+from tfcompose.tf.ros.typesupport import tf_message_type
 rclpy.init()
 node, decoder = rclpy.create_node("listener"), Decoder()
 def take(data):
@@ -64,7 +64,14 @@ def plan() -> Plan:
     """Return the plan whose edges the owner sends."""
     edges = tuple(
         PlanEdge(
-            "base", f"frame_{n}_link", "dynamic", "owner", "/bench/owner", Pose(), HERTZ, SourceLine("bench.yaml", n)
+            "base",
+            f"frame_{n}_link",
+            "dynamic",
+            "owner",
+            "/bench/owner",
+            Pose(),
+            HERTZ,
+            SourceLine("bench.yaml", n),
         )
         for n in range(EDGES)
     )
@@ -86,8 +93,12 @@ def measure() -> list[tuple[float, float]]:
         file, log = Path(folder, "plan.json"), Path(folder, "said.txt")
         file.write_text(write_plan(plan()), encoding="utf-8")
         with log.open("wb") as out:
-            guard = subprocess.Popen([sys.executable, "-m", "tfcompose.guard", str(file), "guard"], stdout=out)
-        listener, owner = (subprocess.Popen([sys.executable, "-c", code]) for code in (LISTENER, OWNER))
+            guard = subprocess.Popen(
+                [sys.executable, "-m", "tfcompose.guard", str(file), "guard"], stdout=out
+            )
+        listener, owner = (
+            subprocess.Popen([sys.executable, "-c", code]) for code in (LISTENER, OWNER)
+        )
         try:
             return _rounds([psutil.Process(one.pid) for one in (guard, listener)], log)
         finally:
@@ -108,7 +119,9 @@ def _rounds(processes: list[psutil.Process], log: Path) -> list[tuple[float, flo
         before, begun = [_used_s(one) for one in processes], time.monotonic()
         time.sleep(ROUND_S)
         passed = time.monotonic() - begun
-        guard, listener = ((_used_s(one) - was) / passed for one, was in zip(processes, before, strict=True))
+        guard, listener = (
+            (_used_s(one) - was) / passed for one, was in zip(processes, before, strict=True)
+        )
         parts.append((guard, listener))
     if '"error"' in log.read_text("utf-8"):
         raise RuntimeError("the guard found something wrong")
@@ -139,5 +152,8 @@ if __name__ == "__main__":
     os.environ.update(ROS_DOMAIN_ID=DOMAIN, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     before = os.getloadavg()[0]
     guard_part, listener_part = both()
-    cells = [f"{100 * guard_part:.0f} % of a core", f"{100 * listener_part:.0f} %: a plain rclpy listener that decodes"]
+    cells = [
+        f"{100 * guard_part:.0f} % of a core",
+        f"{100 * listener_part:.0f} %: a plain rclpy listener that decodes",
+    ]
     record("guard", {f"the guard, with {EDGES:,} edges at {HERTZ:g} Hz": cells}, before)

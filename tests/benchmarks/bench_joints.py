@@ -1,9 +1,10 @@
 """What ``joints`` costs and how late it is: ``python -m tests.benchmarks.bench_joints``, or name the file to pytest.
 
-A node of the benchmark sends joint states at 500 Hz and hears /tf. Figures are the process's CPU time (user and
-system) per second, and the time from a joint state's publishing to the transforms' being taken. Several runs; the least
-of each counts, since what else the machine does only adds. Beside them a plain rclpy node is measured that answers
-each joint state's bytes with bytes that it has ready: what waking up and DDS alone cost on this machine today.
+A node of the benchmark sends joint states at 500 Hz and hears /tf. Figures are the process's CPU
+time (user and system) per second, and the time from a joint state's publishing to the transforms'
+being taken. Several runs; the least of each counts, since what else the machine does only adds.
+Beside them a plain rclpy node is measured that answers each joint state's bytes with bytes that it
+has ready: what waking up and DDS alone cost on this machine today.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.benchmarks.results import record
-from tfcompose.geometry import Pose
-from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.plan.file import write_plan
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.plan.file import write_plan
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,8 +46,8 @@ import contextlib
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from sensor_msgs.msg import JointState
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.tf_codec import Template
+from tfcompose.tf.ros.typesupport import tf_message_type
 rclpy.init()
 node = rclpy.create_node("plain", namespace="/rover")
 data = Template([("link_0", "link_1")]).data
@@ -80,16 +81,25 @@ def plan_file(folder: Path, joints: int) -> Path:
     )  # fmt: skip
     processes = (PlanProcess("joints", "joints", nodes=("/rover/joints",)),)
     file = folder / "plan.json"
-    file.write_text(write_plan(Plan("rover", "", "link_0", RosSettings("/rover"), edges, processes)))
+    file.write_text(
+        write_plan(Plan("rover", "", "link_0", RosSettings("/rover"), edges, processes))
+    )
     return file
 
 
-def measure(joints: int, seconds: float = SECONDS, *, plain: bool = False) -> tuple[float, float, float, float]:
+def measure(
+    joints: int, seconds: float = SECONDS, *, plain: bool = False
+) -> tuple[float, float, float, float]:
     """Return the part of a core, the median and the 99th percentile of the delay in seconds, and MB."""
-    from tfcompose.ros.node import open_node  # noqa: PLC0415 (after ROS's variables are set)
+    from tfcompose.tf.ros.node import open_node  # noqa: PLC0415 (after ROS's variables are set)
 
     with tempfile.TemporaryDirectory() as folder, open_node("bench", "/rover") as node:
-        words = ["-m", "tfcompose.publishers.joints", str(plan_file(Path(folder), joints)), "joints"]
+        words = [
+            "-m",
+            "tfcompose.launcher.publishers.joints",
+            str(plan_file(Path(folder), joints)),
+            "joints",
+        ]
         command = [sys.executable, *(["-c", PLAIN] if plain else words)]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         try:
@@ -101,13 +111,16 @@ def measure(joints: int, seconds: float = SECONDS, *, plain: bool = False) -> tu
 
 def _sender(node: Any, joints: int) -> Callable[[], float | None]:
     """Return what sends a joint state, waits for the rest of its period, and returns after how long it was answered."""
-    from rclpy.serialization import serialize_message  # noqa: PLC0415 (after ROS's variables are set)
+    # After ROS's variables are set.
+    from rclpy.serialization import serialize_message  # noqa: PLC0415
     from sensor_msgs.msg import JointState  # noqa: PLC0415 (the same)
 
-    from tfcompose.ros.node import TFSubscription, wait  # noqa: PLC0415 (the same)
-    from tfcompose.signals import Stop  # noqa: PLC0415 (the same)
+    from tfcompose.foundation.signals import Stop  # noqa: PLC0415 (the same)
+    from tfcompose.tf.ros.node import TFSubscription, wait  # noqa: PLC0415 (the same)
 
-    message = JointState(name=[f"joint_{n}" for n in range(joints)], position=[0.01 * n for n in range(joints)])
+    message = JointState(
+        name=[f"joint_{n}" for n in range(joints)], position=[0.01 * n for n in range(joints)]
+    )
     data = bytearray(serialize_message(message))
     publisher = node.create_publisher(JointState, "joint_states", 10)
     heard, stop = TFSubscription(node, static=False), Stop()
@@ -125,7 +138,9 @@ def _sender(node: Any, joints: int) -> Callable[[], float | None]:
     return send
 
 
-def _measure(pid: int, send: Callable[[], float | None], seconds: float) -> tuple[float, float, float, float]:
+def _measure(
+    pid: int, send: Callable[[], float | None], seconds: float
+) -> tuple[float, float, float, float]:
     end = time.monotonic() + 20
     while send() is None:
         if time.monotonic() > end:
@@ -178,7 +193,10 @@ def rows() -> Rows:
         times = f"{1e3 * middle:.2f} ms at the median, {1e3 * late:.2f} ms at the 99th percentile"
         found[f"`joints`: {joints} joints at {RATE} Hz"] = [
             f"{100 * core:.0f} % of a core, {times}, {memory:.0f} MB",
-            f"{100 * least:.0f} %, {1e3 * soonest:.2f} ms: plain rclpy that answers each message with ready bytes",
+            (
+                f"{100 * least:.0f} %, {1e3 * soonest:.2f} ms: plain rclpy that answers each"
+                " message with ready bytes"
+            ),
         ]
     return found
 

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from tfcompose.geometry import Pose
+from tfcompose.foundation.geometry import Pose
 
 EDGES = 500
 MESSAGES = 2000
@@ -18,8 +18,9 @@ DOMAIN = "101"
 
 def measure() -> dict[str, float]:
     """Return the microseconds that a message of ``EDGES`` edges costs, by step."""
-    from tfcompose.ros.node import TFPublisher, open_node  # noqa: PLC0415 (after ROS's variables are set)
-    from tfcompose.ros.tf_codec import Template  # noqa: PLC0415 (after ROS's variables are set)
+    # After ROS's variables are set.
+    from tfcompose.tf.ros.node import TFPublisher, open_node  # noqa: PLC0415
+    from tfcompose.tf.ros.tf_codec import Template  # noqa: PLC0415 (after ROS's variables are set)
 
     pose = Pose((1.0, 2.0, 3.0))
     template = Template([(f"frame_{n}", f"frame_{n + 1}") for n in range(EDGES)])
@@ -43,7 +44,9 @@ def measure() -> dict[str, float]:
 
 
 @pytest.mark.ros
-def test_publishing_500_edges_by_template_bytes_costs_under_50_us(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_publishing_500_edges_by_template_bytes_costs_under_50_us(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", DOMAIN)
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     found = measure()

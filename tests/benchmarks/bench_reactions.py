@@ -1,8 +1,8 @@
 """How soon a running robot reacts: ``python tests/benchmarks/bench_reactions.py``, or name the file to pytest.
 
-A robot with an owner at 50 Hz runs under ``up``. Measured are the seconds from a stranger's first message until the
-guard's line names it; from an owner's standstill until its line says so; and from the launcher's SIGKILL until the last
-of its processes has ended. Medians of some runs.
+A robot with an owner at 50 Hz runs under ``up``. Measured are the seconds from a stranger's first
+message until the guard's line names it; from an owner's standstill until its line says so; and
+from the launcher's SIGKILL until the last of its processes has ended. Medians of some runs.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from tfcompose.ros.node import TFPublisher, open_node
-from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -50,7 +50,9 @@ def running(folder: Path) -> Iterator[tuple[psutil.Process, Path]]:
     (folder / "robot.yaml").write_text(ROBOT, encoding="utf-8")
     output = folder / "output.txt"
     with output.open("wb") as out:
-        up = subprocess.Popen([sys.executable, "-m", "tfcompose", "up"], cwd=folder, stdout=out, stderr=out)
+        up = subprocess.Popen(
+            [sys.executable, "-m", "tfcompose", "up"], cwd=folder, stdout=out, stderr=out
+        )
     try:
         seconds_until(lambda: "tree complete" in output.read_text("utf-8"))
         yield psutil.Process(up.pid), output
@@ -80,7 +82,9 @@ def named_s(output: Path, name: str) -> float:
         seconds_until(lambda: publisher.publisher.get_subscription_count() > 0)
 
         def is_named() -> bool:
-            stranger = Transform(time.time_ns(), "odom", "base_link", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            stranger = Transform(
+                time.time_ns(), "odom", "base_link", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+            )
             publisher.publish(encode([stranger]))
             return f"published by /bench/{name};" in output.read_text("utf-8")
 
@@ -103,7 +107,9 @@ def ended_s(launcher: psutil.Process) -> float:
     """Return how long it takes until everything has ended of which the launcher is killed."""
     below = launcher.children(recursive=True)
     launcher.kill()
-    return seconds_until(lambda: not any(each.is_running() and each.status() != "zombie" for each in below))
+    return seconds_until(
+        lambda: not any(each.is_running() and each.status() != "zombie" for each in below)
+    )
 
 
 def measure() -> dict[str, float]:

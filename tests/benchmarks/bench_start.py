@@ -1,7 +1,8 @@
 """What starting costs, as ratios in one run: ``python tests/benchmarks/bench_start.py``, or name the file to pytest.
 
-Whole processes and the processor's time for them, which a busy machine changes little; the commands that are compared
-take turns, so that a busy moment meets all of them; medians; compiled files are there before the first one that counts.
+Whole processes and the processor's time for them, which a busy machine changes little; the
+commands that are compared take turns, so that a busy moment meets all of them; medians; compiled
+files are there before the first one that counts.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ ROOT = Path(__file__).parents[2]
 RUNS = 21
 COMMANDS = {
     "pass": ["-c", "pass"],
-    "a model and yaml": ["-c", "import yaml, pydantic\nclass A(pydantic.BaseModel):\n    a: int = 1"],
+    "a model and yaml": [
+        "-c",
+        "import yaml, pydantic\nclass A(pydantic.BaseModel):\n    a: int = 1",
+    ],
     "lint": ["-m", "tfcompose", "lint", str(ROOT / "robots" / "autonomous_robot.yaml")],
     "--help": ["-m", "tfcompose", "--help"],
 }
@@ -32,7 +36,9 @@ def measure(runs: int = RUNS) -> dict[str, float]:
     for run in range(runs + 1):
         for name, words in COMMANDS.items():
             began = _spent()
-            subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+            subprocess.run(
+                [sys.executable, *words], check=True, stdout=subprocess.DEVNULL, cwd=ROOT
+            )
             if run:  # the first run warms the disk
                 seconds[name].append(_spent() - began)
     return {name: statistics.median(taken) for name, taken in seconds.items()}

@@ -1,8 +1,8 @@
 """What a strict guard costs in time: ``python -m tests.benchmarks.bench_strict``, or name the file to pytest.
 
-A process of the plan sends 50 edges at 200 Hz, and a listener takes how long they were under way: without a guard's
-fence, and through it, by partition and by remapping, in turns. The difference of the medians, and of the 99th
-percentiles, is what strict adds.
+A process of the plan sends 50 edges at 200 Hz, and a listener takes how long they were under way:
+without a guard's fence, and through it, by partition and by remapping, in turns. The difference of
+the medians, and of the 99th percentiles, is what strict adds.
 """
 
 from __future__ import annotations
@@ -18,27 +18,33 @@ from statistics import median, quantiles
 import pytest
 
 from tests.benchmarks.results import record
-from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.tf_codec import decode
-from tfcompose.signals import Stop
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import TFSubscription, open_node, wait
+from tfcompose.tf.ros.tf_codec import decode
 
 EDGES, HERTZ = 50, 200.0
 ROUNDS, ROUND_S, BEFORE_S = 5, 2.5, 1.0
 MEDIAN_MS, P99_MS = 0.4, 1.0
 DOMAIN = "94"
 #: What is measured: the guard's mode, and its fence.
-WAYS = {"watch": "mode: watch", "strict": "mode: strict, fence: partition", "remapped": "mode: strict, fence: remap"}
+WAYS = {
+    "watch": "mode: watch",
+    "strict": "mode: strict, fence: partition",
+    "remapped": "mode: strict, fence: remap",
+}
 OWNER = Path(__file__).with_name("owner.py")
 
 
 def robot(folder: Path, mode: str) -> Path:
     """Write the robot's file and return its path."""
-    frames = "".join(f"  frame_{n}: {{parent: base, owner: owner, rate: {HERTZ:g} Hz}}\n" for n in range(EDGES))
+    frames = "".join(
+        f"  frame_{n}: {{parent: base, owner: owner, rate: {HERTZ:g} Hz}}\n" for n in range(EDGES)
+    )
     file = folder / f"{mode}.yaml"
     file.write_text(
-        f"tfcompose: 1\nrobot: bench_{mode}\nros: {{discovery: localhost}}\nbase: base\nframes:\n  base: {{}}\n{frames}"
-        f"processes:\n  owner: {{run: [{sys.executable}, {OWNER}, base, '{EDGES}', '{HERTZ:g}'], node: /owner}}\n"
-        f"guard: {{{WAYS[mode]}}}\n",
+        f"tfcompose: 1\nrobot: bench_{mode}\nros: {{discovery: localhost}}\nbase: base\nframes:\n "
+        f" base: {{}}\n{frames}processes:\n  owner: {{run: [{sys.executable}, {OWNER}, base,"
+        f" '{EDGES}', '{HERTZ:g}'], node: /owner}}\nguard: {{{WAYS[mode]}}}\n",
         encoding="utf-8",
     )
     return file
@@ -81,7 +87,10 @@ def measure() -> dict[str, tuple[float, float]]:
                 delays = delays_ms(mode, Path(folder))
                 assert len(delays) > ROUND_S * HERTZ * 0.8, f"{mode}: {len(delays)} messages came"
                 found.append((median(delays), quantiles(delays, n=100)[98]))
-    return {mode: (min(m for m, _ in found), min(p for _, p in found)) for mode, found in rounds.items()}
+    return {
+        mode: (min(m for m, _ in found), min(p for _, p in found))
+        for mode, found in rounds.items()
+    }
 
 
 def test_strict_adds_little() -> None:
@@ -94,10 +103,15 @@ def test_strict_adds_little() -> None:
         sys.stdout.write(f"{mode}: median {middle:.3f} ms, 99th percentile {late:.3f} ms\n")
     busy = found["watch"][1] > P99_MS  # one in a hundred comes later than that without a fence
     if busy:
-        sys.stdout.write("the machine is busy: what strict adds at the 99th percentile cannot be told\n")
+        sys.stdout.write(
+            "the machine is busy: what strict adds at the 99th percentile cannot be told\n"
+        )
     for way in ("strict", "remapped"):
         added = [fenced - watch for fenced, watch in zip(found[way], found["watch"], strict=True)]
-        sys.stdout.write(f"{way} adds {added[0]:.3f} ms at the median, {added[1]:.3f} ms at the 99th percentile\n")
+        sys.stdout.write(
+            f"{way} adds {added[0]:.3f} ms at the median, {added[1]:.3f} ms at the 99th"
+            " percentile\n"
+        )
         assert added[0] < MEDIAN_MS, way
         assert busy or added[1] < P99_MS, way
 

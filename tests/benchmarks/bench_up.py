@@ -1,10 +1,10 @@
 """How soon ``up`` has a tree, and what it takes: ``python -m tests.benchmarks.bench_up``, or name the file to pytest.
 
-A robot with 100 fixed edges. Beside it a plain rclpy process that sends the same edges, started in turn with it, so
-that a busy moment meets both; both are measured from the start of their program to the moment when a listener that was
-there before has all edges. That one announces itself often, as tfcompose's own do: how long a newcomer takes to find
-a stock one, 0.1 or 3 s, is chance, and the same for both. A stock listener that joins later is measured from
-``rclpy.init`` on. Medians.
+A robot with 100 fixed edges. Beside it a plain rclpy process that sends the same edges, started in
+turn with it, so that a busy moment meets both; both are measured from the start of their program
+to the moment when a listener that was there before has all edges. That one announces itself often,
+as tfcompose's own do: how long a newcomer takes to find a stock one, 0.1 or 3 s, is chance, and
+the same for both. A stock listener that joins later is measured from ``rclpy.init`` on. Medians.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import psutil
 import pytest
 
 from tests.benchmarks.results import record
-from tfcompose.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES
+from tfcompose.tf.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,16 +33,18 @@ EDGES = 100
 RUNS = 10
 JOINERS = 20
 DRY_RUNS = 7
-#: At most: later than the plain process; for a listener that joins; for all processes; for a dry run.
+#: At most: later than the plain process; for a listener that joins; for all processes; for a dry
+#: run.
 LATER_S, JOINED_S, MEMORY_MB, DRY_RUN_S = 1.0, 0.6, 110.0, 0.15
 DOMAIN = "99"
-#: A stock listener: says how long after rclpy.init, and when on the machine's clock, it had all edges.
+#: A stock listener: says how long after rclpy.init, and when on the machine's clock, it had all
+#: edges.
 LISTENER = f"""
 import time
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from tfcompose.ros.tf_codec import decode
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.tf_codec import decode
+from tfcompose.tf.ros.typesupport import tf_message_type
 began = time.monotonic()
 rclpy.init()
 node, seen = rclpy.create_node("listener"), set()
@@ -60,8 +62,8 @@ rclpy.shutdown()
 PLAIN = f"""
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.tf_codec import Template
+from tfcompose.tf.ros.typesupport import tf_message_type
 rclpy.init()
 node = rclpy.create_node("plain")
 qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -73,17 +75,25 @@ rclpy.spin(node)
 
 def built(folder: Path) -> Path:
     """Build the robot, and return its plan's file."""
-    frames = "\n".join(f"  frame_{n}: {{parent: base_link, xyz: [{n / 10:g}, 0, 0]}}" for n in range(EDGES))
-    (folder / "robot.yaml").write_text(f"tfcompose: 1\nrobot: bench\nframes:\n  base_link: {{}}\n{frames}\n")
+    frames = "\n".join(
+        f"  frame_{n}: {{parent: base_link, xyz: [{n / 10:g}, 0, 0]}}" for n in range(EDGES)
+    )
+    (folder / "robot.yaml").write_text(
+        f"tfcompose: 1\nrobot: bench\nframes:\n  base_link: {{}}\n{frames}\n"
+    )
     words = ("tfcompose", "build", "robot.yaml", "-o", "built")
-    subprocess.run([sys.executable, "-m", *words], check=True, cwd=folder, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-m", *words], check=True, cwd=folder, stdout=subprocess.DEVNULL
+    )
     return folder / "built" / "plan.json"
 
 
 @contextmanager
 def running(folder: Path, *words: str) -> Iterator[subprocess.Popen[bytes]]:
     """Run a Python program until the block ends; Ctrl-C ends it then."""
-    popen = subprocess.Popen([sys.executable, *words], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    popen = subprocess.Popen(
+        [sys.executable, *words], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     try:
         yield popen
     finally:
@@ -94,7 +104,9 @@ def running(folder: Path, *words: str) -> Iterator[subprocess.Popen[bytes]]:
 @contextmanager
 def listening(**environment: str) -> Iterator[subprocess.Popen[str]]:
     env = os.environ | environment
-    popen = subprocess.Popen([sys.executable, "-c", LISTENER], stdout=subprocess.PIPE, text=True, env=env)
+    popen = subprocess.Popen(
+        [sys.executable, "-c", LISTENER], stdout=subprocess.PIPE, text=True, env=env
+    )
     try:
         assert popen.stdout
         assert popen.stdout.readline() == "listens\n"
@@ -149,12 +161,17 @@ def dry_run_s(folder: Path, plan: Path) -> float:
 
 def measure(runs: int = RUNS, joiners: int = JOINERS) -> dict[str, list[float]]:
     """Return the seconds of each run, and the memory of each process."""
-    found: dict[str, list[float]] = {name: [] for name in ("plain", "up", "joined", "memory", "dry run")}
+    found: dict[str, list[float]] = {
+        name: [] for name in ("plain", "up", "joined", "memory", "dry run")
+    }
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "runtime").mkdir(mode=0o700)
         places = {"XDG_RUNTIME_DIR": f"{name}/runtime", "ROS_LOG_DIR": f"{name}/log"}
-        os.environ |= {"ROS_DOMAIN_ID": DOMAIN, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"} | places
+        os.environ |= {
+            "ROS_DOMAIN_ID": DOMAIN,
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        } | places
         plan = built(folder)
         up = ("-m", "tfcompose", "up", str(plan))
         for _ in range(runs):
@@ -169,7 +186,9 @@ def measure(runs: int = RUNS, joiners: int = JOINERS) -> dict[str, list[float]]:
 
 
 @pytest.mark.ros
-def test_100_edges_are_live_soon_after_a_plain_process_and_at_once_for_who_joins_in_little_memory() -> None:
+def test_100_edges_are_live_soon_after_a_plain_process_and_at_once_for_who_joins_in_little_memory() -> (
+    None
+):
     found = measure()
     assert median(found["up"]) - median(found["plain"]) <= LATER_S, found
     assert max(found["joined"]) <= JOINED_S, found
@@ -181,18 +200,32 @@ if __name__ == "__main__":
     before = os.getloadavg()[0]
     observed = measure(*(int(word) for word in sys.argv[1:] if word.isdecimal()))
     plain, ours = median(observed["plain"]), median(observed["up"])
-    sys.stdout.write(f"{EDGES} edges at a listener: plain {plain:.2f} s, up {ours:.2f} s ({ours - plain:+.2f} s)\n")
+    sys.stdout.write(
+        f"{EDGES} edges at a listener: plain {plain:.2f} s, up {ours:.2f} s ({ours - plain:+.2f}"
+        " s)\n"
+    )
     sys.stdout.write(f"  plain {sorted(round(one, 2) for one in observed['plain'])}\n")
     sys.stdout.write(f"  up    {sorted(round(one, 2) for one in observed['up'])}\n")
     late = sum(one > JOINED_S for one in observed["joined"])
-    sys.stdout.write(f"who joins: median {median(observed['joined']):.2f} s, longest {max(observed['joined']):.2f} s, ")
+    sys.stdout.write(
+        f"who joins: median {median(observed['joined']):.2f} s, longest"
+        f" {max(observed['joined']):.2f} s, "
+    )
     sys.stdout.write(f"{late} of {len(observed['joined'])} over {JOINED_S} s\n")
-    sys.stdout.write(f"memory: {sum(observed['memory']):.0f} MB: {[round(one) for one in observed['memory']]}\n")
+    sys.stdout.write(
+        f"memory: {sum(observed['memory']):.0f} MB: {[round(one) for one in observed['memory']]}\n"
+    )
     sys.stdout.write(f"dry run: {observed['dry run'][0]:.3f} s\n")
     joiners = f"{median(observed['joined']):.2f} s, at most {max(observed['joined']):.2f} s"
     rows = {
-        f"{EDGES} fixed edges are at a listener after": [f"{ours:.2f} s", f"{plain:.2f} s: a plain rclpy process"],
-        "a listener that joins has all edges after": [f"{joiners} in {len(observed['joined'])} tries", ""],
+        f"{EDGES} fixed edges are at a listener after": [
+            f"{ours:.2f} s",
+            f"{plain:.2f} s: a plain rclpy process",
+        ],
+        "a listener that joins has all edges after": [
+            f"{joiners} in {len(observed['joined'])} tries",
+            "",
+        ],
         "memory, shared pages divided": [f"{sum(observed['memory']):.0f} MB", ""],
     }
     record("up", rows, before)

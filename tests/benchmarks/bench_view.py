@@ -1,11 +1,13 @@
 """What the view costs: ``python -m tests.benchmarks.bench_view``, or name the file to pytest.
 
-For a robot file: how long after the command a browser has been sent the whole scene, how long a save takes that
-changes one mount, with lint of what is written, and how large the largest page of the gallery is.
+For a robot file: how long after the command a browser has been sent the whole scene, how long a
+save takes that changes one mount, with lint of what is written, and how large the largest page of
+the gallery is.
 
-Live, one owner sends 1,000 frames at 20 Hz, which all move, in messages of 100; they hang in chains of ten. One browser
-is connected, or rather a program that reads what one would. What is measured is the processor time of the view's own
-process, as a part of one core, in rounds of some seconds, and its memory.
+Live, one owner sends 1,000 frames at 20 Hz, which all move, in messages of 100; they hang in
+chains of ten. One browser is connected, or rather a program that reads what one would. What is
+measured is the processor time of the view's own process, as a part of one core, in rounds of some
+seconds, and its memory.
 """
 
 from __future__ import annotations
@@ -30,9 +32,9 @@ from websockets.typing import Subprotocol
 
 from tests.benchmarks.results import record
 from tfcompose.cli.compiling import library
-from tfcompose.compile import Compiled, compile_robot
-from tfcompose.geometry import Pose
-from tfcompose.view.session import Session
+from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.foundation.geometry import Pose
+from tfcompose.tools.view.session import Session
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,9 +47,9 @@ ROVER = Path(__file__).parents[2] / "robots" / "field_rover.yaml"
 DOMAIN = "101"
 OWNER = f"""
 import math, time
-from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.tf.ros.tf_codec import Template
+from tfcompose.tf.ros.node import TFPublisher, open_node
 with open_node("owner", "") as node:
     publisher = TFPublisher(node, static=False)
     names = [("base" if n % {DEPTH} == 0 else f"f{{n - 1}}", f"f{{n}}") for n in range({FRAMES})]
@@ -69,8 +71,13 @@ def robot() -> str:
     """Return the robot whose frames the owner sends."""
     parents = ("base" if number % DEPTH == 0 else f"f{number - 1}" for number in range(FRAMES))
     keys = f"owner: owner, rate: {HERTZ:g} Hz"
-    frames = [f"  f{number}: {{parent: {parent}, {keys}}}" for number, parent in enumerate(parents)]
-    head = "tfcompose: 1\nrobot: bench\nprocesses: {owner: {external: true, node: owner}}\nframes:\n  base: {}\n"
+    frames = [
+        f"  f{number}: {{parent: {parent}, {keys}}}" for number, parent in enumerate(parents)
+    ]
+    head = (
+        "tfcompose: 1\nrobot: bench\nprocesses: {owner: {external: true, node: owner}}\nframes:\n "
+        " base: {}\n"
+    )
     return head + "\n".join(frames) + "\n"
 
 
@@ -79,7 +86,9 @@ class Browser:
 
     def __init__(self, port: int) -> None:
         protocol = Subprotocol(f"viser-v{viser.__version__}")
-        self._connection = connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None, open_timeout=30)
+        self._connection = connect(
+            f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None, open_timeout=30
+        )
         self.messages = 0
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -142,7 +151,9 @@ def first_scene_s() -> float:
         port = int(address.rpartition(":")[2])
         latest = begun
         with (
-            connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None) as connection,
+            connect(
+                f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None
+            ) as connection,
             contextlib.suppress(TimeoutError),
         ):
             while True:
@@ -163,7 +174,9 @@ def save_s() -> float:
         def compiled(texts: Mapping[str, str]) -> Compiled:
             return compile_robot(texts[str(file)], str(file), library())
 
-        session = Session({str(file): file.read_text("utf-8")}, compiled, lambda path, _, new: write(path, new))
+        session = Session(
+            {str(file): file.read_text("utf-8")}, compiled, lambda path, _, new: write(path, new)
+        )
         mount = session.mount("front_link")
         session.move(mount.edge.child, Pose((0.01 + mount.edge.pose.xyz[0], 0, 0)))
         begun = time.monotonic()
@@ -200,7 +213,9 @@ def test_a_robot_is_there_in_3_s_saved_in_150_ms_and_a_page_of_3_mb() -> None:
 
 
 @pytest.mark.ros
-def test_1000_frames_at_20_hz_take_a_quarter_of_a_core_and_400_mb(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_1000_frames_at_20_hz_take_a_quarter_of_a_core_and_400_mb(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", DOMAIN)
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     part, used, updates = measure()

@@ -9,8 +9,8 @@ import signal
 import sys
 import time
 
-from tfcompose.ros.node import TFPublisher, open_node
-from tfcompose.ros.tf_codec import Template
+from tfcompose.tf.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Template
 
 
 def main(parent: str, edges: int, hertz: float, ros_args: list[str]) -> None:

@@ -1,9 +1,9 @@
 """The figures that the README and the topics print: each from a file that a benchmark wrote.
 
-``python -m tests.benchmarks.bench_buffer --record`` measures and writes ``results/buffer.json``: the rows as they are
-printed, and with what machine, when, under what load and by which command they came to be. A table on a page stands
-below a line ``<!-- figures: buffer joints -->`` that names its files; ``python -m tests.benchmarks.results --write``
-writes all tables anew.
+``python -m tests.benchmarks.bench_buffer --record`` measures and writes ``results/buffer.json``:
+the rows as they are printed, and with what machine, when, under what load and by which command
+they came to be. A table on a page stands below a line ``<!-- figures: buffer joints -->`` that
+names its files; ``python -m tests.benchmarks.results --write`` writes all tables anew.
 """
 
 from __future__ import annotations
@@ -18,19 +18,22 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "tfcompose" / "topics").glob("*.md")))
+PAGES = (ROOT / "README.md", *sorted((ROOT / "tfcompose" / "data" / "topics").glob("*.md")))
 FOLDER = Path(__file__).with_name("results")
 #: A row's name, and its cells.
 Rows = dict[str, list[str]]
 
 _TABLE = re.compile(
-    r"(?P<mark><!-- figures: (?P<names>[a-z ]+) -->\n\n)(?P<head>\|.*\n\|[-|]+\|\n)(?P<rows>(?:\|.*\n)*)"
+    r"(?P<mark><!-- figures: (?P<names>[a-z ]+)"
+    r" -->\n\n)(?P<head>\|.*\n\|[-|]+\|\n)(?P<rows>(?:\|.*\n)*)"
 )
 
 
 def machine() -> dict[str, Any]:
     """Return what the machine is, without its name."""
-    model = re.search(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8"), re.MULTILINE)
+    model = re.search(
+        r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8"), re.MULTILINE
+    )
     pages = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return {
         "processor": model[1] if model else platform.machine(),
@@ -44,7 +47,8 @@ def machine() -> dict[str, Any]:
 def record(name: str, rows: Rows, load: float) -> None:
     """Print the rows, and write them to the file of that name if the command line says ``--record``.
 
-    ``load`` is the system's load of the last minute before the benchmark began: ``os.getloadavg()[0]``.
+    ``load`` is the system's load of the last minute before the benchmark began:
+    ``os.getloadavg()[0]``.
     """
     for row, cells in rows.items():
         sys.stdout.write(f"| {' | '.join([row, *cells])} |\n")
@@ -73,8 +77,15 @@ def rewritten(text: str) -> str:
     """Return a text with the rows of its tables as they were recorded."""
 
     def table(found: re.Match[str]) -> str:
-        rows = {row: cells for name in found["names"].split() for row, cells in recorded(name)["rows"].items()}
-        lines = (f"| {' | '.join([row, *cells])} |\n".replace("|  |", "| |") for row, cells in rows.items())
+        rows = {
+            row: cells
+            for name in found["names"].split()
+            for row, cells in recorded(name)["rows"].items()
+        }
+        lines = (
+            f"| {' | '.join([row, *cells])} |\n".replace("|  |", "| |")
+            for row, cells in rows.items()
+        )
         return f"{found['mark']}{found['head']}{''.join(lines)}"
 
     return _TABLE.sub(table, text)

@@ -7,7 +7,9 @@ import pytest
 from tfcompose.cli.all_hosts import _Printer
 
 
-def test_events_have_their_host_and_a_line_that_is_none_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_events_have_their_host_and_a_line_that_is_none_is_printed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     printer = _Printer("events", is_json=True)
     printer.take("brain", '{"event": "started"}')
     printer.take("rear", "Welcome to rear")

@@ -22,7 +22,9 @@ def tfcompose(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return tfcompose_in(cwd, *words)
 
 
-def with_a_process(*words: str, cwd: Path, text: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
+def with_a_process(
+    *words: str, cwd: Path, text: str = "", **environment: str
+) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tfcompose", *words]
     return processes.run(command, cwd=cwd, env=os.environ | environment, stdin=text)
 
@@ -59,7 +61,9 @@ def test_a_bad_file_gives_one_finding_with_its_place_and_nothing_is_emitted(
 
 @pytest.mark.parametrize("command", ["lint", "build", "tree"])
 @pytest.mark.parametrize("kind", ["missing", "folder", "fifo", "a file as a folder", "unreadable"])
-def test_what_cannot_be_read_is_one_finding_and_exit_2(command: str, kind: str, folder: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_read_is_one_finding_and_exit_2(
+    command: str, kind: str, folder: Path, tmp_path: Path
+) -> None:
     file = folder / "robot.yaml"
     words = [command, "robot.yaml"]
     if kind == "folder":
@@ -97,7 +101,9 @@ WRONG_USE = {
 
 
 @pytest.mark.parametrize("case", WRONG_USE)
-def test_wrong_use_is_exit_2_and_says_what_there_is(case: str, folder: Path, tmp_path: Path) -> None:
+def test_wrong_use_is_exit_2_and_says_what_there_is(
+    case: str, folder: Path, tmp_path: Path
+) -> None:
     (folder / "robot.yaml").write_text(GOOD)
     before = everything_below(tmp_path)
     done = tfcompose(*WRONG_USE[case], cwd=folder)
@@ -133,7 +139,9 @@ def test_text_that_steers_a_terminal_is_shown_and_not_obeyed(folder: Path) -> No
 
 
 def test_output_that_the_terminal_cannot_show_is_escaped(folder: Path) -> None:
-    done = with_a_process("tree", str(ROBOTS / "my_robot.yaml"), cwd=folder, PYTHONIOENCODING="ascii")
+    done = with_a_process(
+        "tree", str(ROBOTS / "my_robot.yaml"), cwd=folder, PYTHONIOENCODING="ascii"
+    )
     assert done.returncode == 0
     assert "\\u2500" in done.stdout
 
@@ -150,7 +158,9 @@ def test_output_that_cannot_be_saved_is_one_sentence(folder: Path) -> None:
     assert os.strerror(errno.ENOSPC) in done.stderr
 
 
-@pytest.mark.parametrize("words", [("tree", "robots/autonomous_robot.yaml"), ("--help",), ("up", "--help")])
+@pytest.mark.parametrize(
+    "words", [("tree", "robots/autonomous_robot.yaml"), ("--help",), ("up", "--help")]
+)
 def test_a_reader_that_goes_away_causes_no_traceback(words: tuple[str, ...]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
@@ -168,7 +178,9 @@ def test_a_pipe_that_is_open_already_is_read(folder: Path) -> None:
 
 
 def test_lint_in_json_is_a_list_of_findings_as_the_contract_has_them(folder: Path) -> None:
-    (folder / "robot.yaml").write_text(GOOD + "frames: {a: {parent: base_link}}\nframes: {}\ngaurd: {}\n")
+    (folder / "robot.yaml").write_text(
+        GOOD + "frames: {a: {parent: base_link}}\nframes: {}\ngaurd: {}\n"
+    )
     done = tfcompose("lint", "--format", "json", cwd=folder)
     assert done.returncode == 1
     found = json.loads(done.stdout)
@@ -184,7 +196,14 @@ def test_lint_in_json_is_a_list_of_findings_as_the_contract_has_them(folder: Pat
             "end_line": 5,
             "end_column": 7,
             "help": "",
-            "notes": [{"message": found[0]["notes"][0]["message"], "file": "robot.yaml", "line": 4, "column": 1}],
+            "notes": [
+                {
+                    "message": found[0]["notes"][0]["message"],
+                    "file": "robot.yaml",
+                    "line": 4,
+                    "column": 1,
+                }
+            ],
         },
         {
             "code": "TF101",
@@ -202,7 +221,9 @@ def test_lint_in_json_is_a_list_of_findings_as_the_contract_has_them(folder: Pat
     ]
 
 
-def test_lint_in_json_without_findings_is_an_empty_list_and_a_missing_file_is_a_finding(folder: Path) -> None:
+def test_lint_in_json_without_findings_is_an_empty_list_and_a_missing_file_is_a_finding(
+    folder: Path,
+) -> None:
     (folder / "robot.yaml").write_text(GOOD)
     assert json.loads(tfcompose("lint", "--format", "json", cwd=folder).stdout) == []
     done = tfcompose("lint", "--format", "json", "nothing.yaml", cwd=folder)
@@ -213,7 +234,9 @@ def test_lint_in_json_without_findings_is_an_empty_list_and_a_missing_file_is_a_
 
 
 def test_a_warning_fails_lint_only_with_strict(folder: Path) -> None:
-    text = GOOD + "sensors: {c: {preset: realsense/d435i, parent: base_link, place: c_color_frame}}\n"
+    text = (
+        GOOD + "sensors: {c: {preset: realsense/d435i, parent: base_link, place: c_color_frame}}\n"
+    )
     (folder / "robot.yaml").write_text(text)
     done = tfcompose("lint", cwd=folder)
     assert done.returncode == 0
@@ -233,7 +256,9 @@ def test_lint_shows_the_line_and_a_caret_under_the_place(folder: Path) -> None:
 
 
 def test_lint_checks_a_file_with_each_of_its_profiles(folder: Path) -> None:
-    (folder / "robot.yaml").write_text(GOOD + "profiles: {one: {frames: {a: {parent: b}}}, two: {}}\n")
+    (folder / "robot.yaml").write_text(
+        GOOD + "profiles: {one: {frames: {a: {parent: b}}}, two: {}}\n"
+    )
     done = tfcompose("lint", cwd=folder)
     assert done.returncode == 1
     assert "with --profile one" in done.stdout
@@ -242,7 +267,15 @@ def test_lint_checks_a_file_with_each_of_its_profiles(folder: Path) -> None:
 
 
 def test_pose_in_json_is_the_pose_of_the_second_frame_in_the_first(folder: Path) -> None:
-    done = tfcompose("pose", str(ROBOTS / "my_robot.yaml"), "camera_link", "laser_link", "--format", "json", cwd=folder)
+    done = tfcompose(
+        "pose",
+        str(ROBOTS / "my_robot.yaml"),
+        "camera_link",
+        "laser_link",
+        "--format",
+        "json",
+        cwd=folder,
+    )
     found = json.loads(done.stdout)
     assert set(found) == {"parent", "child", "xyz", "quat_xyzw", "rpy"}
     assert (found["parent"], found["child"]) == ("camera_link", "laser_link")
@@ -257,21 +290,29 @@ def test_a_stream_that_is_closed_is_no_traceback(tmp_path: Path, closed: str) ->
     command = f"{shlex.quote(sys.executable)} -m tfcompose explain TF301 {kept} {closed}; echo $?"
     done = processes.run(["/bin/sh", "-c", command])
     assert done.stdout.splitlines()[-1] == "0"
-    assert "Traceback" not in done.stdout + done.stderr + (output.read_text() if output.exists() else "")
+    assert "Traceback" not in done.stdout + done.stderr + (
+        output.read_text() if output.exists() else ""
+    )
 
 
 @pytest.mark.parametrize("command", ["build", "export systemd"])
 def test_a_folder_that_was_removed_is_named_as_the_reason(tmp_path: Path, command: str) -> None:
     (tmp_path / "robot.yaml").write_text(GOOD)
     (tmp_path / "gone").mkdir()
-    words = f"cd gone && rmdir ../gone && {sys.executable} -m tfcompose {command} {tmp_path}/robot.yaml"
+    words = (
+        f"cd gone && rmdir ../gone && {sys.executable} -m tfcompose {command}"
+        f" {tmp_path}/robot.yaml"
+    )
     done = processes.run(["/bin/sh", "-c", words], cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert re.fullmatch(r"tfcompose: .*\bcurrent folder\b.*\n", done.stderr)
 
 
 def test_arguments_of_a_xacro_file_are_given_to_lint_as_to_import(folder: Path) -> None:
-    text = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="$(arg name)_link"/></robot>'
+    text = (
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="$(arg'
+        ' name)_link"/></robot>'
+    )
     (folder / "r.xacro").write_text(text)
     (folder / "robot.yaml").write_text(GOOD)
     assert "error[TF106]" in tfcompose("lint", "r.xacro", cwd=folder).stdout
@@ -286,14 +327,27 @@ def test_arguments_of_a_xacro_file_are_given_to_lint_as_to_import(folder: Path) 
 def test_a_file_name_moves_no_terminals_cursor(folder: Path) -> None:
     name = "a\x1b[31m.yaml"
     (folder / name).write_text(GOOD.replace("base_link", "base link"))
-    for words in (["lint", name], ["lint", name, "--format", "github"], ["import", name], ["tree", f"{name}.yaml"]):
+    for words in (
+        ["lint", name],
+        ["lint", name, "--format", "github"],
+        ["import", name],
+        ["tree", f"{name}.yaml"],
+    ):
         done = tfcompose(*words, cwd=folder)
         assert done.returncode in {1, 2}, words
         assert "\x1b" not in done.stdout + done.stderr, words
 
 
 @pytest.mark.parametrize(
-    "words", ["import robot.urdf", "import --bag b", "tree", "tree --bag b", "graph -o g.svg", "verify --bag b"]
+    "words",
+    [
+        "import robot.urdf",
+        "import --bag b",
+        "tree",
+        "tree --bag b",
+        "graph -o g.svg",
+        "verify --bag b",
+    ],
 )
 def test_a_duration_is_refused_where_no_running_tree_is_observed(words: str, folder: Path) -> None:
     done = tfcompose(*words.split(), "--for", "3", cwd=folder)

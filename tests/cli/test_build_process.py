@@ -22,7 +22,9 @@ pytestmark = pytest.mark.ros
 def up(file: str | Path, *words: str) -> subprocess.Popen[str]:
     """Start ``tfcompose up``; what it may read from its stdin is never written."""
     command = [sys.executable, "-m", "tfcompose", "up", str(file), *words]
-    return processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return processes.start(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
 
 
 def build_of(launcher: subprocess.Popen[str]) -> psutil.Process:
@@ -30,7 +32,9 @@ def build_of(launcher: subprocess.Popen[str]) -> psutil.Process:
 
     def builds() -> list[psutil.Process]:
         below = psutil.Process(launcher.pid).children()
-        return [one for one in below if any("pydantic_core" in each.path for each in one.memory_maps())]
+        return [
+            one for one in below if any("pydantic_core" in each.path for each in one.memory_maps())
+        ]
 
     assert until(builds)
     return builds()[0]
@@ -67,20 +71,25 @@ def test_a_build_that_is_killed_ends_the_launcher_which_names_the_signal() -> No
     assert "SIGKILL" in errors
 
 
-@pytest.mark.parametrize(("text", "code"), [("tfcompose: 1\nrobot: r\nframes: {a: {parent: b}}\n", 1), (None, 2)])
+@pytest.mark.parametrize(
+    ("text", "code"), [("tfcompose: 1\nrobot: r\nframes: {a: {parent: b}}\n", 1), (None, 2)]
+)
 def test_up_ends_as_the_build_does(text: str | None, code: int, tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     if text is not None:
         file.write_text(text, "utf-8")
     ends = [
-        processes.run([sys.executable, "-m", "tfcompose", command, file], cwd=tmp_path) for command in ("build", "up")
+        processes.run([sys.executable, "-m", "tfcompose", command, file], cwd=tmp_path)
+        for command in ("build", "up")
     ]
     assert {(one.returncode, one.stdout) for one in ends} == {(code, "")}
     assert ends[0].stderr == ends[1].stderr != ""
 
 
 @pytest.mark.parametrize("hook", ["after_in_child", "after_in_parent"])
-def test_an_interrupt_while_the_build_is_forked_ends_both_and_nothing_is_printed(hook: str, tmp_path: Path) -> None:
+def test_an_interrupt_while_the_build_is_forked_ends_both_and_nothing_is_printed(
+    hook: str, tmp_path: Path
+) -> None:
     """Python prints what a hook of a fork raises, and goes on."""
     (tmp_path / "robot.yaml").write_text(ROVER, "utf-8")
     send = f"import os; os.register_at_fork({hook}=lambda: os.kill(os.getpid(), 2))"

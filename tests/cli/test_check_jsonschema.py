@@ -17,7 +17,10 @@ LINKS = "links: {base_link: {}}\n"
 BROKEN = {
     "unknown section": (HEAD + LINKS + "gaurd: {mode: watch}\n", "gaurd"),
     "unknown key": (HEAD + "links: {base_link: {}, a: {parnet: base_link}}\n", "parnet"),
-    "two numbers": (HEAD + "links: {base_link: {}, a: {parent: base_link, xyz: [0, 1]}}\n", "$.links.a"),
+    "two numbers": (
+        HEAD + "links: {base_link: {}, a: {parent: base_link, xyz: [0, 1]}}\n",
+        "$.links.a",
+    ),
     "no name": ("tfcompose: 1\n" + LINKS, "robot"),
     "another version": ("tfcompose: 2\nrobot: r\n" + LINKS, "$.tfcompose"),
     "a joint of no type": (
@@ -30,11 +33,17 @@ BROKEN = {
         "$.sensors.c.preset",
     ),
     "an unknown option": (
-        HEAD + LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, options: {streem: [color]}}}\n",
+        HEAD
+        + LINKS
+        + "sensors: {c: {preset: realsense/d435i, parent: base_link, options: {streem:"
+        " [color]}}}\n",
         "streem",
     ),
     "an unknown stream": (
-        HEAD + LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, options: {streams: [colour]}}}\n",
+        HEAD
+        + LINKS
+        + "sensors: {c: {preset: realsense/d435i, parent: base_link, options: {streams:"
+        " [colour]}}}\n",
         "$.sensors.c.options.streams",
     ),
     "an unknown preset of a node": (
@@ -49,14 +58,24 @@ BROKEN = {
         HEAD + "links: {base_link: {}, a: {parent: base_link, rpy: [0, 1, 3 cm]}}\n",
         "$.links.a.rpy[2]",
     ),
-    "two rotations": (HEAD + "links: {base_link: {}, a: {parent: base_link, rpy: [0, 0, 0], look: up}}\n", "$.links.a"),
+    "two rotations": (
+        HEAD + "links: {base_link: {}, a: {parent: base_link, rpy: [0, 0, 0], look: up}}\n",
+        "$.links.a",
+    ),
     "an unknown code": (HEAD + LINKS + "rules: {TF9999: off}\n", "TF9999"),
 }
 
 
 def check(*files: Path) -> subprocess.CompletedProcess[str]:
     schema = ROOT / "schemas" / "robot.schema.json"
-    command = [sys.executable, "-m", "check_jsonschema", "--schemafile", str(schema), *map(str, files)]
+    command = [
+        sys.executable,
+        "-m",
+        "check_jsonschema",
+        "--schemafile",
+        str(schema),
+        *map(str, files),
+    ]
     return processes.run(command)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.cli import tfcompose
 from tfcompose.cli.combinations import MOST, combinations, merged
-from tfcompose.findings import Span, finding
+from tfcompose.foundation.findings import Span, finding
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,12 +28,18 @@ def test_beyond_that_each_two_values_are_together_in_one(count: int, values: int
     every = combinations(alternatives, dict.fromkeys(alternatives, "v0"))
     assert len(every) <= MOST < values**count
     for one, other in subsets(alternatives, 2):
-        assert {(row[one], row[other]) for row in every} == set(product(alternatives[one], alternatives[other]))
+        assert {(row[one], row[other]) for row in every} == set(
+            product(alternatives[one], alternatives[other])
+        )
 
 
 def test_a_finding_is_named_by_the_fewest_arguments_that_say_where_it_is() -> None:
-    every = combinations({"a": ("0", "1"), "b": ("0", "1"), "c": ("0", "1")}, dict.fromkeys("abc", "0"))
-    always, single, pair, two = (finding("TF203", text, Span("r.yaml")) for text in ("x", "a", "b", "c"))
+    every = combinations(
+        {"a": ("0", "1"), "b": ("0", "1"), "c": ("0", "1")}, dict.fromkeys("abc", "0")
+    )
+    always, single, pair, two = (
+        finding("TF203", text, Span("r.yaml")) for text in ("x", "a", "b", "c")
+    )
     judged = [
         (
             one,
@@ -80,9 +86,12 @@ def test_lint_and_the_other_commands_take_arguments(tmp_path: Path) -> None:
 
 def test_lint_judges_an_integer_at_its_bounds_and_its_default(tmp_path: Path) -> None:
     file = tmp_path / "r.yaml"
-    rows = "".join(f"  at_{n}: {{parent: gone_{n}, when: '${{args.n == {n}}}'}}\n" for n in (0, 2, 3, 9))
+    rows = "".join(
+        f"  at_{n}: {{parent: gone_{n}, when: '${{args.n == {n}}}'}}\n" for n in (0, 2, 3, 9)
+    )
     file.write_text(
-        f"tfcompose: 1\nrobot: r\nargs: {{n: {{default: 2, min: 0, max: 9}}}}\nframes:\n  base_link: {{}}\n{rows}"
+        "tfcompose: 1\nrobot: r\nargs: {n: {default: 2, min: 0, max: 9}}\nframes:\n "
+        f" base_link: {{}}\n{rows}"
     )
     printed = tfcompose("lint", file, code=1).stdout
     assert [n for n in (0, 2, 3, 9) if f"note: with n:={n}" in printed] == [0, 2, 9]

@@ -13,8 +13,8 @@ from tests.support.shell import PROMPT, Shell
 from tfcompose.cli.commands.completion import SCRIPTS
 from tfcompose.cli.parser import COMMANDS, GROUPS, summary_of
 from tfcompose.launcher.runtime_dir import Lock, runtime_dir_of
-from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.plan.file import write_plan
+from tfcompose.model.plan import Plan, PlanProcess, RosSettings
+from tfcompose.model.plan.file import write_plan
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 CELL = """\
@@ -66,7 +66,10 @@ def test_a_word_is_completed(line: str, tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     words = line.split(" ")
     done = tfcompose_in(ROBOTS, "completion", "--at", len(words), "--", "tfcompose", *words)
-    assert (done.returncode, set(done.stdout.split())) == (int(line in FILES), (CASES | FILES)[line])
+    assert (done.returncode, set(done.stdout.split())) == (
+        int(line in FILES),
+        (CASES | FILES)[line],
+    )
 
 
 LINES = {
@@ -94,7 +97,8 @@ def test_a_place_outside_of_the_line_has_nothing(at: int, tmp_path: Path) -> Non
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-#: What is typed before the tab key, and the line after it; a frame, a file, a preset, a code, a robot, a process.
+#: What is typed before the tab key, and the line after it; a frame, a file, a preset, a code, a
+#: robot, a process.
 TYPED = {
     "tfcompose li": "lint ",
     "tfcompose pose cell.yaml too": "tool0 ",
@@ -145,7 +149,9 @@ def test_a_shell_on_a_terminal_completes_words_at_the_tab_key(name: str, folder:
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m tfcompose "$@"\n', "utf-8")
     program.chmod(0o755)
     path = f"{program.parent}:{os.environ['PATH']}"
-    shell = Shell(folder, name, PATH=path, HOME=str(folder), PYTHONPATH=str(ROBOTS.parent), LC_ALL="C.UTF-8")
+    shell = Shell(
+        folder, name, PATH=path, HOME=str(folder), PYTHONPATH=str(ROBOTS.parent), LC_ALL="C.UTF-8"
+    )
     try:
         shell.type(f"{SETUP[name]}\r")
         for typed, completed in TYPED.items():
@@ -161,7 +167,9 @@ def test_a_shell_on_a_terminal_completes_words_at_the_tab_key(name: str, folder:
 
 def test_there_is_a_script_for_each_shell_and_for_no_other(tmp_path: Path) -> None:
     assert SCRIPTS.keys() == SETUP.keys()
-    assert all(tfcompose_in(tmp_path, "completion", shell).stdout == SCRIPTS[shell] for shell in SCRIPTS)
+    assert all(
+        tfcompose_in(tmp_path, "completion", shell).stdout == SCRIPTS[shell] for shell in SCRIPTS
+    )
     assert tfcompose_in(tmp_path, "completion", "csh").returncode == 2
 
 
@@ -176,9 +184,19 @@ def test_help_groups_every_command_once_and_help_of_a_command_is_its_page(tmp_pa
 
 
 def test_the_option_or_command_that_is_near_is_named_and_a_far_one_is_not(tmp_path: Path) -> None:
-    for words, near in (("up --detached", "--detach?"), ("lnt", "lint?"), ("lint --fromat=json", "--format?")):
+    for words, near in (
+        ("up --detached", "--detach?"),
+        ("lnt", "lint?"),
+        ("lint --fromat=json", "--format?"),
+    ):
         done = tfcompose_in(tmp_path, *words.split())
         assert (done.returncode, near in done.stderr) == (2, True), done.stderr
-    for words in ("version", "up --xyzzy", "export launch -o", "lint --select XX1", "graph --direction up"):
+    for words in (
+        "version",
+        "up --xyzzy",
+        "export launch -o",
+        "lint --select XX1",
+        "graph --direction up",
+    ):
         done = tfcompose_in(tmp_path, *words.split())
         assert (done.returncode, "did you mean" in done.stderr) == (2, False), done.stderr

@@ -28,7 +28,9 @@ LATE = {"TF804", "TF805"}
 
 
 @pytest.fixture
-def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Any]]:
+def tfc(
+    domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Any]]:
     """Run a command to its end, in a folder and with a runtime folder of the test's own."""
     assert domain
     (tmp_path / "runtime").mkdir(mode=0o700)
@@ -102,7 +104,11 @@ def test_what_is_missing_when_the_time_is_over_is_reported_with_1_and_the_robot_
     (tmp_path / "robot.yaml").write_text(EXTERNAL)
     up = tfc("up", "--wait", "--timeout", "12")
     assert up.returncode == 1
-    assert [name in up.stderr for name in ("drive", "static", "odom → base_link")] == [True, False, True]
+    assert [name in up.stderr for name in ("drive", "static", "odom → base_link")] == [
+        True,
+        False,
+        True,
+    ]
     assert ps(tfc)["static"]["state"] == "running"
 
 
@@ -134,7 +140,11 @@ def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobod
     after = ps(tfc)
     assert after["guard"]["pid"] == before["guard"]["pid"]
     assert after["static"]["pid"] != before["static"]["pid"]
-    assert {line.split("] ")[1].split()[0] for line in tfc("logs").stdout.splitlines() if "[TF8" in line} == {"hangs"}
+    assert {
+        line.split("] ")[1].split()[0]
+        for line in tfc("logs").stdout.splitlines()
+        if "[TF8" in line
+    } == {"hangs"}
     assert " drive?" in tfc("restart", "driv").stderr
 
 
@@ -250,13 +260,18 @@ def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
         elsewhere.setenv("XDG_RUNTIME_DIR", str(tmp_path / "other"))
         second = tfc("up", "--for", "3")
         assert (second.returncode, second.stdout) == (1, "")
-        assert f" pid {launcher_of(tmp_path)}, with XDG_RUNTIME_DIR={tmp_path}/runtime" in second.stderr
+        assert (
+            f" pid {launcher_of(tmp_path)}, with XDG_RUNTIME_DIR={tmp_path}/runtime"
+            in second.stderr
+        )
         down = tfc("down", "--leftovers")
         assert (down.returncode, down.stdout.split()[0]) == (0, "0")
     assert {process["state"] for process in ps(tfc).values()} == {"running"}
 
 
-def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the_way(tfc: Callable[..., Any]) -> None:
+def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the_way(
+    tfc: Callable[..., Any],
+) -> None:
     assert tfc("up", "--wait").returncode == 0
     (robot,) = json.loads(tfc("ps", "--format", "json").stdout)
     below = psutil.Process(robot["launcher"]).children(recursive=True)
@@ -286,14 +301,22 @@ def test_events_are_reported_from_the_start_and_wait_returns_the_exit_code(
     assert kinds[-1] == "Ended"
     found = [event["found"] for event in events if event["event"] == "FindingShown"]
     (found,) = [one for one in found if one["code"] not in LATE]
-    assert (found["code"], found["message"].split()[0], found["message"].split()[-1]) == ("TF808", "static", "SIGKILL")
+    assert (found["code"], found["message"].split()[0], found["message"].split()[-1]) == (
+        "TF808",
+        "static",
+        "SIGKILL",
+    )
 
 
 @pytest.mark.parametrize("words", [("events",), ("logs", "-f")])
-def test_who_follows_ends_when_nobody_reads_it_any_more(tfc: Callable[..., Any], words: tuple[str, ...]) -> None:
+def test_who_follows_ends_when_nobody_reads_it_any_more(
+    tfc: Callable[..., Any], words: tuple[str, ...]
+) -> None:
     """``tfcompose logs -f | grep -m1 complete``: nothing more may ever be written."""
     assert tfc("up", "--wait").returncode == 0
-    with processes.start([sys.executable, "-m", "tfcompose", *words], stdout=subprocess.PIPE) as follower:
+    with processes.start(
+        [sys.executable, "-m", "tfcompose", *words], stdout=subprocess.PIPE
+    ) as follower:
         assert follower.stdout
         while "all ready after" not in follower.stdout.readline():
             pass
@@ -325,7 +348,9 @@ def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
     assert "folder   ${build_dir}/../.." in first.stdout
     assert not (tmp_path / "build").exists()
     assert str(tmp_path) not in first.stdout
-    assert [word in first.stdout for word in ("${python}", "${plan}", "odom → base_link", "20 Hz")] == [True] * 4
+    assert [
+        word in first.stdout for word in ("${python}", "${plan}", "odom → base_link", "20 Hz")
+    ] == [True] * 4
     tfc("build")
     assert tfc("up", "build/rover/plan.json", "--dry-run").stdout == first.stdout
 
@@ -357,13 +382,19 @@ def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(
     assert until(lambda: tfc("ps", "--robot", "rover").returncode == 0)
 
 
-def test_verify_and_doctor_take_the_plan_of_the_robot_that_runs_here(tfc: Callable[..., Any], tmp_path: Path) -> None:
+def test_verify_and_doctor_take_the_plan_of_the_robot_that_runs_here(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
     assert tfc("up", "--wait").returncode == 0
     (tmp_path / "robot.yaml").unlink()
     verified = tfc("verify", "--for", "2")
-    assert (verified.returncode, verified.stdout.count("2 of 2")) == (0, 1), verified.stdout + verified.stderr
+    assert (verified.returncode, verified.stdout.count("2 of 2")) == (0, 1), (
+        verified.stdout + verified.stderr
+    )
     assert "rover@" in verified.stderr
-    drive = next(name for name, process in ps(tfc).items() if process["edges"] and name != "static")
+    drive = next(
+        name for name, process in ps(tfc).items() if process["edges"] and name != "static"
+    )
     assert tfc("stop", drive).returncode == 0
     examined = tfc("doctor", "--for", "3")
     assert "rover@" in examined.stderr

@@ -7,12 +7,17 @@ import pytest
 from tests.support.cli import tfcompose_in
 from tfcompose.cli.commands import tree
 from tfcompose.cli.console import Console
-from tfcompose.findings import Note, finding
-from tfcompose.ipc import Ended, FindingShown, LogLine
-from tfcompose.plan import OutputPlace, Plan, PlanProcess, RosSettings
+from tfcompose.foundation.findings import Note, finding
+from tfcompose.model.messages import Ended, FindingShown, LogLine
+from tfcompose.model.plan import OutputPlace, Plan, PlanProcess, RosSettings
 
 PLAN = Plan("rover", "", None, RosSettings(), (), (PlanProcess("drive", "run"),))
-FAILED = finding("TF808", "drive ended with exit code 1", None, notes=[Note("drive: boom"), Note("it ran for 2 s")])
+FAILED = finding(
+    "TF808",
+    "drive ended with exit code 1",
+    None,
+    notes=[Note("drive: boom"), Note("it ran for 2 s")],
+)
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
@@ -30,7 +35,11 @@ class Printed:
 def test_lines_that_were_printed_are_not_quoted_again() -> None:
     output = Printed()
     console = Console(PLAN, output, colour=False)
-    for notice in (LogLine("drive", "stderr", "boom"), FindingShown(FAILED), Ended(1, ("drive ended", "drive: boom"))):
+    for notice in (
+        LogLine("drive", "stderr", "boom"),
+        FindingShown(FAILED),
+        Ended(1, ("drive ended", "drive: boom")),
+    ):
         console(notice)
     assert output.text.count("boom") == 1
     assert "it ran for 2 s" in output.text
@@ -43,13 +52,16 @@ def test_lines_that_were_not_printed_are_quoted() -> None:
     assert output.text.count("boom") == 1
 
 
-def test_a_tree_on_a_terminal_has_each_frame_in_its_place_and_does_not_wrap(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tree_on_a_terminal_has_each_frame_in_its_place_and_does_not_wrap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     full = tfcompose_in(ROBOTS, "tree", "autonomous_robot.yaml").stdout.splitlines()
     monkeypatch.setattr(tree, "table_width", lambda _stream: 80)
     fitted = tfcompose_in(ROBOTS, "tree", "autonomous_robot.yaml").stdout.splitlines()
     assert max(map(len, full)) > 80 > max(map(len, fitted))
     names, fitted_names = (
-        [line.split("── ")[1].split()[0] for line in lines if "── " in line] for lines in (full, fitted)
+        [line.split("── ")[1].split()[0] for line in lines if "── " in line]
+        for lines in (full, fitted)
     )
     assert fitted_names == names
 
@@ -59,11 +71,15 @@ def test_a_process_writes_to_the_terminal_or_into_its_log_as_its_output_says() -
     processes = tuple(PlanProcess(f"to_{place}", "run", output=place) for place in outputs)
     output, kept = Printed(), dict[str, str]()
     plan = Plan("rover", "", None, RosSettings(), (), processes)
-    console = Console(plan, output, colour=False, keep=lambda name, text: kept.update({name: text}))
+    console = Console(
+        plan, output, colour=False, keep=lambda name, text: kept.update({name: text})
+    )
     for one in processes:
         console(LogLine(one.name, "stdout", f"line of {one.name}"))
     assert kept == {name: f"line of {name}" for name in ("to_both", "to_log")}
-    assert [name for name in ("to_both", "to_log", "to_screen") if f"line of {name}" in output.text] == [
+    assert [
+        name for name in ("to_both", "to_log", "to_screen") if f"line of {name}" in output.text
+    ] == [
         "to_both",
         "to_screen",
     ]

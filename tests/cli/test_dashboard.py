@@ -11,10 +11,18 @@ from hypothesis import strategies as st
 
 from tfcompose.cli.dashboard import KEPT_LINES, Dashboard
 from tfcompose.cli.screen import Keys
-from tfcompose.findings import Note, finding
-from tfcompose.geometry import Pose
-from tfcompose.ipc import Ended, FindingShown, OwnerLive, ProcessStatus, RecoveredShown, RobotStatus, Stopping
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.foundation.findings import Note, finding
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.messages import (
+    Ended,
+    FindingShown,
+    OwnerLive,
+    ProcessStatus,
+    RecoveredShown,
+    RobotStatus,
+    Stopping,
+)
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -23,14 +31,52 @@ if TYPE_CHECKING:
 
 NOON = 1_800_000_000.0
 #: A process that runs and is ready, in the order of the class.
-RUNNING = ProcessStatus("", "run", None, "running", "", True, False, True, "", "", 4711, 3725.0, 0, 0, 0, ())  # noqa: FBT003
-PAGES: dict[Page, str] = {"processes": "esc", "log": "1", "edges": "e", "findings": "f", "help": "?"}
-TAKEN = finding("TF801", "map → odom is also published by /slam_old", None, notes=[Note("pid 77")], help="end it")
+RUNNING = ProcessStatus(
+    "",
+    "run",
+    None,
+    "running",
+    "",
+    True,  # noqa: FBT003
+    False,  # noqa: FBT003
+    True,  # noqa: FBT003
+    "",
+    "",
+    4711,
+    3725.0,
+    0,
+    0,
+    0,
+    (),
+)
+PAGES: dict[Page, str] = {
+    "processes": "esc",
+    "log": "1",
+    "edges": "e",
+    "findings": "f",
+    "help": "?",
+}
+TAKEN = finding(
+    "TF801",
+    "map → odom is also published by /slam_old",
+    None,
+    notes=[Note("pid 77")],
+    help="end it",
+)
 
 
 def edge_of(number: int) -> PlanEdge:
     source = SourceLine("r.yaml", 1)
-    return PlanEdge(f"frame_{number}", f"frame_{number + 1}", "dynamic", "drive", "/drive", Pose(), 50.0, source)
+    return PlanEdge(
+        f"frame_{number}",
+        f"frame_{number + 1}",
+        "dynamic",
+        "drive",
+        "/drive",
+        Pose(),
+        50.0,
+        source,
+    )
 
 
 def dashboard(count: int = 3, edges: int = 2, **changes: object) -> Dashboard:
@@ -43,7 +89,12 @@ def dashboard(count: int = 3, edges: int = 2, **changes: object) -> Dashboard:
         missing=(), silent=(), processes=tuple(states),
     )  # fmt: skip
     plan = Plan(
-        "rover", "", None, RosSettings(), tuple(map(edge_of, range(edges))), tuple(PlanProcess(n, "run") for n in names)
+        "rover",
+        "",
+        None,
+        RosSettings(),
+        tuple(map(edge_of, range(edges))),
+        tuple(PlanProcess(n, "run") for n in names),
     )
     return Dashboard("rover@0", plan, clock=lambda: NOON, status=replace(status, **changes))  # type: ignore[arg-type]
 
@@ -104,12 +155,16 @@ def test_a_finding_is_on_the_first_page_at_once_and_with_its_help_on_its_own() -
     assert "end it" not in text
     view.take(RecoveredShown("map → odom: /slam_old has ended", 3.0), NOON)
     assert {"TF801", "pid 77", "end it", "has ended"} <= {
-        word for word in ("TF801", "pid 77", "end it", "has ended") if word in shown(open_page(view, "findings"))
+        word
+        for word in ("TF801", "pid 77", "end it", "has ended")
+        if word in shown(open_page(view, "findings"))
     }
 
 
 def test_edges_that_are_not_live_come_first() -> None:
-    view = dashboard(3, 40, missing=("frame_30 → frame_31",), silent=("frame_35 → frame_36",), complete=False)
+    view = dashboard(
+        3, 40, missing=("frame_30 → frame_31",), silent=("frame_35 → frame_36",), complete=False
+    )
     lines = shown(open_page(view, "edges")).splitlines()[2:4]
     assert ["not live" in lines[0], "silent" in lines[1]] == [True, True]
     assert "frame_30" in lines[0]
@@ -198,12 +253,29 @@ def test_the_end_is_remembered() -> None:
     assert view.ended == Ended(0)
 
 
-KEYS = [*"qefgh?lkj0123456789 x", "up", "down", "left", "right", "pgup", "pgdn", "home", "end", "esc", "enter", ""]
+KEYS = [
+    *"qefgh?lkj0123456789 x",
+    "up",
+    "down",
+    "left",
+    "right",
+    "pgup",
+    "pgdn",
+    "home",
+    "end",
+    "esc",
+    "enter",
+    "",
+]
 
 
 @given(st.lists(st.sampled_from(KEYS), max_size=30), st.integers(0, 12), st.sampled_from(SIZES))
 def test_no_keys_break_the_view(keys: list[str], count: int, size: tuple[int, int]) -> None:
-    view = dashboard(count) if count else Dashboard("rover@0", Plan("rover", "", None, RosSettings(), (), ()))
+    view = (
+        dashboard(count)
+        if count
+        else Dashboard("rover@0", Plan("rover", "", None, RosSettings(), (), ()))
+    )
     for key in keys:
         view.press(key)
         assert len(view.lines(*size)) == size[1]
@@ -223,15 +295,24 @@ def test_keys_are_known_in_pieces_and_in_the_forms_that_terminals_send() -> None
 
 def test_what_was_printed_before_the_view_is_among_its_events_after_each_connection() -> None:
     plan = Plan("rover", "", None, RosSettings(), (), ())
-    view = Dashboard("rover@0", plan, (), ["an earlier run left 77 behind\033[2J"], clock=lambda: NOON)
+    view = Dashboard(
+        "rover@0", plan, (), ["an earlier run left 77 behind\033[2J"], clock=lambda: NOON
+    )
     assert "WARNING an earlier run left 77 behind" in shown(view)
     view.forget()
     assert shown(view).count("an earlier run left 77 behind") == 1
 
 
-def test_what_the_build_found_is_among_the_findings_also_after_the_connection_is_made_again() -> None:
+def test_what_the_build_found_is_among_the_findings_also_after_the_connection_is_made_again() -> (
+    None
+):
     view = dashboard()
-    view = Dashboard("rover@0", view.plan, [replace(TAKEN, code="TF508", severity="warning")], clock=lambda: NOON)
+    view = Dashboard(
+        "rover@0",
+        view.plan,
+        [replace(TAKEN, code="TF508", severity="warning")],
+        clock=lambda: NOON,
+    )
     for _ in range(2):
         assert "1 warning" in shown(view).splitlines()[0]
         assert "TF508" in shown(view)

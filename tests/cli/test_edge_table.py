@@ -3,8 +3,8 @@
 import pytest
 
 from tfcompose.cli.edge_table import lines_of
-from tfcompose.live.edges import TreeObserver
-from tfcompose.live.publishers import Publisher
+from tfcompose.tf.live.edges import TreeObserver
+from tfcompose.tf.live.publishers import Publisher
 
 SECOND = 1_000_000_000
 

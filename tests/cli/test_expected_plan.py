@@ -9,7 +9,7 @@ import pytest
 
 from tfcompose.cli import main
 from tfcompose.cli.commands import doctor
-from tfcompose.plan import Plan
+from tfcompose.model.plan import Plan
 
 ROBOT = Path(__file__).parents[2] / "robots" / "my_robot.yaml"
 
@@ -19,7 +19,9 @@ def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan | None]:
     """Have the doctor look at nothing; the plan that it would have judged by comes here."""
     known: list[Plan | None] = []
 
-    def plan(arguments: Namespace, real: Callable[[Namespace], Plan | None] = doctor._plan) -> NoReturn:
+    def plan(
+        arguments: Namespace, real: Callable[[Namespace], Plan | None] = doctor._plan
+    ) -> NoReturn:
         known.append(real(arguments))
         raise SystemExit(77)
 
@@ -28,7 +30,9 @@ def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan | None]:
 
 
 @pytest.mark.ros
-def test_the_doctor_expects_frames_by_their_names_on_the_live_tree(plans: list[Plan | None]) -> None:
+def test_the_doctor_expects_frames_by_their_names_on_the_live_tree(
+    plans: list[Plan | None],
+) -> None:
     words = ["doctor", str(ROBOT), "--set", "ros.frame_prefix=r1/"]
     assert main(words) == 77
     assert plans[0]

@@ -19,10 +19,14 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("kind", ["systemd", "compose", "launch"])
-def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_complete(robot: Path, kind: str) -> None:
+def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_complete(
+    robot: Path, kind: str
+) -> None:
     assert main(["build"]) == 0
     build = robot / "build" / "rover"
-    before = {file.relative_to(build): file.read_bytes() for file in build.rglob("*") if file.is_file()}
+    before = {
+        file.relative_to(build): file.read_bytes() for file in build.rglob("*") if file.is_file()
+    }
     exports = []
     for words in (["build/rover/plan.json"], ["build/rover"], []):
         assert main(["export", kind, *words]) == 0
@@ -32,7 +36,9 @@ def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_com
     assert Path("params/drive.yaml") in before
 
 
-def test_a_built_folder_is_started_as_its_plan_is(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_built_folder_is_started_as_its_plan_is(
+    robot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["build"]) == 0
     printed = []
     for file in ("build/rover/plan.json", "build/rover"):
@@ -44,7 +50,9 @@ def test_a_built_folder_is_started_as_its_plan_is(robot: Path, capsys: pytest.Ca
     assert main(["up", "empty", "--dry-run"]) == 2
 
 
-def test_a_hosts_share_is_exported_without_the_others(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_hosts_share_is_exported_without_the_others(
+    robot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     def services(*words: str) -> set[str]:
         assert main(["export", "compose", "two.yaml", *words]) == 0
         text = (robot / "build" / "rover" / "compose" / "compose.yaml").read_text("utf-8")
@@ -60,11 +68,19 @@ def test_a_hosts_share_is_exported_without_the_others(robot: Path, capsys: pytes
 
 
 def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
-    words = ["--at", "/opt/rover", "--python", "/usr/bin/python3", "--setup", "/opt/ros/jazzy/setup.bash"]
+    words = [
+        "--at",
+        "/opt/rover",
+        "--python",
+        "/usr/bin/python3",
+        "--setup",
+        "/opt/ros/jazzy/setup.bash",
+    ]
     assert main(["export", "systemd", *words]) == 0
     unit = (robot / "build" / "rover" / "systemd" / "rover-static.service").read_text("utf-8")
     assert (
-        "/opt/ros/jazzy/setup.bash -- /usr/bin/python3 -m tfcompose.launcher.exec /opt/rover/plan.json static\n" in unit
+        "/opt/ros/jazzy/setup.bash -- /usr/bin/python3 -m tfcompose.launcher.exec"
+        " /opt/rover/plan.json static\n" in unit
     )
     assert str(robot) not in unit
     assert "PATH" not in unit, "the setup file says it"
@@ -73,7 +89,9 @@ def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
 STRICT = ["--set", "guard.mode=strict"]
 
 
-def test_units_of_a_declared_host_have_its_python_and_setup_unless_others_are_given(robot: Path) -> None:
+def test_units_of_a_declared_host_have_its_python_and_setup_unless_others_are_given(
+    robot: Path,
+) -> None:
     declared = "hosts: {jetson: {python: /opt/py, setup: [/opt/a.bash, /opt/b.bash]}, main: {}}\n"
     (robot / "two.yaml").write_text(
         ON_TWO_HOSTS.replace("processes:", f"{declared}processes:\n  static: {{host: main}}")
@@ -82,7 +100,9 @@ def test_units_of_a_declared_host_have_its_python_and_setup_unless_others_are_gi
     assert main(["export", "systemd", "two.yaml", "--host", "jetson"]) == 0
     assert "/opt/a.bash /opt/b.bash" in unit.read_text("utf-8")
     assert "/opt/py -m tfcompose" in unit.read_text("utf-8")
-    assert main(["export", "systemd", "two.yaml", "--host", "jetson", "--python", "/usr/bin/py"]) == 0
+    assert (
+        main(["export", "systemd", "two.yaml", "--host", "jetson", "--python", "/usr/bin/py"]) == 0
+    )
     assert "/usr/bin/py -m tfcompose" in unit.read_text("utf-8")
 
 
@@ -100,7 +120,9 @@ def test_a_strict_plan_is_exported_where_a_guard_runs_and_every_owner_can_be_fen
     assert main(["export", "compose", *STRICT]) == 0
     assert "fence" in words_of(capsys.readouterr().out)
     file = robot / "robot.yaml"
-    text = file.read_text("utf-8").replace("run: [slam, --now]", "run: slam | tee log, shell: true")
+    text = file.read_text("utf-8").replace(
+        "run: [slam, --now]", "run: slam | tee log, shell: true"
+    )
     file.write_text(text, "utf-8")
     assert main(["export", "systemd", *STRICT]) == 1
     assert "slam" in words_of(capsys.readouterr().err)
@@ -108,7 +130,8 @@ def test_a_strict_plan_is_exported_where_a_guard_runs_and_every_owner_can_be_fen
 
 
 @pytest.mark.parametrize(
-    ("words", "code"), [(["nothere.yaml"], 2), (["nothere.json"], 2), (["plan.json", "--profile", "demo"], 2)]
+    ("words", "code"),
+    [(["nothere.yaml"], 2), (["nothere.json"], 2), (["plan.json", "--profile", "demo"], 2)],
 )
 def test_what_cannot_be_exported_writes_nothing(robot: Path, words: list[str], code: int) -> None:
     assert main(["export", "launch", *words]) == code

@@ -17,14 +17,24 @@ from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import Fixer, rewrite
-from tfcompose.compile import compile_robot
-from tfcompose.findings import Edit, Finding, RejectedError, Span, edited, finding, slip_of
-from tfcompose.language import with_includes
-from tfcompose.load import load
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.foundation.findings import (
+    Edit,
+    Finding,
+    RejectedError,
+    Span,
+    edited,
+    finding,
+    slip_of,
+)
+from tfcompose.spec.language import with_includes
+from tfcompose.spec.load import load
 
 HEAD = "tfcompose: 1  # version\nrobot: r\n"
 PRESETS = library()
-EXAMPLES_OF_ROBOTS = [file.read_text("utf-8") for file in (Path(__file__).parents[2] / "robots").glob("*.yaml")]
+EXAMPLES_OF_ROBOTS = [
+    file.read_text("utf-8") for file in (Path(__file__).parents[2] / "robots").glob("*.yaml")
+]
 #: Those of one file.
 ROBOTS = [text for text in EXAMPLES_OF_ROBOTS if "\nparts:" not in text]
 
@@ -53,8 +63,14 @@ OPTICAL = f"{LINK}  camera_optical_frame"
 SHARED = f"{LINK}  p: {{parent: base_link}}\n  camera_optical_frame"
 EXAMPLES = {
     "a key": ("links: {a: {}, b: {parnet: a}} # c\n", "links: {a: {}, b: {parent: a}} # c\n"),
-    "a key in quotes": ("links: {a: {}, b: {'parnet' : a}}\n", "links: {a: {}, b: {'parent' : a}}\n"),
-    "a key in another case": ("links: {a: {}, b: {Parent: a}}\n", "links: {a: {}, b: {parent: a}}\n"),
+    "a key in quotes": (
+        "links: {a: {}, b: {'parnet' : a}}\n",
+        "links: {a: {}, b: {'parent' : a}}\n",
+    ),
+    "a key in another case": (
+        "links: {a: {}, b: {Parent: a}}\n",
+        "links: {a: {}, b: {parent: a}}\n",
+    ),
     "a section": ("link:  # bodies\n  a: {}\n", "links:  # bodies\n  a: {}\n"),
     "two keys at once": (
         "links: {a: {}, b: {paent: a, yxz: [1, 0, 0]}}\n",
@@ -72,15 +88,24 @@ EXAMPLES = {
     ),
     "an optical frame in lines": (
         f"{OPTICAL}:\n      parent: camera_link   # where\n      xyz: [0, 0, 1]\n",
-        f"{OPTICAL}:\n      parent: camera_link   # where\n      rpy: [-90 deg, 0, -90 deg]\n      xyz: [0, 0, 1]\n",
+        (
+            f"{OPTICAL}:\n      parent: camera_link   # where\n      rpy: [-90 deg, 0, -90 deg]\n "
+            "     xyz: [0, 0, 1]\n"
+        ),
     ),
     "an optical frame at the end of a file that does not end its line": (
         f"{OPTICAL}:\n    parent: camera_link",
         f"{OPTICAL}:\n    parent: camera_link\n    rpy: [-90 deg, 0, -90 deg]",
     ),
     "an optical frame that is off, as a list of lines": (
-        f"{OPTICAL}:\n    parent: camera_link\n    rpy:\n    - -1.5  # a\n    - 0\n    - -1.6\n    # b\n",
-        f"{OPTICAL}:\n    parent: camera_link\n    rpy:\n    - -90 deg  # a\n    - 0\n    - -90 deg\n    # b\n",
+        (
+            f"{OPTICAL}:\n    parent: camera_link\n    rpy:\n    - -1.5  # a\n    - 0\n    -"
+            " -1.6\n    # b\n"
+        ),
+        (
+            f"{OPTICAL}:\n    parent: camera_link\n    rpy:\n    - -90 deg  # a\n    - 0\n    -"
+            " -90 deg\n    # b\n"
+        ),
     ),
     "an optical frame with a quaternion": (
         f"{OPTICAL}: {{parent: camera_link, quat_xyzw: [0, 0, 0, 1]}}\n",
@@ -99,8 +124,14 @@ EXAMPLES = {
         f"{OPTICAL}: {{parent: camera_link, look: forward}}\n",
     ),
     "an optical frame of which one angle is right, and shared": (
-        f"{SHARED}: {{parent: camera_link, rpy: [-90 deg, &z 0, -1.5]}}\n  q: {{parent: p, rpy: [*z, 1, 1]}}\n",
-        f"{SHARED}: {{parent: camera_link, rpy: [-90 deg, &z 0, -90 deg]}}\n  q: {{parent: p, rpy: [*z, 1, 1]}}\n",
+        (
+            f"{SHARED}: {{parent: camera_link, rpy: [-90 deg, &z 0, -1.5]}}\n  q: {{parent: p,"
+            " rpy: [*z, 1, 1]}\n"
+        ),
+        (
+            f"{SHARED}: {{parent: camera_link, rpy: [-90 deg, &z 0, -90 deg]}}\n  q: {{parent: p,"
+            " rpy: [*z, 1, 1]}\n"
+        ),
     ),
     "what is safe beside what is not": (
         "links: {a: {}, b: {parnet: c}, d: {parnet: a}, e: {parnet: f}, g: {parnet: a}}\n",
@@ -116,14 +147,18 @@ EXAMPLES = {
 @pytest.mark.parametrize("name", EXAMPLES)
 @pytest.mark.parametrize("newline", ["\n", "\r\n"], ids=["LF", "CRLF"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["", "BOM"])
-def test_it_writes_what_is_meant_and_keeps_all_other_bytes(name: str, newline: str, mark: str, tmp_path: Path) -> None:
+def test_it_writes_what_is_meant_and_keeps_all_other_bytes(
+    name: str, newline: str, mark: str, tmp_path: Path
+) -> None:
     before, after = (mark + (HEAD + text).replace("\n", newline) for text in EXAMPLES[name])
     assert fixed(tmp_path, before) == after
 
 
 UNSAFE = {
     "the right key is there already": "links: {a: {}, b: {parnet: a, parent: a}}\n",
-    "two keys would become one": "links: {a: {}, b: {parent: a, xxyz: [0, 0, 0], xyzz: [0, 0, 0]}}\n",
+    "two keys would become one": (
+        "links: {a: {}, b: {parent: a, xxyz: [0, 0, 0], xyzz: [0, 0, 0]}}\n"
+    ),
     "no key is near": "links: {a: {}, b: {parent: a, colour: red}}\n",
     "the key would exclude another": "links: {a: {}, b: {parent: a, rpyy: [0, 0, 0], look: up}}\n",
     "two units are near": "links: {a: {}, b: {parent: a, xyz: [0, 3 cmm, 1]}}\n",
@@ -131,7 +166,10 @@ UNSAFE = {
     "an unknown parent": "links: {base_link: {}, b: {parent: base_lnk}}\n",
     "an unknown owner": "links: {a: {}, b: {parent: a, owner: statc}}\n",
     "an unknown preset": "links: {a: {}}\nsensors: {s: {preset: generic/imuu, parent: a}}\n",
-    "an unknown option": "links: {a: {}}\nsensors: {s: {preset: realsense/d435i, parent: a, options: {imuu: true}}}\n",
+    "an unknown option": (
+        "links: {a: {}}\nsensors: {s: {preset: realsense/d435i, parent: a, options: {imuu:"
+        " true}}}\n"
+    ),
     "a fault comes to light": "links: {a: {}, b: {parnet: c}}\n",
     "an optical frame with a tilt": f"{OPTICAL}: {{parent: camera_link, look: {{down: 3 deg}}}}\n",
     "a rotation that others share": (
@@ -148,14 +186,19 @@ UNSAFE = {
 def test_where_the_answer_is_not_safe_the_file_stays_as_it_is(why: str, tmp_path: Path) -> None:
     text = HEAD + UNSAFE[why]
     assert fixed(tmp_path, text) == text
-    assert lint(str(tmp_path / "r.yaml"), lambda file: Path(file).read_text("utf-8")), "there is something to say"
+    assert lint(str(tmp_path / "r.yaml"), lambda file: Path(file).read_text("utf-8")), (
+        "there is something to say"
+    )
 
 
 def test_a_slip_of_the_pen_is_one_character_and_has_one_answer() -> None:
-    assert [slip_of(word, ["parent", "xyz"]) for word in ("parnet", "paret", "pparent", "pxrent", "PARENT")] == [
-        "parent"
-    ] * 5
-    assert [slip_of(word, ["parent", "xyz"]) for word in ("prnt", "parentss", "x", "parent", "")] == [None] * 5
+    assert [
+        slip_of(word, ["parent", "xyz"])
+        for word in ("parnet", "paret", "pparent", "pxrent", "PARENT")
+    ] == ["parent"] * 5
+    assert [
+        slip_of(word, ["parent", "xyz"]) for word in ("prnt", "parentss", "x", "parent", "")
+    ] == [None] * 5
     assert slip_of("cmm", ["cm", "mm"]) is None
     assert slip_of("CM", ["cm", "mm", "m"]) == "cm"
 
@@ -216,9 +259,9 @@ def test_an_included_file_is_edited_only_where_it_is_named(tmp_path: Path) -> No
 
 def test_a_file_that_cannot_be_saved_is_one_sentence_and_exit_2(tmp_path: Path) -> None:
     program = (
-        "import errno, os, sys\nfrom pathlib import Path\n"
-        "def full(_): raise OSError(errno.ENOSPC, 'No space left on device', 'r.yaml')\n"
-        "os.fsync = full\nfrom tfcompose.cli import main\nsys.exit(main(['lint', '--fix', 'r.yaml']))"
+        "import errno, os, sys\nfrom pathlib import Path\ndef full(_): raise OSError(errno.ENOSPC,"
+        " 'No space left on device', 'r.yaml')\nos.fsync = full\nfrom tfcompose.cli import"
+        " main\nsys.exit(main(['lint', '--fix', 'r.yaml']))"
     )
     text = HEAD + EXAMPLES["a key"][0]
     (tmp_path / "r.yaml").write_text(text)
@@ -234,7 +277,9 @@ def test_an_edit_that_takes_nothing_away_is_not_kept(tmp_path: Path) -> None:
     file = tmp_path / "r.yaml"
     file.write_text("word")
     span = Span(str(file), 1, 1, 1, 5)
-    fixer = Fixer([str(file)], lambda *_: [finding("TF101", "still here", span, edits=[Edit(span, "other")])])
+    fixer = Fixer(
+        [str(file)], lambda *_: [finding("TF101", "still here", span, edits=[Edit(span, "other")])]
+    )
     assert [one.message for one in fixer.fix(str(file))] == ["still here"]
     assert (fixer.texts, fixer.fixed) == ({}, [])
 
@@ -260,7 +305,9 @@ def slipped(draw: st.DrawFn) -> str:
     text = draw(st.sampled_from(ROBOTS))
     for _ in range(draw(st.integers(1, 4))):
         words = [
-            found for found in re.finditer(r"[A-Za-z_]{2,}", text) if text[found.end() : found.end() + 1] in ":,]}"
+            found
+            for found in re.finditer(r"[A-Za-z_]{2,}", text)
+            if text[found.end() : found.end() + 1] in ":,]}"
         ]
         begin, end = draw(st.sampled_from(words)).span()
         at, char = draw(st.integers(begin, end - 1)), draw(st.sampled_from("aexyz"))
@@ -270,7 +317,9 @@ def slipped(draw: st.DrawFn) -> str:
 
 @given(slipped() | st.sampled_from([HEAD + before for before, _ in EXAMPLES.values()]))
 @settings(max_examples=150, deadline=None)
-def test_the_second_time_there_is_nothing_to_fix_and_the_first_time_brings_nothing_new(text: str) -> None:
+def test_the_second_time_there_is_nothing_to_fix_and_the_first_time_brings_nothing_new(
+    text: str,
+) -> None:
     def read(_: str) -> str:
         return text
 

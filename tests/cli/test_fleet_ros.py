@@ -12,8 +12,8 @@ pytestmark = pytest.mark.ros
 ROBOT = Path(__file__).parents[2] / "robots" / "two_rovers.yaml"
 STRANGER = """
 import sys, time
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
 topic, parent, child = sys.argv[1:]
 with open_node("stranger", "", args=["-r", f"/tf:={topic}"]) as node:
     publisher = TFPublisher(node, static=False)
@@ -30,10 +30,26 @@ def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_off
     robot = start("tfcompose", "up", ROBOT)
     robot.until_says("tree complete: 11 edges")
     assert robot.output.count("tree complete") == 1
-    observed = start("tfcompose", "echo", "rover1/base_link", "rover1/laser_link", "--once", "--namespace", "rover1")
+    observed = start(
+        "tfcompose",
+        "echo",
+        "rover1/base_link",
+        "rover1/laser_link",
+        "--once",
+        "--namespace",
+        "rover1",
+    )
     observed.until_says("xyz        [0.1000, 0.0000, 0.2000] m")
     missing = start(
-        "tfcompose", "echo", "rover2/base_link", "rover2/laser_link", "--once", "--namespace", "rover1", "--timeout", 2
+        "tfcompose",
+        "echo",
+        "rover2/base_link",
+        "rover2/laser_link",
+        "--once",
+        "--namespace",
+        "rover1",
+        "--timeout",
+        2,
     )
     assert missing.process.wait(60) == 1
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])

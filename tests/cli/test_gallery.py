@@ -33,8 +33,16 @@ def test_a_demo_starts_nothing_but_what_tfcompose_brings_along(robot: str, tmp_p
     assert built.returncode == 0, built.stderr
     plan = json.loads((tmp_path / "plan.json").read_text("utf-8"))
     assert {process["kind"] for process in plan["processes"]} <= OWN
-    assert all(edge["owner"] in {process["name"] for process in plan["processes"]} for edge in plan["edges"])
+    assert all(
+        edge["owner"] in {process["name"] for process in plan["processes"]}
+        for edge in plan["edges"]
+    )
 
 
 def test_every_robot_of_the_gallery_has_a_demo() -> None:
-    assert set(WITH_DEMO) >= {"car_roof.yaml", "field_rover.yaml", "house_robot.yaml", "picker.yaml"}
+    assert set(WITH_DEMO) >= {
+        "car_roof.yaml",
+        "field_rover.yaml",
+        "house_robot.yaml",
+        "picker.yaml",
+    }

@@ -16,9 +16,21 @@ LATE = {"TF804", "TF805"}
 
 
 @pytest.mark.parametrize("robot", ["car_roof", "field_rover", "house_robot", "picker"])
-def test_a_demo_runs_without_hardware(robot: str, start: Callable[..., Started], tmp_path: Path) -> None:
+def test_a_demo_runs_without_hardware(
+    robot: str, start: Callable[..., Started], tmp_path: Path
+) -> None:
     for _ in range(4):
-        up = start("tfcompose", "up", ROOT / f"robots/{robot}.yaml", "-p", "demo", "-o", tmp_path, "--for", 7)
+        up = start(
+            "tfcompose",
+            "up",
+            ROOT / f"robots/{robot}.yaml",
+            "-p",
+            "demo",
+            "-o",
+            tmp_path,
+            "--for",
+            7,
+        )
         code = up.process.wait(2 * TIMEOUT_S)
         up.close()
         found = set(re.findall(r"\[(TF\d+)\]", up.output))

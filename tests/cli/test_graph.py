@@ -11,13 +11,22 @@ from tests.support import processes
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "robots" / "two_rovers.yaml"
-BEGIN = {"svg": b"<svg ", "pdf": b"%PDF-1.4", "png": b"\x89PNG", "dot": b"digraph ", "mmd": b"flowchart LR"}
+BEGIN = {
+    "svg": b"<svg ",
+    "pdf": b"%PDF-1.4",
+    "png": b"\x89PNG",
+    "dot": b"digraph ",
+    "mmd": b"flowchart LR",
+}
 
 
 def graph(*words: object, cwd: Path, without: str = "") -> subprocess.CompletedProcess[str]:
     """Run the command, ``without`` a package."""
     hide = f"import sys; sys.modules[{without!r}] = None; " if without else ""
-    program = f"{hide}from tfcompose.cli import main; raise SystemExit(main({['graph', *map(str, words)]!r}))"
+    program = (
+        f"{hide}from tfcompose.cli import main; raise"
+        f" SystemExit(main({['graph', *map(str, words)]!r}))"
+    )
     return processes.run([sys.executable, "-c", program], cwd=cwd)
 
 
@@ -28,7 +37,9 @@ def test_the_suffix_decides_the_format(ending: str, tmp_path: Path) -> None:
     (saved,) = tmp_path.iterdir()
     assert saved.read_bytes().startswith(BEGIN[ending])
     (plain := tmp_path / "plain").touch()
-    assert saved.stat().st_mode == plain.stat().st_mode, "as readable as other files of this user's"
+    assert saved.stat().st_mode == plain.stat().st_mode, (
+        "as readable as other files of this user's"
+    )
 
 
 def test_without_options_it_writes_what_build_writes(tmp_path: Path) -> None:
@@ -46,9 +57,15 @@ def test_poses_are_drawn_on_request(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "named"),
-    [("tree.jpg", {".jpg", *BEGIN}), ("tree", {"tree", *BEGIN}), ("no/folder/tree.svg", {"no/folder"})],
+    [
+        ("tree.jpg", {".jpg", *BEGIN}),
+        ("tree", {"tree", *BEGIN}),
+        ("no/folder/tree.svg", {"no/folder"}),
+    ],
 )
-def test_what_cannot_be_saved_is_refused_in_one_line(name: str, named: set[str], tmp_path: Path) -> None:
+def test_what_cannot_be_saved_is_refused_in_one_line(
+    name: str, named: set[str], tmp_path: Path
+) -> None:
     done = graph(ROBOT, "-o", name, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
@@ -65,7 +82,9 @@ def test_without_the_package_only_png_is_refused_and_says_what_to_install(tmp_pa
 
 
 def test_a_robot_with_errors_is_not_drawn(tmp_path: Path) -> None:
-    (tmp_path / "bad.yaml").write_text("tfcompose: 1\nrobot: bad\nframes: {a: {parent: b}}\n", encoding="utf-8")
+    (tmp_path / "bad.yaml").write_text(
+        "tfcompose: 1\nrobot: bad\nframes: {a: {parent: b}}\n", encoding="utf-8"
+    )
     done = graph("bad.yaml", cwd=tmp_path)
     assert done.returncode == 1
     assert "error[TF" in done.stderr

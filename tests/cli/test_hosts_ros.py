@@ -20,7 +20,8 @@ def ps() -> dict[str, dict[str, str]]:
     shown = processes.run(words).stdout
     robots = json.loads(shown or "[]")
     return {
-        robot["name"].partition("@")[0]: {one["name"]: one["state"] for one in robot["processes"]} for robot in robots
+        robot["name"].partition("@")[0]: {one["name"]: one["state"] for one in robot["processes"]}
+        for robot in robots
     }
 
 
@@ -28,31 +29,49 @@ def test_two_hosts_start_their_shares_and_each_receives_the_entire_tree(
     start: Callable[..., Started], tmp_path: Path
 ) -> None:
     file = tmp_path / "rover.yaml"
-    file.write_text(ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
+    file.write_text(
+        ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8"
+    )
     main = start("tfcompose", "up", file, "-o", tmp_path / "a")
     main.until_says("expecting arm_drive (/arm_drive)")
     main.until_says("live  drive")
     jetson = start("tfcompose", "up", file, "--host", "jetson", "-o", tmp_path / "b")
-    assert until(lambda: "tree complete: 3 edges" in main.output and "tree complete: 3 edges" in jetson.output), (
-        main.output + jetson.output
-    )
+    assert until(
+        lambda: (
+            "tree complete: 3 edges" in main.output and "tree complete: 3 edges" in jetson.output
+        )
+    ), main.output + jetson.output
     shares = {
-        "rover": {"static": "running", "drive": "running", "arm_drive": "expected", "guard": "running"},
-        "rover.jetson": {"static": "expected", "drive": "expected", "arm_drive": "running", "guard": "running"},
+        "rover": {
+            "static": "running",
+            "drive": "running",
+            "arm_drive": "expected",
+            "guard": "running",
+        },
+        "rover.jetson": {
+            "static": "expected",
+            "drive": "expected",
+            "arm_drive": "running",
+            "guard": "running",
+        },
     }
     assert ps() == shares
     assert offences(main.output + jetson.output) == []
-    assert jetson.output.index("live  drive") < jetson.output.index("started arm_drive"), "it waits for another host's"
+    assert jetson.output.index("live  drive") < jetson.output.index("started arm_drive"), (
+        "it waits for another host's"
+    )
     assert jetson.end() == 0
-    assert until(lambda: "TF804" in main.output), "the guard on one host sees that the other's owner fell silent"
+    assert until(lambda: "TF804" in main.output), (
+        "the guard on one host sees that the other's owner fell silent"
+    )
     assert main.end() == 0
 
 
 #: A node that sends its own edge, and another machine's.
 LIAR = """
 import signal, sys, time
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("arm_drive", "/", args=sys.argv[2:]) as node:
     publisher = TFPublisher(node, static=False)
@@ -78,9 +97,11 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
     main = start("tfcompose", "up", file, "-o", tmp_path / "a")
     main.until_says("live  drive")
     jetson = start("tfcompose", "up", file, "--host", "jetson", "-o", tmp_path / "b")
-    assert until(lambda: "tree complete: 3 edges" in main.output and "tree complete: 3 edges" in jetson.output), (
-        main.output + jetson.output
-    )
+    assert until(
+        lambda: (
+            "tree complete: 3 edges" in main.output and "tree complete: 3 edges" in jetson.output
+        )
+    ), main.output + jetson.output
     jetson.until_says("error[TF801] odom → base_link is published by /arm_drive;")
     words = [sys.executable, "-m", "tfcompose", "verify", str(file), "--live", "--for", "3"]
 
@@ -94,10 +115,14 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
     assert (jetson.end(), main.end()) == (0, 0)
 
 
-def test_a_share_that_is_live_on_another_machine_is_refused(start: Callable[..., Started], tmp_path: Path) -> None:
+def test_a_share_that_is_live_on_another_machine_is_refused(
+    start: Callable[..., Started], tmp_path: Path
+) -> None:
     """Started by another supervisor, as nothing of another machine's launcher is seen here but its nodes."""
     file = tmp_path / "rover.yaml"
-    file.write_text(ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
+    file.write_text(
+        ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8"
+    )
     assert start("tfcompose", "build", file, "-o", tmp_path / "a").process.wait(60) == 0
     elsewhere = start("tfcompose.launcher.exec", tmp_path / "a" / "plan.json", "drive")
     elsewhere.until_says("simulated at")

@@ -12,7 +12,9 @@ from tfcompose.cli.commands.init import FOLDER, TEMPLATES
 
 
 @pytest.mark.parametrize("template", TEMPLATES)
-def test_a_template_lints_in_every_profile_and_builds_under_its_new_name(template: str, tmp_path: Path) -> None:
+def test_a_template_lints_in_every_profile_and_builds_under_its_new_name(
+    template: str, tmp_path: Path
+) -> None:
     assert tfcompose_in(tmp_path, "init", template, "--name", "my_robot").returncode == 0
     linted = tfcompose_in(tmp_path, "lint", ".", "--fail-on", "warning")
     assert linted.returncode == 0, linted.stdout
@@ -27,12 +29,23 @@ def test_every_template_is_listed_and_no_file_is_left_out() -> None:
 
 @pytest.mark.ros
 @pytest.mark.parametrize("template", TEMPLATES)
-def test_the_command_that_it_names_starts_the_robot(template: str, tmp_path: Path, domain: object) -> None:
+def test_the_command_that_it_names_starts_the_robot(
+    template: str, tmp_path: Path, domain: object
+) -> None:
     assert domain
     printed = tfcompose_in(tmp_path, "init", template).stdout
-    (up,) = (line.partition("#")[0].split() for line in printed.splitlines() if line.startswith("  tfcompose up"))
+    (up,) = (
+        line.partition("#")[0].split()
+        for line in printed.splitlines()
+        if line.startswith("  tfcompose up")
+    )
     robot = processes.Started(
-        processes.start([sys.executable, "-m", *up], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        processes.start(
+            [sys.executable, "-m", *up],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
     )
     try:
         robot.until_says("tree complete")
@@ -59,7 +72,8 @@ def test_a_name_that_no_robot_can_have_is_refused(name: str, tmp_path: Path) -> 
 def test_the_schema_is_in_the_folder_of_the_file_that_names_it(tmp_path: Path) -> None:
     assert tfcompose_in(tmp_path, "init", "-o", "a/b/arm.yaml", "--schema").returncode == 0
     (named,) = (
-        line.partition("$schema=")[2] for line in (tmp_path / "a/b/arm.yaml").read_text("utf-8").splitlines()[:1]
+        line.partition("$schema=")[2]
+        for line in (tmp_path / "a/b/arm.yaml").read_text("utf-8").splitlines()[:1]
     )
     assert (tmp_path / "a/b" / named).is_file()
 

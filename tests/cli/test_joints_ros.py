@@ -14,8 +14,8 @@ from std_msgs.msg import String
 
 from tests.support import processes
 from tests.support.waiting import until
-from tfcompose.ros.node import JOINT_STATES, LATCHED, Subscription, open_node
-from tfcompose.tf2 import Buffer, TransformListener
+from tfcompose.tf.ros.node import JOINT_STATES, LATCHED, Subscription, open_node
+from tfcompose.tf.tf2 import Buffer, TransformListener
 
 pytestmark = pytest.mark.ros
 
@@ -37,7 +37,9 @@ processes: {states: {simulate: {joints: {z_first: 0.4, wheel: 100 deg}, rate: 50
 
 
 @pytest.fixture
-def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., str]]:
+def tfc(
+    domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., str]]:
     """Run a command to its end in the test's folder, and end the robot with the test."""
     assert domain
     (tmp_path / "runtime").mkdir(mode=0o700)
@@ -71,7 +73,9 @@ def test_simulated_joints_move_the_robot_and_a_new_description_comes_while_it_ru
 
         assert until(lambda: has_reported(1))
         agrees(buffer, heard[0], _positions(states))
-        (tmp_path / "robot.yaml").write_text(ARM.replace("xyz: [0, 0.3, 0]", "xyz: [0, 0.3, 0.7]"), encoding="utf-8")
+        (tmp_path / "robot.yaml").write_text(
+            ARM.replace("xyz: [0, 0.3, 0]", "xyz: [0, 0.3, 0.7]"), encoding="utf-8"
+        )
         assert "restarted: joints" in tfc("up", "--wait")
         assert until(lambda: has_reported(2)), "who listens gets the new one"
         assert until(lambda: _z(buffer) == pytest.approx(0.7))
@@ -79,9 +83,19 @@ def test_simulated_joints_move_the_robot_and_a_new_description_comes_while_it_ru
 
 
 def agrees(buffer: Buffer, description: str, positions: dict[str, float]) -> None:
-    expected = {"z_first": 0.4, "m_mid": -0.8, "a_last": -0.3, "lift": 0.3, "wheel": 1.7453292519943295}
-    assert positions == pytest.approx(expected), "mimics are sent, too; where 0 is out of the limits the middle counts"
-    model: Any = yourdfpy.URDF.load(BytesIO(description.encode()), load_meshes=False, build_scene_graph=True)
+    expected = {
+        "z_first": 0.4,
+        "m_mid": -0.8,
+        "a_last": -0.3,
+        "lift": 0.3,
+        "wheel": 1.7453292519943295,
+    }
+    assert positions == pytest.approx(expected), (
+        "mimics are sent, too; where 0 is out of the limits the middle counts"
+    )
+    model: Any = yourdfpy.URDF.load(
+        BytesIO(description.encode()), load_meshes=False, build_scene_graph=True
+    )
     model.update_cfg({name: positions[name] for name in ("z_first", "lift", "wheel")})
     frames = [f"r1/{name}" for name in "abde"]
     assert until(lambda: all(buffer.can_transform("r1/base_link", frame, 0) for frame in frames))

@@ -71,20 +71,27 @@ def test_diff_prints_what_fix_would_write_and_writes_nothing(folder: Path) -> No
     assert "TF410" in done.stderr
     lines = done.stdout.splitlines()
     changed = [line for line in lines if line.startswith(("-", "+"))]
-    old, new = (next(line for line in text.splitlines() if "Lidar" in line) for text in (FIXABLE, WARNED))
+    old, new = (
+        next(line for line in text.splitlines() if "Lidar" in line) for text in (FIXABLE, WARNED)
+    )
     assert changed == ["--- fixable.yaml", "+++ fixable.yaml", f"-{old}", f"+{new}"]
     assert tfcompose_in(folder, "lint", "--diff", "warned.yaml").returncode == 0
 
 
 @pytest.mark.parametrize("option", ["--diff", "--watch"])
-def test_what_is_for_people_is_not_mixed_with_what_programs_read(option: str, folder: Path) -> None:
+def test_what_is_for_people_is_not_mixed_with_what_programs_read(
+    option: str, folder: Path
+) -> None:
     done = tfcompose_in(folder, "lint", "fixable.yaml", option, "--format", "json")
     assert (done.returncode, done.stdout) == (2, "")
 
 
 def test_junit_has_a_case_for_each_file(folder: Path) -> None:
     done = tfcompose_in(folder, "lint", "--format", "junit", "warned.yaml", "wrong.yaml")
-    cases = {case.get("name"): case.find("failure") for case in ET.fromstring(done.stdout).iter("testcase")}  # noqa: S314 (our own)
+    cases = {
+        case.get("name"): case.find("failure")
+        for case in ET.fromstring(done.stdout).iter("testcase")  # noqa: S314
+    }
     assert cases.keys() == {"warned.yaml", "wrong.yaml"}
     assert cases["warned.yaml"] is None
     assert cases["wrong.yaml"] is not None
@@ -109,7 +116,9 @@ def test_the_hook_skips_the_yaml_of_others_and_no_robot(folder: Path) -> None:
 
 def test_watch_lints_again_when_a_file_changes(folder: Path) -> None:
     command = [sys.executable, "-m", "tfcompose", "lint", "--watch", str(folder)]
-    watch = processes.Started(processes.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+    watch = processes.Started(
+        processes.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    )
     assert until(lambda: watch.output.count("watching") == 1)
     assert "TF104" in watch.output
     (folder / "wrong.yaml").write_text(WARNED, "utf-8")
@@ -121,7 +130,11 @@ def test_watch_lints_again_when_a_file_changes(folder: Path) -> None:
 
 
 def test_force_color_colours_a_pipe_unless_no_color_is_set(folder: Path) -> None:
-    rest = {name: value for name, value in os.environ.items() if name not in {"FORCE_COLOR", "NO_COLOR"}}
+    rest = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in {"FORCE_COLOR", "NO_COLOR"}
+    }
     command = [sys.executable, "-m", "tfcompose", "lint", "warned.yaml"]
 
     def is_coloured(**environment: str) -> bool:

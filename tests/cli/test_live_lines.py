@@ -24,7 +24,9 @@ class Terminal:
         self.stream: TextIO = os.fdopen(line, "w")
 
     def resize(self, columns: int, rows: int) -> None:
-        fcntl.ioctl(self.stream.fileno(), termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        fcntl.ioctl(
+            self.stream.fileno(), termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0)
+        )
 
     def shown(self) -> str:
         """Return what was written since the last time; it may come in pieces, so an end is written after it."""
@@ -56,7 +58,9 @@ def test_each_drawing_replaces_the_last_one_and_what_was_below_it_goes(terminal:
     assert terminal.shown() == "\r\033[3Afour\033[K\n\033[J"
 
 
-def test_no_line_is_longer_than_the_terminal_and_there_are_no_more_than_it_shows(terminal: Terminal) -> None:
+def test_no_line_is_longer_than_the_terminal_and_there_are_no_more_than_it_shows(
+    terminal: Terminal,
+) -> None:
     LiveLines(terminal.stream).draw(["x" * 100, *map(str, range(50))])
     lines = terminal.shown().replace("\033[K", "").split("\n")
     assert lines[0] == "x" * 38 + "…"

@@ -40,7 +40,9 @@ def shell(domain: object, tmp_path: Path) -> Iterator[Shell]:
     made.close()
 
 
-def test_it_shows_the_robot_and_its_logs_and_ctrl_c_ends_it_and_puts_the_terminal_back(shell: Shell) -> None:
+def test_it_shows_the_robot_and_its_logs_and_ctrl_c_ends_it_and_puts_the_terminal_back(
+    shell: Shell,
+) -> None:
     shell.up()
     shell.shows("all well", "talker", "1/1 edges live")
     started = shell.below()
@@ -98,8 +100,12 @@ def test_a_terminal_that_goes_away_ends_the_robot(shell: Shell) -> None:
     assert until(lambda: all(map(gone, started)))
 
 
-def test_a_process_that_fails_ends_it_and_the_reason_stays_on_the_terminal(shell: Shell, tmp_path: Path) -> None:
-    (tmp_path / "robot.yaml").write_text(ROBOT.replace("time.sleep(600)", "time.sleep(1); raise SystemExit(3)"))
+def test_a_process_that_fails_ends_it_and_the_reason_stays_on_the_terminal(
+    shell: Shell, tmp_path: Path
+) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        ROBOT.replace("time.sleep(600)", "time.sleep(1); raise SystemExit(3)")
+    )
     shell.up()
     shell.shows("talker ended with exit code 3", "ended with exit code 1", PROMPT)
     shell.type("echo exit code $?\n")
@@ -107,7 +113,8 @@ def test_a_process_that_fails_ends_it_and_the_reason_stays_on_the_terminal(shell
 
 
 @pytest.mark.parametrize(
-    ("environment", "words"), [({"TERM": "dumb"}, ()), ({"CI": "true"}, ()), ({}, ("--no-live",)), ({}, ("| cat",))]
+    ("environment", "words"),
+    [({"TERM": "dumb"}, ()), ({"CI": "true"}, ()), ({}, ("--no-live",)), ({}, ("| cat",))],
 )
 def test_elsewhere_it_prints_lines(
     domain: object, tmp_path: Path, environment: dict[str, str], words: tuple[str, ...]
@@ -147,7 +154,9 @@ def test_ctrl_s_stops_neither_the_view_nor_its_end(shell: Shell) -> None:
     shell.shows("ended", PROMPT)
 
 
-def test_a_terminal_that_takes_nothing_keeps_neither_the_view_nor_the_robot_from_ending(shell: Shell) -> None:
+def test_a_terminal_that_takes_nothing_keeps_neither_the_view_nor_the_robot_from_ending(
+    shell: Shell,
+) -> None:
     shell.up()
     shell.shows("all well")
     started = shell.below()

@@ -21,11 +21,18 @@ from hypothesis import strategies as st
 from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.cli.console import Console, StatusLine
 from tfcompose.cli.terminal import coloured_only, plain
-from tfcompose.findings import finding
-from tfcompose.geometry import Pose
-from tfcompose.ipc import Ended, FindingShown, LogLine, OwnerLive, ProcessState, Stopping
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.plan.file import write_plan
+from tfcompose.foundation.findings import finding
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.messages import (
+    Ended,
+    FindingShown,
+    LogLine,
+    OwnerLive,
+    ProcessState,
+    Stopping,
+)
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.plan.file import write_plan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +44,7 @@ import sys
 from pathlib import Path
 from tfcompose.cli.console import Console, StatusLine
 from tfcompose.cli.terminal import size_of
-from tfcompose.plan.file import read_plan
+from tfcompose.model.plan.file import read_plan
 from tfcompose.launcher.output import NonBlockingOutput
 from tfcompose.launcher.supervisor import Session, supervise
 file = Path(sys.argv[1])
@@ -51,8 +58,13 @@ sys.exit(code)
 
 
 def plan_of(*names: str, owner: str = "") -> Plan:
-    edge = PlanEdge("base_link", "lidar", "static", owner, f"/{owner}", Pose(), None, SourceLine("r.yaml", 1))
-    processes = [PlanProcess(name, "run", owns=((edge.parent, edge.child),) * (name == owner)) for name in names]
+    edge = PlanEdge(
+        "base_link", "lidar", "static", owner, f"/{owner}", Pose(), None, SourceLine("r.yaml", 1)
+    )
+    processes = [
+        PlanProcess(name, "run", owns=((edge.parent, edge.child),) * (name == owner))
+        for name in names
+    ]
     return Plan("rover", "", None, RosSettings(), (edge,) if owner else (), tuple(processes))
 
 
@@ -88,7 +100,9 @@ def running(*names: str) -> list[ProcessState]:
 
 def test_the_line_stays_below_the_log_and_the_log_is_complete() -> None:
     view = View(plan_of("static", "drive", owner="static"))
-    view.tell(*running("static"), LogLine("drive", "stdout", "one"), LogLine("drive", "stdout", "two"))
+    view.tell(
+        *running("static"), LogLine("drive", "stdout", "one"), LogLine("drive", "stdout", "two")
+    )
     assert view.lines == [
         "tfcompose | started static (pid 7)",
         "drive     | one",
@@ -138,14 +152,18 @@ def test_who_others_start_counts_when_its_edges_are_live() -> None:
 
 
 def test_a_long_name_does_not_move_the_other_lines() -> None:
-    view = View(plan_of("a" * 40, "b")).tell(LogLine("b", "stdout", "x"), LogLine("a" * 40, "stdout", "y"))
+    view = View(plan_of("a" * 40, "b")).tell(
+        LogLine("b", "stdout", "x"), LogLine("a" * 40, "stdout", "y")
+    )
     assert view.lines[:2] == [f"{'b':<24} | x", f"{'a' * 40} | y"]
 
 
 def test_what_a_process_writes_moves_no_cursor_and_colours_nothing_else() -> None:
     view = View(plan_of("evil"), 60)
     view.tell(LogLine("evil", "stdout", "one"))
-    view.tell(LogLine("evil", "stdout", "\033[2J\033[3A\033]0;title\a\033[31mred\033[?25l\rback\x9b2J"))
+    view.tell(
+        LogLine("evil", "stdout", "\033[2J\033[3A\033]0;title\a\033[31mred\033[?25l\rback\x9b2J")
+    )
     assert view.lines[:2] == [
         "evil      | one",
         "evil      | red\N{REPLACEMENT CHARACTER}back\N{REPLACEMENT CHARACTER}2J",
@@ -207,7 +225,10 @@ class Terminal:
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
     def lines(self) -> list[str]:
-        above = ["".join(row[x].data for x in range(self.screen.columns)) for row in self.screen.history.top]
+        above = [
+            "".join(row[x].data for x in range(self.screen.columns))
+            for row in self.screen.history.top
+        ]
         return [line.rstrip() for line in [*above, *self.screen.display] if line.strip()]
 
 
@@ -218,7 +239,9 @@ def _set_size(fd: int, columns: int, rows: int) -> None:
 @pytest.fixture
 def terminal(tmp_path: Path) -> Iterator[Terminal]:
     """A launcher of 40 sleeping processes and one that counts, on a terminal of 60 columns."""
-    count = "import time\nfor i in range(10**6): print('line', i, 'end', flush=True); time.sleep(0.02)"
+    count = (
+        "import time\nfor i in range(10**6): print('line', i, 'end', flush=True); time.sleep(0.02)"
+    )
     sleeping = [PlanProcess(f"sleeper_{number}", "run", ("sleep", "60")) for number in range(40)]
     counting = PlanProcess("counting", "run", (sys.executable, "-I", "-S", "-c", count))
     file = tmp_path / "plan.json"
@@ -229,7 +252,9 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
         os.kill(one.pid, signal.SIGKILL)
 
 
-def test_on_a_real_terminal_the_log_is_complete_the_line_below_it_and_ctrl_c_leaves_nothing(terminal: Terminal) -> None:
+def test_on_a_real_terminal_the_log_is_complete_the_line_below_it_and_ctrl_c_leaves_nothing(
+    terminal: Terminal,
+) -> None:
     assert terminal.shows("41 of 41 processes")
     assert terminal.shows("line 40 end")
     terminal.resize(44, 12)
@@ -240,6 +265,10 @@ def test_on_a_real_terminal_the_log_is_complete_the_line_below_it_and_ctrl_c_lea
     lines = terminal.lines()
     assert lines[-1].endswith("| ended")
     assert not [line for line in lines if line.startswith("[0")]
-    numbers = [int(line.split()[3]) for line in lines if line.startswith("counting") and line.endswith("end")]
+    numbers = [
+        int(line.split()[3])
+        for line in lines
+        if line.startswith("counting") and line.endswith("end")
+    ]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
     assert len(numbers) > 80

@@ -53,5 +53,13 @@ def test_a_copy_is_never_half_done_and_stays_while_its_plan_is_the_one(
         assert copy_plan(plan, tmp_path / "plan.json", place, alone=True) == copy
     assert observed == [full]
     assert [file.name for file in copy.parent.iterdir()] == ["plan.json"]
-    assert copy_plan(compiled_plan(ROVER.replace("lidar", "lamp")), tmp_path / "plan.json", place, alone=True) != copy
+    assert (
+        copy_plan(
+            compiled_plan(ROVER.replace("lidar", "lamp")),
+            tmp_path / "plan.json",
+            place,
+            alone=True,
+        )
+        != copy
+    )
     assert not copy.exists()

@@ -40,7 +40,9 @@ def matrix(xyz: list[float], rotation: Rotation) -> np.ndarray:
     return made
 
 
-def test_the_pose_up_one_branch_and_down_another(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_pose_up_one_branch_and_down_another(
+    robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     def step(xyz: list[float], rpy: list[float]) -> np.ndarray:
         return matrix(xyz, Rotation.from_euler("xyz", rpy))
 
@@ -50,8 +52,12 @@ def test_the_pose_up_one_branch_and_down_another(robot: str, capsys: pytest.Capt
     output = json.loads(capsys.readouterr().out)
     assert (output["parent"], output["child"]) == ("mast", "hand")
     meant = np.linalg.inv(mast) @ hand
-    assert matrix(output["xyz"], Rotation.from_quat(output["quat_xyzw"])) == pytest.approx(meant, abs=1e-11)
-    assert matrix(output["xyz"], Rotation.from_euler("xyz", output["rpy"])) == pytest.approx(meant, abs=1e-11)
+    assert matrix(output["xyz"], Rotation.from_quat(output["quat_xyzw"])) == pytest.approx(
+        meant, abs=1e-11
+    )
+    assert matrix(output["xyz"], Rotation.from_euler("xyz", output["rpy"])) == pytest.approx(
+        meant, abs=1e-11
+    )
 
 
 @pytest.mark.parametrize(
@@ -76,7 +82,9 @@ def test_what_moves_on_the_way_is_named_and_nothing_else(
 
 
 @pytest.mark.parametrize("command", ["pose", "explain"])
-def test_between_two_trees_there_is_no_pose(robot: str, command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_between_two_trees_there_is_no_pose(
+    robot: str, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main([command, robot, "mast", "corner"]) == 1
     output = capsys.readouterr()
     assert (output.out, words_of(output.err) >= {"mast", "corner"}) == ("", True)
@@ -84,11 +92,16 @@ def test_between_two_trees_there_is_no_pose(robot: str, command: str, capsys: py
     assert " corner?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", ["pose {} a", "pose --format text a {}", "pose a --set vars.x=1 {}", "explain a {}"])
+@pytest.mark.parametrize(
+    "words", ["pose {} a", "pose --format text a {}", "pose a --set vars.x=1 {}", "explain a {}"]
+)
 def test_two_frames_alone_are_those_of_the_robot_file_here(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = "tfcompose: 1\nrobot: r\nvars: {x: 2}\nframes: {a: {}, b: {parent: a, xyz: ['${x}', 0, 0]}}\n"
+    text = (
+        "tfcompose: 1\nrobot: r\nvars: {x: 2}\nframes: {a: {}, b: {parent: a, xyz: ['${x}', 0,"
+        " 0]}}\n"
+    )
     (tmp_path / "robot.yaml").write_text(text)
     (tmp_path / "other.yaml").write_text(text.replace("x: 2", "x: 7"))
     monkeypatch.chdir(tmp_path)

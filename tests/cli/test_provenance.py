@@ -39,14 +39,23 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def test_explain_names_the_place_of_each_value_and_of_all_that_it_replaced(
     robot: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["explain", robot, "base_link", "mast", "-f", "over.yaml", "--set", "frames.mast.xyz=[0, 0, 0.6]"]
+    words = [
+        "explain",
+        robot,
+        "base_link",
+        "mast",
+        "-f",
+        "over.yaml",
+        "--set",
+        "frames.mast.xyz=[0, 0, 0.6]",
+    ]
     assert main(words) == 0
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
     assert "parent: base_link  base.yaml:5:18" in lines
     assert (
         "xyz: [0, 0, 0.6]  --set frames.mast.xyz=[0, 0, 0.6]:1:1"
-        ", over over.yaml:1:22, over robot.yaml:3:15, over base.yaml:5:34"
-    ) in lines
+        ", over over.yaml:1:22, over robot.yaml:3:15, over base.yaml:5:34" in lines
+    )
 
 
 CELL = """\
@@ -60,7 +69,9 @@ parts: {left: {spec: robot.yaml, prefix: l_, parent: world, xyz: [1, 0, 0], prof
 def test_the_values_of_parts_have_their_places_in_the_files_of_the_parts(
     robot: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    Path("outer.yaml").write_text(CELL.replace("robot.yaml", "cell.yaml").replace(", profiles: [bent]", ""), "utf-8")
+    Path("outer.yaml").write_text(
+        CELL.replace("robot.yaml", "cell.yaml").replace(", profiles: [bent]", ""), "utf-8"
+    )
     Path("cell.yaml").write_text(CELL.replace(robot, "robot.yaml"), "utf-8")
     assert main(["explain", "outer.yaml", "world", "l_l_head_optical"]) == 0
     output = capsys.readouterr()
@@ -77,7 +88,10 @@ def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(
     robot: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     main(["explain", robot, "mast", "head_optical", "--set", "frames.head_optical.look=forward"])
-    assert "look: forward  --set frames.head_optical.look=forward:1:1, over base.yaml:6:37" in capsys.readouterr().out
+    assert (
+        "look: forward  --set frames.head_optical.look=forward:1:1, over base.yaml:6:37"
+        in capsys.readouterr().out
+    )
 
 
 @pytest.mark.parametrize(
@@ -89,7 +103,11 @@ def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(
     ],
 )
 def test_a_finding_about_a_replaced_value_names_what_it_replaced(
-    robot: str, profile: str, found_at: str, replaced: list[str], capsys: pytest.CaptureFixture[str]
+    robot: str,
+    profile: str,
+    found_at: str,
+    replaced: list[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     main(["lint", robot, "--profile", profile, "--format", "json"])
     found = {
@@ -101,14 +119,18 @@ def test_a_finding_about_a_replaced_value_names_what_it_replaced(
     assert all(name in note["message"] for name in replaced[1:])
 
 
-def test_a_finding_in_a_setting_names_what_it_replaced(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finding_in_a_setting_names_what_it_replaced(
+    robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     main(["build", robot, "-o", "out", "--set", "frames.mast.xyz=[0, 0, 400]"])
     output = capsys.readouterr().err
     assert "TF414" in output
     assert "note: robot.yaml:3:15: " in output
 
 
-def test_a_finding_about_what_nothing_replaced_has_no_such_note(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finding_about_what_nothing_replaced_has_no_such_note(
+    robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     main(["lint", robot, "--profile", "far", "--format", "json"])
     others = [one for one in json.loads(capsys.readouterr().out) if one["code"] != "TF414"]
     assert not [note for one in others for note in one["notes"] if "replaces" in note["message"]]

@@ -12,10 +12,10 @@ import pytest
 from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.cli.schemas import LANGUAGES, schema_text
-from tfcompose.compile import compile_robot
-from tfcompose.findings import RejectedError
-from tfcompose.language import validate_node_preset, validate_preset
-from tfcompose.load import load
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.spec.language import validate_node_preset, validate_preset
+from tfcompose.spec.load import load
 
 ROOT = Path(__file__).parents[2]
 HEAD = "tfcompose: 1\nrobot: r\n"
@@ -31,10 +31,14 @@ def validator(language: str) -> Any:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_schema_in_the_repository_is_fresh(language: str) -> None:
-    assert (ROOT / "schemas" / f"{language}.schema.json").read_text("utf-8") == schema_text(language)
+    assert (ROOT / "schemas" / f"{language}.schema.json").read_text("utf-8") == schema_text(
+        language
+    )
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "robots").glob("*.yaml")), ids=lambda file: file.stem)
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "robots").glob("*.yaml")), ids=lambda file: file.stem
+)
 def test_the_example_robots_are_valid(file: Path) -> None:
     validator("robot").validate(load(file.read_text("utf-8"), file.name).data)
     line = file.read_text("utf-8").splitlines()[0]
@@ -43,13 +47,15 @@ def test_the_example_robots_are_valid(file: Path) -> None:
     assert (file.parent / schema[1]).resolve() == ROOT / "schemas" / "robot.schema.json"
 
 
-@for_each(sorted((ROOT / "tfcompose/presets").glob("*/*.yaml")))
+@for_each(sorted((ROOT / "tfcompose/data/presets").glob("*/*.yaml")))
 def test_the_presets_are_valid(file: Path) -> None:
     validator("preset").validate(load(file.read_text("utf-8"), file.name).data)
 
 
 @pytest.mark.parametrize(
-    "file", sorted((ROOT / "tfcompose/presets/nodes").glob("*/*.yaml")), ids=lambda file: file.stem
+    "file",
+    sorted((ROOT / "tfcompose/data/presets/nodes").glob("*/*.yaml")),
+    ids=lambda file: file.stem,
 )
 def test_the_presets_of_nodes_are_valid(file: Path) -> None:
     validator("node").validate(load(file.read_text("utf-8"), file.name).data)
@@ -60,8 +66,10 @@ FINE = [
     "links: {base_link: {visual: [{box: [1, 1, 1]}, {sphere: {radius: 1 m}, xyz: [0, 0, 1]}]}}\n",
     LINKS + "frames: {a: {parent: base_link, look: down, static: false}}\n",
     LINKS + "frames: {a: {parent: base_link, look: {down: 15 deg}}}\n",
-    LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, tf: tfcompose, driver: none}}\n",
-    LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, driver: {restart: always}}}\n",
+    LINKS
+    + "sensors: {c: {preset: realsense/d435i, parent: base_link, tf: tfcompose, driver: none}}\n",
+    LINKS
+    + "sensors: {c: {preset: realsense/d435i, parent: base_link, driver: {restart: always}}}\n",
     LINKS + "vars: {p: imu}\nsensors: {c: {preset: 'generic/${p}', parent: base_link}}\n",
     LINKS + "vars: {p: generic/imu}\nsensors: {c: {preset: '${p}', parent: base_link}}\n",
     LINKS + "vars: {p: ekf}\nprocesses: {e: {run: [sleep, '9'], node: {preset: '${p}'}}}\n",
@@ -98,8 +106,20 @@ def test_what_the_compiler_refuses_by_its_form_the_schema_refuses(text: str) -> 
     ("profile", "fine"),
     [
         ("{sensors: {laser: {driver: none, xyz: null}}, ros: {clock: sim}}", True),
-        ("{links: {mast: null}, processes: {player: {external: true}}, frames: {dock: {parent: base_link}}}", True),
-        ("{processes: {player: {run: [play], publishes: [{parent: base_link, child: dock, off: {}}]}}}", True),
+        (
+            (
+                "{links: {mast: null}, processes: {player: {external: true}}, frames: {dock:"
+                " {parent: base_link}}}"
+            ),
+            True,
+        ),
+        (
+            (
+                "{processes: {player: {run: [play], publishes: [{parent: base_link, child: dock,"
+                " off: {}}]}}}"
+            ),
+            True,
+        ),
         ("{sensors: {laser: {drivr: none}}}", False),
         ("{processes: {player: {restart: sometimes}}}", False),
         ("{processes: {player: {run: [play], publishes: [{parent: base_link}]}}}", False),
@@ -108,7 +128,10 @@ def test_what_the_compiler_refuses_by_its_form_the_schema_refuses(text: str) -> 
 )
 def test_a_profile_may_hold_a_part_of_what_a_robot_does(profile: str, *, fine: bool) -> None:
     laser = "sensors: {laser: {preset: generic/lidar2d, parent: base_link, xyz: [0, 0, 1]}}\n"
-    text = f"{HEAD}links: {{base_link: {{}}, mast: {{parent: base_link}}}}\n{laser}profiles: {{p: {profile}}}\n"
+    text = (
+        f"{HEAD}links: {{base_link: {{}}, mast: {{parent: base_link}}}}\n{laser}profiles: {{p:"
+        f" {profile}}}\n"
+    )
     assert not compile_robot(text, "r.yaml", library()).errors or not fine
     assert bool(compile_robot(text, "r.yaml", library(), ["p"]).errors) is not fine
     assert validator("robot").is_valid(load(text, "r.yaml").data) is fine
@@ -125,12 +148,17 @@ def test_a_profile_may_hold_a_part_of_what_a_robot_does(profile: str, *, fine: b
         ("tfcompose: 2\n", False),
     ],
 )
-def test_an_overlay_may_hold_a_part_of_what_a_robot_does_and_profiles(overlay: str, *, fine: bool) -> None:
+def test_an_overlay_may_hold_a_part_of_what_a_robot_does_and_profiles(
+    overlay: str, *, fine: bool
+) -> None:
     laser = "sensors: {laser: {preset: generic/lidar2d, parent: base_link, xyz: [0, 0, 1]}}\n"
     text = f"{HEAD}links: {{base_link: {{}}, mast: {{parent: base_link}}}}\n{laser}"
     source = load(overlay, "o.yaml")
     profiles = list(source.data.get("profiles", ()))
-    assert bool(compile_robot(text, "r.yaml", library(), profiles, overlays=[source]).errors) is not fine
+    assert (
+        bool(compile_robot(text, "r.yaml", library(), profiles, overlays=[source]).errors)
+        is not fine
+    )
     assert validator("overlay").is_valid(source.data) is fine
 
 
@@ -146,9 +174,12 @@ def test_an_overlay_may_hold_a_part_of_what_a_robot_does_and_profiles(overlay: s
     ],
 )
 def test_presets_have_no_expressions(language: str, file: str, line: str) -> None:
-    text = (ROOT / "tfcompose" / "presets" / file).read_text("utf-8")
+    text = (ROOT / "tfcompose" / "data" / "presets" / file).read_text("utf-8")
     if language == "preset":
-        text = text[: text.index("optics:")] + "optics:\n  image:\n    frame: '{name}_optical_frame'\n"
+        text = (
+            text[: text.index("optics:")]
+            + "optics:\n  image:\n    frame: '{name}_optical_frame'\n"
+        )
     validate = {"preset": validate_preset, "node": validate_node_preset}[language]
     value = "true" if "backward" in line or "one_of" in line else "1"
     fine, wrong = (load(text + line.format(one), file) for one in (value, '"${a}"'))
@@ -169,6 +200,9 @@ def test_a_robot_without_its_name_or_version_is_refused() -> None:
 def test_every_key_has_a_place_in_the_schema_and_every_mapping_says_what_it_is() -> None:
     for language in ("robot", "preset"):
         schema = json.loads(schema_text(language))
-        for definition in [schema, *(one for one in schema["$defs"].values() if "properties" in one)]:
+        for definition in [
+            schema,
+            *(one for one in schema["$defs"].values() if "properties" in one),
+        ]:
             assert definition["description"]
             assert definition["additionalProperties"] is False

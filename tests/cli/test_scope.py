@@ -12,10 +12,10 @@ from tests.support.robots import ROVER
 from tfcompose.cli import main
 from tfcompose.cli.commands import monitor
 from tfcompose.cli.runs import chosen_run, other_domains, run_of_domain
-from tfcompose.geometry import Pose
+from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir, runtime_dir_of
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.plan.file import write_plan
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.plan.file import write_plan
 
 PLAN = Plan("rover", "sha256:0", None, RosSettings(), (), ())
 Run = Callable[..., RuntimeDir]
@@ -61,7 +61,9 @@ def test_the_domain_decides_between_robots(runs: Run, monkeypatch: pytest.Monkey
     assert chosen_run(None, "down").name == there.name
 
 
-def test_two_robots_in_the_domain_need_a_name(runs: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_robots_in_the_domain_need_a_name(
+    runs: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
     runs("rover", 67)
     runs("crawler", 67)
     assert main(["wait"]) == 2
@@ -70,7 +72,9 @@ def test_two_robots_in_the_domain_need_a_name(runs: Run, capsys: pytest.CaptureF
     assert "crawler@67" in errors
 
 
-def test_the_robot_file_of_the_folder_names_one_that_has_a_domain_of_its_own(runs: Run, tmp_path: Path) -> None:
+def test_the_robot_file_of_the_folder_names_one_that_has_a_domain_of_its_own(
+    runs: Run, tmp_path: Path
+) -> None:
     runs("crawler", 71)
     rover = runs("rover", 72)
     (tmp_path / "robot.yaml").write_text(ROVER, "utf-8")
@@ -84,7 +88,10 @@ def test_logs_are_those_of_the_newest_run_in_the_domain(
     runs: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     elsewhere = runs("crawler", 71)
-    for place, line in ((elsewhere, "far"), (replace_name(elsewhere, "rover@67", tmp_path), "near")):
+    for place, line in (
+        (elsewhere, "far"),
+        (replace_name(elsewhere, "rover@67", tmp_path), "near"),
+    ):
         place.folder.mkdir(exist_ok=True)
         (place.folder / "lock").touch()
         place.logs.mkdir(parents=True)
@@ -99,7 +106,9 @@ def replace_name(place: RuntimeDir, name: str, tmp_path: Path) -> RuntimeDir:
     return RuntimeDir(name, place.folder.with_name(name), tmp_path / "log" / "tfcompose" / name)
 
 
-def test_the_plan_of_the_domains_robot_is_known(runs: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_plan_of_the_domains_robot_is_known(
+    runs: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert run_of_domain() is None
     rover = runs("rover", 67)
     found = run_of_domain()
@@ -122,7 +131,12 @@ def test_two_files_with_one_robots_name_do_not_share_a_folder_silently(
     monkeypatch.chdir(tmp_path)
     for name in ("a.yaml", "b.yaml"):
         (tmp_path / name).write_text(ROVER, "utf-8")
-    assert main(["build", "a.yaml"]) == main(["build", "a.yaml"]) == main(["build", "b.yaml", "-o", "b"]) == 0
+    assert (
+        main(["build", "a.yaml"])
+        == main(["build", "a.yaml"])
+        == main(["build", "b.yaml", "-o", "b"])
+        == 0
+    )
     assert capsys.readouterr().err == ""
     assert main(["build", "b.yaml"]) == 0
     assert "a.yaml" in capsys.readouterr().err
@@ -138,7 +152,8 @@ def test_monitor_takes_the_topics_of_the_robot_in_the_domain(
     edges = [("odom", "base", "drive"), ("odom2", "base2", "drive2")]
     remaps = {"drive": {"/tf": "/robot1/tf"}, "drive2": {"/tf": "/robot2/tf"}}
     planned = tuple(
-        PlanEdge(a, b, "dynamic", owner, f"/{owner}", Pose(), 10.0, SourceLine("r.yaml", 1)) for a, b, owner in edges
+        PlanEdge(a, b, "dynamic", owner, f"/{owner}", Pose(), 10.0, SourceLine("r.yaml", 1))
+        for a, b, owner in edges
     )
     processes = tuple(PlanProcess(name, "external", remap=remap) for name, remap in remaps.items())
     one = replace(PLAN, edges=planned[:1], processes=processes[:1])
@@ -146,7 +161,10 @@ def test_monitor_takes_the_topics_of_the_robot_in_the_domain(
     monkeypatch.setattr("tfcompose.cli.runs.plan_of_run", lambda _: one)
     assert monitor._namespace_here() == "/robot1"
     assert place.name in capsys.readouterr().err
-    monkeypatch.setattr("tfcompose.cli.runs.plan_of_run", lambda _: replace(PLAN, edges=planned, processes=processes))
+    monkeypatch.setattr(
+        "tfcompose.cli.runs.plan_of_run",
+        lambda _: replace(PLAN, edges=planned, processes=processes),
+    )
     with pytest.raises(SystemExit):
         monitor._namespace_here()
     assert "--namespace /robot1 or --namespace /robot2" in capsys.readouterr().err

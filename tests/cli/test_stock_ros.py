@@ -14,8 +14,8 @@ from std_msgs.msg import String
 
 from tests.support.processes import Started
 from tests.support.waiting import until
-from tfcompose.ros.graph import UNKNOWN_NODE, writers
-from tfcompose.ros.node import LATCHED, Subscription, open_node
+from tfcompose.tf.ros.graph import UNKNOWN_NODE, writers
+from tfcompose.tf.ros.node import LATCHED, Subscription, open_node
 
 pytestmark = pytest.mark.ros
 
@@ -38,17 +38,18 @@ processes:
   wheels: {simulate: {joints: zero, rate: 20 Hz}}
 xml: {note: "<gazebo><a>it's: a \\"quote\\" # no comment \\u00e9</a></gazebo>"}
 """
-#: Fixed joints once, moving ones with each joint state, floating ones never; and the description on its topic.
+#: Fixed joints once, moving ones with each joint state, floating ones never; and the description
+#: on its topic.
 STAND_IN = """#!{python}
 import sys, xml.etree.ElementTree as ET
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
-from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import JOINT_STATES, latch, open_node
-from tfcompose.signals import Stop
-from tfcompose.ros.node import Subscription, TFPublisher, wait
+from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import JOINT_STATES, latch, open_node
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import Subscription, TFPublisher, wait
 at = sys.argv.index("--ros-args")
 with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1:]) as node:
     for name, kind in (("robot_description", Parameter.Type.STRING), ("frame_prefix", Parameter.Type.STRING)):
@@ -100,7 +101,9 @@ def test_the_tree_is_complete_everybody_publishes_their_own_and_the_description_
     assert 'type="floating"' not in built.partition('name="swing"')[0].partition("<joint")[2]
     assert nodes == {"/rover/tfcompose_static"}
     lines = [line for line in up.lines + up.errors if "error" in line]
-    assert not [line for line in lines if "error[TF804]" not in line], "a busy machine is late in truth"
+    assert not [line for line in lines if "error[TF804]" not in line], (
+        "a busy machine is late in truth"
+    )
 
 
 def description() -> tuple[str, set[str]]:

@@ -14,19 +14,24 @@ from tfcompose.cli.documentation import topic
 from tfcompose.cli.process_table import row
 from tfcompose.cli.tables import Table, shortened
 from tfcompose.cli.terminal import plain
-from tfcompose.compile import compile_robot
-from tfcompose.ipc import ProcessState, ProcessStatus, StateName, notice_line
-from tfcompose.plan.codec import encode
-from tfcompose.render.text import RED
-from tfcompose.render.tree import pose_text, tree
-from tfcompose.tree import drawn
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.render.text import RED
+from tfcompose.compiler.render.tree import pose_text, tree
+from tfcompose.foundation.tree import drawn
+from tfcompose.model.messages import ProcessState, ProcessStatus, StateName, notice_line
+from tfcompose.model.plan.codec import encode
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 ROWS = [
     ("edge", "kind", "rate", "remark"),
     ("camera_link → camera_color_optical_frame", "static", "", ""),
-    ("camera_link → camera_depth_optical_frame", "static", "", "late, and refused for a reason that is long"),
+    (
+        "camera_link → camera_depth_optical_frame",
+        "static",
+        "",
+        "late, and refused for a reason that is long",
+    ),
     ("odom → base_link", "dynamic", "50 Hz", ""),
 ]
 TABLE = Table(
@@ -54,7 +59,9 @@ def test_a_pipe_gets_each_cell_in_full() -> None:
     ],
 )
 @pytest.mark.parametrize("indent", ["", "  "])
-def test_a_terminal_gets_no_line_that_wraps_and_every_number(width: int, heads: list[str], indent: str) -> None:
+def test_a_terminal_gets_no_line_that_wraps_and_every_number(
+    width: int, heads: list[str], indent: str
+) -> None:
     head, *lines = TABLE.lines(ROWS, width, indent=indent)
     assert head.split() == heads
     assert max(map(len, lines)) < width
@@ -64,14 +71,20 @@ def test_a_terminal_gets_no_line_that_wraps_and_every_number(width: int, heads: 
 def test_frames_that_differ_still_differ_when_they_are_shortened() -> None:
     lines = TABLE.lines(ROWS, 60)
     assert len(set(lines)) == len(ROWS)
-    assert shortened("camera_link → camera_color_optical_frame", 28) == "→ camera_color_optical_frame"
+    assert (
+        shortened("camera_link → camera_color_optical_frame", 28) == "→ camera_color_optical_frame"
+    )
     assert shortened("camera_link → camera_color_optical_frame", 20) == "→ camer…ptical_frame"
     assert shortened("base_link → front_left_wheel_link", 29) == "b…ink → front_left_wheel_link"
 
 
 @pytest.mark.parametrize("columns", [60, 80, 100])
-@pytest.mark.parametrize("name", ["autonomous_robot", "field_rover", "house_robot", "picker", "two_rovers"])
-def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(name: str, columns: int) -> None:
+@pytest.mark.parametrize(
+    "name", ["autonomous_robot", "field_rover", "house_robot", "picker", "two_rovers"]
+)
+def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(
+    name: str, columns: int
+) -> None:
     robot = compile_robot(
         (ROBOTS / f"{name}.yaml").read_text("utf-8"),
         f"{name}.yaml",
@@ -83,24 +96,49 @@ def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(
     text = tree(robot, columns)
     assert max(map(len, text.splitlines())) <= columns
     words = iter(re.sub("[│├└─]", " ", text).split())
-    for edge in (one for root in robot.roots() for _, one in drawn(robot.children(), root, lambda edge: edge.child)):
+    for edge in (
+        one
+        for root in robot.roots()
+        for _, one in drawn(robot.children(), root, lambda edge: edge.child)
+    ):
         wanted = [edge.child, edge.owner, *pose_text(edge).split()]
         assert all(word in words for word in wanted), f"{wanted} stand there in this order"
 
 
 @pytest.mark.parametrize("columns", [60, 80, 120])
 @pytest.mark.parametrize("name", ["realsense/d455", "hesai/ot128"])
-def test_a_page_of_a_preset_has_no_line_wider_than_the_terminal_and_every_word(name: str, columns: int) -> None:
+def test_a_page_of_a_preset_has_no_line_wider_than_the_terminal_and_every_word(
+    name: str, columns: int
+) -> None:
     facts = preset_page.facts(name, library())
     page = preset_page.text(facts, columns)
     assert max(map(len, page.splitlines())) <= columns
-    plain_words, words = (re.sub("[│├└─]", " ", text).split() for text in (preset_page.text(facts), page))
+    plain_words, words = (
+        re.sub("[│├└─]", " ", text).split() for text in (preset_page.text(facts), page)
+    )
     assert Counter(words) == Counter(plain_words)
 
 
 @pytest.mark.parametrize("state", get_args(StateName))
 def test_a_state_is_one_word_in_text_in_json_and_in_the_help(state: StateName) -> None:
-    status = ProcessStatus("drive", "run", None, state, "", True, False, True, "", "", 7, 1.0, 0, 0, 0, ())  # noqa: FBT003
+    status = ProcessStatus(
+        "drive",
+        "run",
+        None,
+        state,
+        "",
+        True,  # noqa: FBT003
+        False,  # noqa: FBT003
+        True,  # noqa: FBT003
+        "",
+        "",
+        7,
+        1.0,
+        0,
+        0,
+        0,
+        (),
+    )
     event = json.loads(notice_line(ProcessState("drive", state), 0))
     assert row(status, {})[1] == encode(status)["state"] == event["state"]
     assert f"`{state}`" in topic("background")
@@ -121,4 +159,6 @@ def test_a_tree_too_wide_for_a_terminal_drops_the_gaps_not_the_poses() -> None:
     assert max(map(len, narrow)) <= 119 < max(map(len, tree(robot).splitlines()))
     mount = "camera_bottom_screw_frame  static  xyz 0.186526 -0.0175 0.090669  rpy 0 15 0 deg"
     assert any(line.endswith(mount) for line in narrow)
-    assert [line.split()[-1] for line in narrow] == [line.split()[-1] for line in tree(robot).splitlines()]
+    assert [line.split()[-1] for line in narrow] == [
+        line.split()[-1] for line in tree(robot).splitlines()
+    ]

@@ -23,8 +23,8 @@ pytestmark = pytest.mark.ros
 #: Publishes odom → base_link on /tf without end.
 ROGUE = """
 import time
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Template
+from tfcompose.tf.ros.node import TFPublisher, open_node
 template = Template([("odom", "base_link")])
 with open_node("rogue", "/strange") as node:
     publisher = TFPublisher(node, static=False)
@@ -72,7 +72,9 @@ class Up:
 
     @property
     def text(self) -> str:
-        return self.output.read_text(encoding="utf-8", errors="replace")  # its end may be half a character yet
+        return self.output.read_text(
+            encoding="utf-8", errors="replace"
+        )  # its end may be half a character yet
 
     def says(self, words: str) -> None:
         assert until(lambda: words in self.text or self.popen.poll() is not None), self.text
@@ -93,7 +95,9 @@ class Up:
 
 
 @pytest.fixture
-def up(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Up]]:
+def up(
+    domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Up]]:
     """Run ``tfcompose up`` on this text, or on these words, in a folder of the test's own."""
     assert domain
     monkeypatch.chdir(tmp_path)
@@ -120,7 +124,9 @@ def up(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
             one.popen.kill()
             one.popen.wait()
             assert all(until(partial(gone, process)) for process in below)
-        assert "KeyboardInterrupt" not in one.text, "a process of its own was interrupted before it could handle it"
+        assert "KeyboardInterrupt" not in one.text, (
+            "a process of its own was interrupted before it could handle it"
+        )
 
 
 @pytest.fixture
@@ -143,7 +149,9 @@ def rogue(domain: object) -> Iterator[Callable[[], subprocess.Popen[str]]]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_ends_everything_with_0_and_leaves_no_process(up: Callable[..., Up], number: int) -> None:
+def test_a_signal_ends_everything_with_0_and_leaves_no_process(
+    up: Callable[..., Up], number: int
+) -> None:
     robot = up(ROVER)
     robot.says("tree complete: 2 edges live after ")
     below = robot.below()
@@ -155,7 +163,9 @@ def test_a_signal_ends_everything_with_0_and_leaves_no_process(up: Callable[...,
     assert "SIGTERM" not in robot.text.split("stopping: ", 1)[1].split("\n", 1)[1]
 
 
-def test_a_signal_before_the_tree_is_complete_ends_everything_with_0_too(up: Callable[..., Up]) -> None:
+def test_a_signal_before_the_tree_is_complete_ends_everything_with_0_too(
+    up: Callable[..., Up],
+) -> None:
     robot = up(ROVER)
     robot.says("started guard")
     below = robot.below()
@@ -165,7 +175,9 @@ def test_a_signal_before_the_tree_is_complete_ends_everything_with_0_too(up: Cal
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.05, 0.1])
-def test_a_signal_while_processes_of_its_own_start_leaves_no_traceback(up: Callable[..., Up], seconds: float) -> None:
+def test_a_signal_while_processes_of_its_own_start_leaves_no_traceback(
+    up: Callable[..., Up], seconds: float
+) -> None:
     robot = up(ROVER, "--guard", "off")
     robot.says("started drive")
     time.sleep(seconds)
@@ -213,7 +225,9 @@ def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_o
     assert "stopping: TF801 foreign_publisher\n" in robot.text
 
 
-def test_a_publisher_that_is_killed_ends_everything_with_1_and_is_named(up: Callable[..., Up]) -> None:
+def test_a_publisher_that_is_killed_ends_everything_with_1_and_is_named(
+    up: Callable[..., Up],
+) -> None:
     name = "static"
     robot = up(ROVER)
     robot.says("tree complete")
@@ -238,7 +252,9 @@ def test_an_edge_that_proves_to_be_published_while_processes_start_is_refused_as
     up: Callable[..., Up], rogue: Callable[[], object]
 ) -> None:
     rogue()
-    for _ in range(5):  # on a busy machine it may be heard too late to be taken for one that was there first
+    for _ in range(
+        5
+    ):  # on a busy machine it may be heard too late to be taken for one that was there first
         robot = up(ROVER, "--settle", "0.1", "--for", "12")
         assert robot.ends() == 1
         if "TF807" in robot.text:
@@ -254,7 +270,10 @@ def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]
     assert second.ends() == 1
     assert f"rover (pid {first.popen.pid}, since " in second.text
     assert second.text.index("isolate: topics") < second.text.index("started guard")
-    assert re.search(r"error\[TF854\] (rover|other)@\d+ \(pid \d+, since [0-9:]+\) runs in this domain", second.text)
+    assert re.search(
+        r"error\[TF854\] (rover|other)@\d+ \(pid \d+, since [0-9:]+\) runs in this domain",
+        second.text,
+    )
     assert "isolate: topics" in second.text
     assert re.findall(r"started (\w+)", second.text) == ["guard"]
     assert first.popen.poll() is None
@@ -290,7 +309,9 @@ def test_of_two_that_do_not_observe_before_the_start_and_have_the_same_edges_bot
     assert until(end_well), [one.text for one in both]
 
 
-def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at_the_end(up: Callable[..., Up]) -> None:
+def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at_the_end(
+    up: Callable[..., Up],
+) -> None:
     robot = up(EXTERNAL, "--for", "12")
     robot.says("waiting for drive (/diff_drive): odom → base_link")
     robot.says("live  static (/tfcompose_static): base_link → lidar  ")
@@ -322,7 +343,12 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     assert robot.ends() == 2
     assert [line.split()[0] for line in robot.text.splitlines()] == ["error[TF901]", "help:"]
     assert not any((tmp_path / "runtime").iterdir())
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "runtime", "stubs"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "output0.txt",
+        "rover.yaml",
+        "runtime",
+        "stubs",
+    ]
 
 
 def test_an_owner_whose_node_has_another_name_gets_the_line_to_write_and_is_live_with_it(
@@ -350,7 +376,9 @@ def test_without_a_guard_edges_are_still_reported_to_be_live_and_nobody_is_judge
     assert "TF80" not in robot.text
 
 
-def test_observing_before_the_start_takes_nothing_from_the_time_that_was_requested(up: Callable[..., Up]) -> None:
+def test_observing_before_the_start_takes_nothing_from_the_time_that_was_requested(
+    up: Callable[..., Up],
+) -> None:
     begun = time.monotonic()
     robot = up(ROVER, "--settle", "4", "--for", "9")
     late = {"TF804", "TF805"}  # a busy machine is, in truth
@@ -368,12 +396,19 @@ def test_settle_without_a_guard_is_wrong_use_and_settle_0_is_not(up: Callable[..
     assert up(ROVER, "--settle", "0").ends(after="tree complete") == 0
 
 
-def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(up: Callable[..., Up]) -> None:
+def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(
+    up: Callable[..., Up],
+) -> None:
     simulated = "drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}"
     missing = "drive: {run: [no_drive], node: drive}\n  more: {run: [no_more]}"
-    demo = f"profiles: {{demo: {{processes: {{{simulated}, more: {{run: ['true']}}}}}}, idle: {{}}}}\n"
+    demo = (
+        f"profiles: {{demo: {{processes: {{{simulated}, more: {{run: ['true']}}}}}}, idle:"
+        " {}}\n"
+    )
     robot = up(ROVER.replace(simulated, missing) + demo)
     assert robot.ends() == 1
     assert robot.text.count("error[TF810]") == 1
-    assert all(name in robot.text.splitlines()[0] for name in ("no_drive of drive", "no_more of more"))
+    assert all(
+        name in robot.text.splitlines()[0] for name in ("no_drive of drive", "no_more of more")
+    )
     assert robot.text.endswith(": tfcompose up rover.yaml --profile demo\n")

@@ -12,7 +12,7 @@ import pytest
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tfcompose.cli.writing import write_all
-from tfcompose.files import File
+from tfcompose.model.files import File
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 FILES = [File("a.txt", "new a\n"), File("params/b.yaml", "new b\n"), File("c.txt", "new c\n")]
@@ -26,7 +26,9 @@ def contents(folder: Path) -> dict[str, bytes | None]:
 
 
 def earlier_build(folder: Path) -> dict[str, bytes | None]:
-    write_all(folder, [File("a.txt", "old a\n"), File("c.txt", "old c\n"), File("d.txt", "old d\n")])
+    write_all(
+        folder, [File("a.txt", "old a\n"), File("c.txt", "old c\n"), File("d.txt", "old d\n")]
+    )
     return contents(folder)
 
 
@@ -104,7 +106,9 @@ def build(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("output", ["file", "file/below", "/proc/tfcompose", "/dev/null/out"])
-def test_an_output_folder_that_cannot_be_is_one_sentence_and_exit_2(output: str, tmp_path: Path) -> None:
+def test_an_output_folder_that_cannot_be_is_one_sentence_and_exit_2(
+    output: str, tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("mine\n")
     done = build(tmp_path, str(ROBOTS / "my_robot.yaml"), "-o", output)
     assert done.returncode == 2
@@ -140,7 +144,15 @@ def test_a_plan_that_names_files_elsewhere_has_nothing_removed_there(tmp_path: P
 
 
 def test_two_builds_at_once_leave_one_complete_build(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "tfcompose", "build", str(ROBOTS / "autonomous_robot.yaml"), "-o", "out"]
+    command = [
+        sys.executable,
+        "-m",
+        "tfcompose",
+        "build",
+        str(ROBOTS / "autonomous_robot.yaml"),
+        "-o",
+        "out",
+    ]
     both = [processes.start(command, cwd=tmp_path, stdout=subprocess.DEVNULL) for _ in range(4)]
     assert [process.wait(60) for process in both] == [0] * 4
     assert build(tmp_path, str(ROBOTS / "autonomous_robot.yaml"), "-o", "alone").returncode == 0
@@ -151,7 +163,9 @@ def test_a_robot_with_errors_leaves_the_earlier_build(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text("tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n")
     assert build(tmp_path, "-o", "out").returncode == 0
     before = contents(tmp_path / "out")
-    (tmp_path / "robot.yaml").write_text("tfcompose: 1\nrobot: r\nlinks: {base_link: {parent: x}}\n")
+    (tmp_path / "robot.yaml").write_text(
+        "tfcompose: 1\nrobot: r\nlinks: {base_link: {parent: x}}\n"
+    )
     assert build(tmp_path, "-o", "out").returncode == 1
     assert contents(tmp_path / "out") == before
 

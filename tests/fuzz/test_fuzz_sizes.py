@@ -1,7 +1,8 @@
 """No command takes more than in proportion to a robot's size, whatever of it grows.
 
-Counted are the lines that Python runs, which are as many on every machine. From a size to twice and to four times that,
-the second step takes twice what the first one takes, and four times where each thing is compared with each other one.
+Counted are the lines that Python runs, which are as many on every machine. From a size to twice
+and to four times that, the second step takes twice what the first one takes, and four times where
+each thing is compared with each other one.
 """
 
 import sys
@@ -28,17 +29,23 @@ def below(name: str, index: int) -> str:
 
 
 def chain(count: int) -> str:
-    return f"{HEAD}frames:\n" + each(lambda i: f"f{i}: {{parent: {below('f', i)}, xyz: [0.1, 0, 0]}}", count)
+    return f"{HEAD}frames:\n" + each(
+        lambda i: f"f{i}: {{parent: {below('f', i)}, xyz: [0.1, 0, 0]}}", count
+    )
 
 
 def joints(count: int) -> str:
     links = each(lambda i: f"l{i}: {{}}", count)
-    rows = each(lambda i: f"j{i}: {{type: revolute, parent: {below('l', i)}, child: l{i}, {LIMIT}}}", count)
+    rows = each(
+        lambda i: f"j{i}: {{type: revolute, parent: {below('l', i)}, child: l{i}, {LIMIT}}}", count
+    )
     return f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{links}joints:\n{rows}"
 
 
 def refused_joints(count: int) -> str:
-    rows = each(lambda i: f"j{i}: {{type: fixed, parent: {below('l', i)}, child: l{i}, axis: z}}", count)
+    rows = each(
+        lambda i: f"j{i}: {{type: fixed, parent: {below('l', i)}, child: l{i}, axis: z}}", count
+    )
     return f"{HEAD}joints:\n{rows}"
 
 
@@ -47,21 +54,31 @@ def unknown_parents(count: int) -> str:
 
 
 def processes(count: int) -> str:
-    rows = each(lambda i: f"p{i}: {{run: [sleep, '1']{f', after: {{p{i - 1}: ready}}' if i else ''}}}", count)
+    rows = each(
+        lambda i: f"p{i}: {{run: [sleep, '1']{f', after: {{p{i - 1}: ready}}' if i else ''}}}",
+        count,
+    )
     return f"{HEAD}processes:\n{rows}"
 
 
 def comments(count: int) -> str:
-    return f"{HEAD}frames:\n" + each(lambda i: f"f{i}: {{parent: base_link}} # tfcompose: allow TF401 because x", count)
+    return f"{HEAD}frames:\n" + each(
+        lambda i: f"f{i}: {{parent: base_link}} # tfcompose: allow TF401 because x", count
+    )
 
 
 def urdf_attributes(count: int) -> str:
-    return f'<robot name="r"><link name="a" {" ".join(f"b{i}={chr(34)}{chr(34)}" for i in range(count))}/></robot>'
+    return (
+        '<robot name="r"><link name="a"'
+        f" {' '.join(f'b{i}={chr(34)}{chr(34)}' for i in range(count))}/></robot>"
+    )
 
 
 def urdf_materials(count: int) -> str:
     box = "<visual><geometry><box size='1 1 1'/></geometry><material name='m{}'/></visual>\n"
-    return f'<robot name="r"><link name="a">{"".join(map(box.format, range(count)))}</link></robot>'
+    return (
+        f'<robot name="r"><link name="a">{"".join(map(box.format, range(count)))}</link></robot>'
+    )
 
 
 def urdf_links(count: int) -> str:
@@ -72,7 +89,10 @@ def urdf_links(count: int) -> str:
 
 def urdf_hardware(count: int) -> str:
     rows = "".join(f'<joint name="j{i}"/>\n' for i in range(count))
-    control = f'<ros2_control name="c" type="system"><hardware><plugin>p</plugin></hardware>{rows}</ros2_control>'
+    control = (
+        '<ros2_control name="c"'
+        f' type="system"><hardware><plugin>p</plugin></hardware>{rows}</ros2_control>'
+    )
     return f'<robot name="r"><link name="base_link"/>{control}</robot>'
 
 
@@ -82,7 +102,11 @@ CASES = [
     *((make, words) for make in ROBOTS for words in (["lint"], ["tree"])),
     *((make, ["lint"]) for make in URDFS),
     (urdf_links, ["import"]),
-    *((make, words) for make in (chain, joints, processes) for words in (["build", "-o", "out"], ["graph"])),
+    *(
+        (make, words)
+        for make in (chain, joints, processes)
+        for words in (["build", "-o", "out"], ["graph"])
+    ),
     (chain, ["explain", "base_link", "LAST"]),
     (chain, ["pose", "base_link", "LAST"]),
     (chain, ["diff", "FILE"]),
@@ -111,7 +135,9 @@ def lines_run(words: list[str]) -> int:
 
 @pytest.mark.slow
 @for_each(CASES)
-def test_a_command_takes_in_proportion_to_the_size(make: Callable[[int], str], words: list[str]) -> None:
+def test_a_command_takes_in_proportion_to_the_size(
+    make: Callable[[int], str], words: list[str]
+) -> None:
     counts = []
     for size in (20, 100, 200, 400):
         file = Path(f"{make.__name__}{size}.{'urdf' if make in URDFS else 'yaml'}")
@@ -125,7 +151,11 @@ def test_a_command_takes_in_proportion_to_the_size(make: Callable[[int], str], w
 
 
 @pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def _here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
-    lines_run(["lint", str(Path(__file__).parents[2] / "robots/rover.yaml")])  # what is loaded once
+    lines_run(
+        ["lint", str(Path(__file__).parents[2] / "robots/rover.yaml")]
+    )  # what is loaded once
     capsys.readouterr()

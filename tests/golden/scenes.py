@@ -16,7 +16,16 @@ from unittest import mock
 from tests.support import guard_history as guarded
 from tests.support.bags import drive, write_bag
 from tests.support.cli import inside
-from tests.support.deployed import LATE, NOWHERE, RUNNING, STATE, STATUS, StandInHost, release_of, rollout_to
+from tests.support.deployed import (
+    LATE,
+    NOWHERE,
+    RUNNING,
+    STATE,
+    STATUS,
+    StandInHost,
+    release_of,
+    rollout_to,
+)
 from tests.support.deployed import ROBOT as HOSTED
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, run_process
 from tests.support.plans import compiled_plan
@@ -34,36 +43,26 @@ from tests.support.tree_history import (
     sound_plan,
     sound_tree,
 )
-from tfcompose.bags import BagError
-from tfcompose.check.check import check
-from tfcompose.check.rule import rule
 from tfcompose.cli import live, writing
 from tfcompose.cli.commands import echo, fleet
 from tfcompose.cli.compiling import library
 from tfcompose.cli.parser import main
-from tfcompose.compile import compile_robot
-from tfcompose.deploy.connection import LostError, Settings, connected
-from tfcompose.deploy.rollout import Rollout, target_of
-from tfcompose.emit import emit
-from tfcompose.files import Target
-from tfcompose.findings import Finding, RejectedError, Span, finding
-from tfcompose.fleet.check import check_fleet
-from tfcompose.fleet.observe import EdgeStatus, LinkState, RobotStatus, problems_of
-from tfcompose.geometry import Pose
-from tfcompose.importing.draft import Draft
-from tfcompose.importing.shell import add_script
-from tfcompose.ipc import Alive, Clear, Found, GateShut, Live, ProcessRequest
-from tfcompose.language import set_value
-from tfcompose.language.validate import validate_fleet
+from tfcompose.compiler.check.check import check
+from tfcompose.compiler.check.rule import rule
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.emit import emit
+from tfcompose.compiler.urdf.inertia import UnmeasurableError
+from tfcompose.compiler.urdf.packages import Disk
+from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
+from tfcompose.foundation.geometry import Pose
+from tfcompose.guard.verdict.doctor import diagnose
+from tfcompose.guard.verdict.drivers import SentPoses, not_taken
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.schedule import refused_schedule
-from tfcompose.live.publishers import Message, OtherRun, Publisher, Senders
-from tfcompose.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, Topic, TreeState
-from tfcompose.load import Source, load
-from tfcompose.model import Robot
-from tfcompose.model.body import Asset
-from tfcompose.plan import (
+from tfcompose.model.files import Target
+from tfcompose.model.messages import Alive, Clear, Found, GateShut, Live, ProcessRequest
+from tfcompose.model.plan import (
     Driven,
     EdgePattern,
     GuardPolicy,
@@ -77,15 +76,25 @@ from tfcompose.plan import (
     Schedule,
     SourceLine,
 )
-from tfcompose.plan.file import read_plan
-from tfcompose.plan.hosts import share_of
-from tfcompose.process import read_own
-from tfcompose.ros import environment
-from tfcompose.ros.tf_codec import TF_MESSAGE
-from tfcompose.urdf.inertia import UnmeasurableError
-from tfcompose.urdf.packages import Disk
-from tfcompose.verdict.doctor import diagnose
-from tfcompose.verdict.drivers import SentPoses, not_taken
+from tfcompose.model.plan.file import read_plan
+from tfcompose.model.plan.hosts import share_of
+from tfcompose.model.robot import Robot
+from tfcompose.model.robot.body import Asset
+from tfcompose.spec.language import set_value
+from tfcompose.spec.language.validate import validate_fleet
+from tfcompose.spec.load import Source, load
+from tfcompose.tf.bags import BagError
+from tfcompose.tf.live.publishers import Message, OtherRun, Publisher, Senders
+from tfcompose.tf.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, Topic, TreeState
+from tfcompose.tf.process import read_own
+from tfcompose.tf.ros import environment
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE
+from tfcompose.tools.deploy.connection import LostError, Settings, connected
+from tfcompose.tools.deploy.rollout import Rollout, target_of
+from tfcompose.tools.fleet.check import check_fleet
+from tfcompose.tools.fleet.observe import EdgeStatus, LinkState, RobotStatus, problems_of
+from tfcompose.tools.importers.draft import Draft
+from tfcompose.tools.importers.shell import add_script
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 AN_EXAMPLE = finding("TF801", "an example's", None)
@@ -110,7 +119,11 @@ def _trees() -> Iterator[TreeState]:
     yield TreeHistory().moving("a b").moving("b a").observed()
     yield TreeHistory().moving("a b").moving("b a", b"x").fixed("world a").observed()
     yield sound_tree().moving("map base_link", b"x").observed()
-    yield TreeHistory().moving("table cup", b"x", parents=lambda tick: ("table", "hand")[tick % 2]).observed()
+    yield (
+        TreeHistory()
+        .moving("table cup", b"x", parents=lambda tick: ("table", "hand")[tick % 2])
+        .observed()
+    )
     many = TreeHistory()
     for number in range(60):
         many.fixed(f"parent{number:02} cup")
@@ -139,11 +152,19 @@ def _stamps() -> Iterator[TreeState]:
     yield TreeHistory().moving("odom base_link", stamp=late(0.7)).observed()
     yield TreeHistory().moving("odom base_link", stamp=late(-0.3)).observed()
     yield TreeHistory().moving("odom base_link", stamp=lambda _: BEGUN_NS).observed()
-    yield TreeHistory().moving("odom base_link", stamp=lambda now: now - now // 20_000_000 % 2 * SECOND_NS).observed()
+    yield (
+        TreeHistory()
+        .moving("odom base_link", stamp=lambda now: now - now // 20_000_000 % 2 * SECOND_NS)
+        .observed()
+    )
     yield TreeHistory().moving("odom base_link", stamp=lambda _: 0).observed()
     yield TreeHistory().moving("odom base_link", stamp=since_start).observed()
     yield TreeHistory().moving("odom base_link", stamp=late(3600)).observed()
-    yield sound_tree().moving("base_link arm", b"x", stamp=since_start).observed(clock_ns=5 * SECOND_NS)
+    yield (
+        sound_tree()
+        .moving("base_link arm", b"x", stamp=since_start)
+        .observed(clock_ns=5 * SECOND_NS)
+    )
     simulated = TreeHistory().moving("odom base_link")
     for edge in ("map odom", "base_link arm"):
         simulated.moving(edge, b"x", stamp=since_start)
@@ -156,26 +177,41 @@ def _stamps() -> Iterator[TreeState]:
     yield sound_tree().observed(graph=(replace(clock, publishers=()),))
     plan = sound_plan(ros=RosSettings(clock="sim"))
     yield sound_tree().observed(graph=(replace(clock, publishers=(), readers=()),), plan=plan)
-    yield sound_tree().observed(graph=(replace(clock, publishers=("/bag", "/gazebo")),), clock_ns=1, clock_moves=True)
+    yield sound_tree().observed(
+        graph=(replace(clock, publishers=("/bag", "/gazebo")),), clock_ns=1, clock_moves=True
+    )
 
 
 def _graphs() -> Iterator[TreeState]:
-    yield sound_tree().observed(publishers=(Publisher(b"s", "/static", static=True, latched=False),), plan=sound_plan())
-    yield sound_tree().observed(publishers=(Publisher(b"d", "/drive", static=False, reliable=False),))
+    yield sound_tree().observed(
+        publishers=(Publisher(b"s", "/static", static=True, latched=False),), plan=sound_plan()
+    )
+    yield sound_tree().observed(
+        publishers=(Publisher(b"d", "/drive", static=False, reliable=False),)
+    )
     yield sound_tree().observed(volatile_readers=("/rviz",))
     yield sound_tree().observed(volatile_readers=("/rviz", "/viewer"))
     yield sound_tree().observed(graph=(Topic("/tf", "std_msgs/msg/String", ("/old",)),))
     yield sound_tree().observed(malformed={b"d": 3, None: 1})
-    both = (Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)), Topic("/tf", TF_MESSAGE, ("/robot1/ekf",)))
+    both = (
+        Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),
+        Topic("/tf", TF_MESSAGE, ("/robot1/ekf",)),
+    )
     yield sound_tree().observed(graph=both)
-    yield sound_tree().observed(publishers=tuple(Publisher(bytes([n]), f"/n{n}", static=True) for n in range(101)))
+    yield sound_tree().observed(
+        publishers=tuple(Publisher(bytes([n]), f"/n{n}", static=True) for n in range(101))
+    )
     joints = (MovingJoint("shoulder", "base_link", "arm"),)
     states = Topic("/joint_states", JOINT_STATE, ("/broadcaster",), ())
     yield sound_tree().observed(graph=(states,))
     yield sound_tree().observed(graph=(states,), moving_joints=joints)
-    yield sound_tree().observed(graph=(replace(states, publishers=(), readers=("/drive",)),), moving_joints=joints)
+    yield sound_tree().observed(
+        graph=(replace(states, publishers=(), readers=("/drive",)),), moving_joints=joints
+    )
     heard = replace(states, readers=("/drive",))
-    yield sound_tree().observed(graph=(heard,), moving_joints=joints, joint_names=frozenset({"sholder"}))
+    yield sound_tree().observed(
+        graph=(heard,), moving_joints=joints, joint_names=frozenset({"sholder"})
+    )
 
 
 def _data() -> Iterator[TreeState]:
@@ -184,15 +220,21 @@ def _data() -> Iterator[TreeState]:
 
     for frame in ("", "lasr", "elsewhere", "/laser"):
         yield sound_tree().observed(stamped=data(frame))
-    prefixed = TreeHistory().moving("robot1/odom robot1/base_link").fixed("robot1/base_link robot1/laser")
+    prefixed = (
+        TreeHistory().moving("robot1/odom robot1/base_link").fixed("robot1/base_link robot1/laser")
+    )
     yield prefixed.observed(stamped=data("laser"))
-    yield TreeHistory().moving("odom base_link", stamp=late(0.4)).observed(stamped=data("base_link"))
+    yield (
+        TreeHistory().moving("odom base_link", stamp=late(0.4)).observed(stamped=data("base_link"))
+    )
     yield sound_tree().observed(stamped=data("laser", 12.0))
     yield sound_tree().observed(stamped=data("laser", -1.0))
     for stamp in (0, 1234 * SECOND_NS, END_NS + 7200 * SECOND_NS):
         yield sound_tree().observed(stamped=data("laser", (END_NS - stamp) / 1e9, stamp, END_NS))
     simulated = TreeHistory().moving("odom base_link", stamp=since_start).fixed("base_link laser")
-    yield simulated.observed(stamped=data("laser", 0.0, END_NS, END_NS), clock_ns=5 * SECOND_NS, clock_moves=True)
+    yield simulated.observed(
+        stamped=data("laser", 0.0, END_NS, END_NS), clock_ns=5 * SECOND_NS, clock_moves=True
+    )
 
 
 def _setups() -> Iterator[TreeState]:
@@ -217,7 +259,16 @@ def with_a_plan() -> Iterator[Finding]:
     """Judge trees at the end by a plan, as verify and the doctor do, of live trees and of recordings."""
     two = (
         *sound_plan().edges,
-        PlanEdge("base_link", "imu", "static", "static", "/static", Pose(), None, SourceLine("rover.yaml", 10)),
+        PlanEdge(
+            "base_link",
+            "imu",
+            "static",
+            "static",
+            "/static",
+            Pose(),
+            None,
+            SourceLine("rover.yaml", 10),
+        ),
     )
     for tree, plan in (
         (TreeHistory().moving("odom base_link"), sound_plan()),
@@ -228,7 +279,10 @@ def with_a_plan() -> Iterator[Finding]:
         (sound_tree().moving("map base_link", b"x"), sound_plan()),
         (TreeHistory().moving("map base_link").fixed("base_link laser"), sound_plan()),
         (sound_tree().moving("base_link arm", b"x"), sound_plan()),
-        (TreeHistory().moving("odom base_link", until_s=3.0).fixed("base_link laser"), sound_plan()),
+        (
+            TreeHistory().moving("odom base_link", until_s=3.0).fixed("base_link laser"),
+            sound_plan(),
+        ),
         (sound_tree().knows(b"s"), sound_plan()),
         (sound_tree().knows(b"d"), sound_plan()),
         (TreeHistory().moving("odom base_link", hz=20.0).fixed("base_link laser"), sound_plan()),
@@ -254,7 +308,9 @@ def _running(**more: Any) -> guarded.History:
     return guarded.History(**more).clear()
 
 
-def _sent(node: str | None, sent: str, times: int = 5, *, static: bool = False, **more: Any) -> guarded.History:
+def _sent(
+    node: str | None, sent: str, times: int = 5, *, static: bool = False, **more: Any
+) -> guarded.History:
     """Return the history in which a node sends these edges so often."""
     history = _running(**more)
     return history.repeat(history.joins(node, static=static), sent, times)
@@ -284,7 +340,12 @@ def _strangers() -> Iterator[guarded.History]:
         neighbour.run = OtherRun("other@0", 4711, "14:03:27")
         yield neighbouring.repeat(neighbour, edges, 20)
     stops = GuardPolicy(on_violation="stop-offender")
-    yield _sent("/slam", "odom base", guard=stops, processes=(PlanProcess("slam", "run", nodes=("/slam",)),))
+    yield _sent(
+        "/slam",
+        "odom base",
+        guard=stops,
+        processes=(PlanProcess("slam", "run", nodes=("/slam",)),),
+    )
     for switch in ("enable_odom_tf: false", ""):
         yield _sent("/diff", "odom base", claims=(PlanClaim("/diff", "odom", "base", switch),))
     nodes = tuple(replace(one, nodes=(f"/{one.name}er",)) for one in guarded.PROCESSES)
@@ -298,10 +359,21 @@ def _strangers() -> Iterator[guarded.History]:
     unsure = _running(gids=False)
     unsure.joins("/drive")
     yield unsure.repeat(unsure.joins("/rogue"), "map odom, base cup", 10)
-    misnamed = _running(processes=tuple(PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")))
+    misnamed = _running(
+        processes=tuple(
+            PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")
+        )
+    )
     other = misnamed.joins("/other")
     misnamed.send(other, "map odom")
-    writer = Publisher(other.gid, "/other", static=False, ours=True, process="slam", where="on this machine as pid 7")
+    writer = Publisher(
+        other.gid,
+        "/other",
+        static=False,
+        ours=True,
+        process="slam",
+        where="on this machine as pid 7",
+    )
     misnamed.events += misnamed.judge.graph([writer], misnamed.now)
     misnamed.events += misnamed.judge.tick(misnamed.now + 0.2)
     yield misnamed
@@ -332,7 +404,9 @@ def _settings() -> Iterator[guarded.History]:
     history.joins("/static", static=True, volatile=True)
     yield history.wait(5)
     history = _running()
-    history.events += history.judge.graph([Publisher(b"w" * 16, "/slam", static=False, reliable=False)], history.now)
+    history.events += history.judge.graph(
+        [Publisher(b"w" * 16, "/slam", static=False, reliable=False)], history.now
+    )
     yield history
     history = _running()
     writers = [Publisher(b"w" * 16, "/slam", static=static) for static in (False, True)]
@@ -368,7 +442,10 @@ def _clocks() -> Iterator[guarded.History]:
 
 
 def _lost() -> Iterator[guarded.History]:
-    edges = (guarded.edge("map odom", "slam", rate=10.0), guarded.edge("odom base", "slam", rate=10.0))
+    edges = (
+        guarded.edge("map odom", "slam", rate=10.0),
+        guarded.edge("odom base", "slam", rate=10.0),
+    )
     for names in ("map odom", "map odom, odom base"):
         history = _running(edges=edges)
         yield history.repeat(history.joins("/slam"), names, 30).wait(2)
@@ -407,7 +484,9 @@ def _drivers() -> Iterator[Finding]:
         sent_poses = SentPoses(plan, senders)
         sent_edges = tuple((one.parent, one.child) for one in edges[:count])
         off = [Pose((0.0, 0.1, 0.0))] * count
-        sent_poses.take(Message(sent_edges, static=True, gid=b"g" * 16, source_ns=0, sequence=1, poses=off))
+        sent_poses.take(
+            Message(sent_edges, static=True, gid=b"g" * 16, source_ns=0, sequence=1, poses=off)
+        )
         yield from sent_poses.judge()
     for value in (True, None):
         yield from not_taken(node, {"publish_tf": False}, {"publish_tf": value}, (driven,))
@@ -423,17 +502,24 @@ def launcher() -> Iterator[Finding]:
     with TemporaryDirectory() as folder, inside(folder):
         for plan, env in _unfit():
             base, file = {"PATH": "/nowhere", **env}, Path(folder, "plan.json")
-            found = commands_of(plan, list(plan.processes), file, base, environment.child_environment)[1]
+            found = commands_of(
+                plan, list(plan.processes), file, base, environment.child_environment
+            )[1]
             yield from (_without(one, folder) for one in found)
     held = PlanProcess("lidar", "run", schedule=Schedule((4095,)))
     yield refused_schedule(held) or AN_EXAMPLE
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
-        yield refused_schedule(replace(held, schedule=Schedule(policy="fifo", priority=80))) or AN_EXAMPLE
+        yield (
+            refused_schedule(replace(held, schedule=Schedule(policy="fifo", priority=80)))
+            or AN_EXAMPLE
+        )
 
 
 def _without(found: Finding, folder: str) -> Finding:
     """Return the finding with the name of a folder that stays the same."""
-    notes = tuple(replace(note, message=note.message.replace(folder, "FOLDER")) for note in found.notes)
+    notes = tuple(
+        replace(note, message=note.message.replace(folder, "FOLDER")) for note in found.notes
+    )
     return replace(found, message=found.message.replace(folder, "FOLDER"), notes=notes)
 
 
@@ -446,7 +532,9 @@ def _machines() -> Iterator[Any]:
     for _ in range(3):
         restarted.feed(Exited("a", 1)).wait(20)
     yield restarted
-    yield begin(STATIC, run_process("camera", required=False)).feed(Exited("camera", 3, ("no device",)))
+    yield begin(STATIC, run_process("camera", required=False)).feed(
+        Exited("camera", 3, ("no device",))
+    )
     yield begin(STATIC, SLAM).feed(StartFailed("slam", "Permission denied"))
     yield begin(GUARD, SLAM).wait(20)
     yield begin(GUARD, SLAM).feed(Exited("guard", 1, ("no rclpy",)))
@@ -463,30 +551,59 @@ def _machines() -> Iterator[Any]:
     )
     yield offender.feed(Exited("slam", -2), Found(AN_EXAMPLE, "slam"))
     lidar = PlanProcess("lidar", "run", nodes=("/lidar",))
-    gates = {"topic": "/scan", "service": "/reset", "lifecycle": "active", "log": "ready [0-9]+", "exit": ""}
+    gates = {
+        "topic": "/scan",
+        "service": "/reset",
+        "lifecycle": "active",
+        "log": "ready [0-9]+",
+        "exit": "",
+    }
     for kind, text in gates.items():
         gate: Any = Ready(kind, text, timeout_s=3.0)  # type: ignore[arg-type]
-        yield begin(GUARD, replace(lidar, ready=gate)).feed(Clear(), GateShut("lidar", "topics /tf")).wait(3)
+        yield (
+            begin(GUARD, replace(lidar, ready=gate))
+            .feed(Clear(), GateShut("lidar", "topics /tf"))
+            .wait(3)
+        )
     gate = Ready("edges", timeout_s=3.0)
     shut = GateShut("slam", "/tf is published by nobody")
     yield begin(GUARD, STATIC, replace(SLAM, ready=gate)).feed(Clear(), shut).wait(3)
     after = run_process("b", after={"lidar": "ready"})
-    yield begin(GUARD, STATIC, replace(lidar, ready=Ready("topic", "/scan")), after).feed(Clear(), Exited("lidar", 0))
+    yield begin(GUARD, STATIC, replace(lidar, ready=Ready("topic", "/scan")), after).feed(
+        Clear(), Exited("lidar", 0)
+    )
     slam = replace(SLAM, argv=("slam",))
     yield begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), TimeUp())
-    stopped = begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), Live("slam", ("odom",)))
+    stopped = begin(GUARD, STATIC, slam).feed(
+        Clear(), Live("static", ("laser",)), Live("slam", ("odom",))
+    )
     yield stopped.feed(ProcessRequest("stop", "slam"), Exited("slam", -2), TimeUp())
-    yield begin(GUARD, STATIC, replace(slam, after={"drive": "ready"}), drive).feed(Clear(), TimeUp())
+    yield begin(GUARD, STATIC, replace(slam, after={"drive": "ready"}), drive).feed(
+        Clear(), TimeUp()
+    )
 
 
 def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
-    def plan(*processes: PlanProcess, guard: GuardPolicy | None = None, ros: RosSettings | None = None) -> Plan:
+    def plan(
+        *processes: PlanProcess, guard: GuardPolicy | None = None, ros: RosSettings | None = None
+    ) -> Plan:
         edges = tuple(
-            PlanEdge(parent, child, "dynamic", one.name, f"/{one.name}", Pose(), None, SourceLine("rover.yaml", 1))
+            PlanEdge(
+                parent,
+                child,
+                "dynamic",
+                one.name,
+                f"/{one.name}",
+                Pose(),
+                None,
+                SourceLine("rover.yaml", 1),
+            )
             for one in processes
             for parent, child in one.owns
         )
-        return Plan("rover", "", None, ros or RosSettings(), edges, processes, guard or GuardPolicy())
+        return Plan(
+            "rover", "", None, ros or RosSettings(), edges, processes, guard or GuardPolicy()
+        )
 
     true = ("/bin/true",)
 
@@ -494,7 +611,10 @@ def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
         return PlanProcess(name, "run", argv=argv or true, **more)
 
     yield plan(run("lidar", "${executable:sllidar_ros2/sllidar_node}")), {}
-    yield plan(run("lidar", "${executable:sllidar_ros2/sllidar_node}")), {"AMENT_PREFIX_PATH": "/opt/ros/none"}
+    yield (
+        plan(run("lidar", "${executable:sllidar_ros2/sllidar_node}")),
+        {"AMENT_PREFIX_PATH": "/opt/ros/none"},
+    )
     yield plan(run("lidar", "${executable:sllidar_ros2/sllidar_node}"), run("a", "no_a")), {}
     yield plan(run("lidar", "bin/lidar")), {}
     yield plan(run("a", cwd="maps")), {}
@@ -507,11 +627,19 @@ def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
     partition, remap = (GuardPolicy("strict", fence=fence) for fence in ("partition", "remap"))
     yield plan(owner, guard_process, guard=partition), {"RMW_IMPLEMENTATION": "rmw_x"}
     yield plan(replace(owner, remap={"/tf": "tf"}), guard_process, guard=partition), {}
-    yield plan(owner, guard_process, guard=partition), {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"}
+    yield (
+        plan(owner, guard_process, guard=partition),
+        {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"},
+    )
     sets = "export FASTRTPS_DEFAULT_PROFILES_FILE=/opt/my.xml; exec slam"
     yield plan(replace(owner, argv=("/bin/sh", "-c", sets)), guard_process, guard=partition), {}
     shell = replace(owner, argv=("/bin/sh", "-c", "slam | tee log"))
-    yield plan(shell, replace(shell, name="more", owns=(("odom", "a"),)), guard_process, guard=remap), {}
+    yield (
+        plan(
+            shell, replace(shell, name="more", owns=(("odom", "a"),)), guard_process, guard=remap
+        ),
+        {},
+    )
     yield plan(run("nav", "${launch:nav2/nav.launch.py}")), {}
 
 
@@ -521,45 +649,81 @@ def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
 def surroundings() -> Iterator[Finding]:
     """Look at plans, hosts, bags and installations that are not as they should be."""
     yield from _refused(partial(read_own, [], "static"))
-    for text in ("nonsense", "[]", '{"version": 0, "edges": [], "processes": []}', '{"edges": 1, "processes": []}'):
+    for text in (
+        "nonsense",
+        "[]",
+        '{"version": 0, "edges": [], "processes": []}',
+        '{"edges": 1, "processes": []}',
+    ):
         yield from _refused(partial(read_plan, text, "plan.json"))
     plan = compiled_plan(ROVER)
-    elsewhere = replace(plan, processes=tuple(replace(one, host="jetson") for one in plan.processes))
+    elsewhere = replace(
+        plan, processes=tuple(replace(one, host="jetson") for one in plan.processes)
+    )
     strict = replace(elsewhere, guard=GuardPolicy("strict"))
     shares = ((plan, "jetson"), (elsewhere, "jetsn"), (elsewhere, None), (strict, None))
-    yield from (found for some, host in shares if isinstance(found := share_of(some, host, "laptop"), Finding))
+    yield from (
+        found
+        for some, host in shares
+        if isinstance(found := share_of(some, host, "laptop"), Finding)
+    )
     with mock.patch.object(environment, "find_spec", return_value=None):
         yield environment.no_ros() or AN_EXAMPLE
-    with mock.patch.object(environment, "no_ros", return_value=None), mock.patch.dict(os.environ, LD_LIBRARY_PATH=""):
+    with (
+        mock.patch.object(environment, "no_ros", return_value=None),
+        mock.patch.dict(os.environ, LD_LIBRARY_PATH=""),
+    ):
         for settings in ({"ROS_DOMAIN_ID": "300"}, {"RMW_IMPLEMENTATION": "rmw_none_cpp"}):
             yield environment.ros_trouble(settings) or AN_EXAMPLE
         zenoh = RosSettings(rmw="zenoh")
         yield environment.ros_trouble({"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, zenoh) or AN_EXAMPLE
-        yield environment.other_middleware({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, zenoh) or AN_EXAMPLE
-        yield environment.other_distro({"ROS_DISTRO": "jazzy"}, RosSettings(distro="kilted")) or AN_EXAMPLE
+        yield (
+            environment.other_middleware({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, zenoh)
+            or AN_EXAMPLE
+        )
+        yield (
+            environment.other_distro({"ROS_DISTRO": "jazzy"}, RosSettings(distro="kilted"))
+            or AN_EXAMPLE
+        )
         with mock.patch("ctypes.CDLL"):
             for name in ("rmw_cyclonedds_cpp", "rmw_zenoh_cpp"):
-                session = {"RMW_IMPLEMENTATION": name, "ZENOH_SESSION_CONFIG_URI": "/no/such.json5"}
-                with mock.patch.object(environment, "find_spec", return_value=None if "dds" in name else True):
+                session = {
+                    "RMW_IMPLEMENTATION": name,
+                    "ZENOH_SESSION_CONFIG_URI": "/no/such.json5",
+                }
+                with mock.patch.object(
+                    environment, "find_spec", return_value=None if "dds" in name else True
+                ):
                     yield environment.ros_trouble(session) or AN_EXAMPLE
     yield from check(Robot("r", "r.yaml", {}, (), {}, (), None), [two_parents])
     with mock.patch.object(live, "reject", side_effect=_rejected):
-        with mock.patch.object(live, "missing_rosbags", return_value="rosbags is not installed: pip install it"):
+        with mock.patch.object(
+            live, "missing_rosbags", return_value="rosbags is not installed: pip install it"
+        ):
             yield from _refused(partial(live.from_bag, list))
         yield from _refused(partial(live.from_bag, _no_bag))
 
 
 def fleets() -> Iterator[Finding]:
     """Look at fleets: at files with faults, and at robots that are not as they should be."""
-    head = "fleet: 1\nrobots: {r1: {router: tcp/a:7447}, r2: {router: tcp/b:7447, prefix: PREFIX, share: [EDGE]}}\n"
+    head = (
+        "fleet: 1\nrobots: {r1: {router: tcp/a:7447}, r2: {router: tcp/b:7447, prefix: PREFIX,"
+        " share: [EDGE]}}\n"
+    )
     text = f"{head}share: [map → odom, odom → base_link]\n"
-    for prefix, edge in (("r1/", "map → odom"), ("r2/", "odom → base_link"), ("r2/", "odom, base_link")):
+    for prefix, edge in (
+        ("r1/", "map → odom"),
+        ("r2/", "odom → base_link"),
+        ("r2/", "odom, base_link"),
+    ):
         source = load(text.replace("PREFIX", prefix).replace("EDGE", edge), "fleet.yaml")
         yield from _refused(partial(_check_fleet, source))
     source = load(text.replace("PREFIX", "r2/").replace("[EDGE]", "[]"), "fleet.yaml")
     yield from check_fleet(validate_fleet(source), source)
     ages = [(None, None, False), (9.0, 0.1, True), (0.1, -2.0, False)]
-    edges = tuple(EdgeStatus("r1/odom", f"r1/{age}", age, delay, stale) for age, delay, stale in ages)
+    edges = tuple(
+        EdgeStatus("r1/odom", f"r1/{age}", age, delay, stale) for age, delay, stale in ages
+    )
     states: list[tuple[LinkState, float | None]] = [
         ("unreachable", None), ("unreachable", 4.0), ("stale", 4.0), ("silent", None), ("live", 0.1)
     ]  # fmt: skip
@@ -596,7 +760,8 @@ def _refused(work: Callable[[], object]) -> list[Finding]:
     return []
 
 
-# What the file's findings in ``test_findings`` leave out: presets of one's own, settings, and what a build refuses.
+# What the file's findings in ``test_findings`` leave out: presets of one's own, settings, and what
+# a build refuses.
 
 
 def compiled() -> Iterator[Finding]:
@@ -605,13 +770,24 @@ def compiled() -> Iterator[Finding]:
         yield from _refused(partial(set_value, setting))
     robot = f"{HEAD}preset_path: presets\nsensors: {{s: {{preset: %s, parent: base_link}}}}\n"
     with TemporaryDirectory() as folder, inside(folder):
-        for name, text in {"realsense/d435i": "preset: 1\nextends: realsense/d435i\n", "me/mast": MAST}.items():
+        for name, text in {
+            "realsense/d435i": "preset: 1\nextends: realsense/d435i\n",
+            "me/mast": MAST,
+        }.items():
             yield from _with_preset(name, text, robot % name)
         for old, new in WRONG_IN_MAST:
             yield from _with_preset("me/mast", MAST.replace(old, new, 1), robot % "me/mast")
-    mass = "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {mesh: a.stl}, inertial: {mass: 6 kg}}}\n"
-    for code, why in (("TF905", "trimesh, which computes its volume, is not installed"), ("TF725", "it is flat")):
-        moments = mock.Mock(side_effect=UnmeasurableError(code, why, "pip install 'tfcompose[mesh]'"))
+    mass = (
+        "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {mesh: a.stl}, inertial: {mass: 6"
+        " kg}}}\n"
+    )
+    for code, why in (
+        ("TF905", "trimesh, which computes its volume, is not installed"),
+        ("TF725", "it is flat"),
+    ):
+        moments = mock.Mock(
+            side_effect=UnmeasurableError(code, why, "pip install 'tfcompose[mesh]'")
+        )
         here = Disk(mock.Mock(return_value=""), lambda _: True, lambda _: True, moments=moments)
         yield from compile_robot(mass, "r.yaml", library(), read=mock.Mock(), disk=here).found
     for form in ("package", "file"):
@@ -633,14 +809,20 @@ def recordings() -> Iterator[Finding]:
     """Read bags that are none, or hold no TF, and ask them for poses that they do not have."""
     refuse = partial(mock.patch.object, attribute="reject", side_effect=_rejected)
     with TemporaryDirectory() as folder, inside(folder), refuse(live), refuse(echo):
-        for name, sent in {"bag": drive(), "below": drive(topic="/robot1/tf"), "empty": []}.items():
+        for name, sent in {
+            "bag": drive(),
+            "below": drive(topic="/robot1/tf"),
+            "empty": [],
+        }.items():
             write_bag(Path(name), sent)
         Path("folder").mkdir()
         files = ("old.bag", "whole.mcap.zstd", "notes.txt")
         for name in files:
             Path(name).write_bytes(bytes(64))
         for bag in ("none", "folder", "empty", "below", *files):
-            yield from _refused(partial(main, ["echo", "odom", "base_link", "--bag", bag, "--once"]))
+            yield from _refused(
+                partial(main, ["echo", "odom", "base_link", "--bag", bag, "--once"])
+            )
         for words in (["odom", "base_lnk"], ["odom", "base_link", "--at", "1000000000.5"]):
             yield from _refused(partial(main, ["echo", *words, "--bag", "bag", "--once"]))
 
@@ -659,31 +841,53 @@ def imported() -> Iterator[Finding]:
 def deployed() -> Iterator[Finding]:
     """Deploy to hosts that lack something, are apart, are lost or do not come up."""
     hosted = compiled_plan(HOSTED)
-    for plan, names in ((replace(hosted, hosts={}), []), (compiled_plan(NOWHERE), []), (hosted, ["jetsn"])):
+    for plan, names in (
+        (replace(hosted, hosts={}), []),
+        (compiled_plan(NOWHERE), []),
+        (hosted, ["jetsn"]),
+    ):
         try:
             target_of(plan, names, {})
         except RejectedError as error:
             yield from error.findings
-    refused = asyncio.run(connected("rear", PlanHost("root@127.0.0.1", 1), Settings("x.rear", "x"), None))
+    refused = asyncio.run(
+        connected("rear", PlanHost("root@127.0.0.1", 1), Settings("x.rear", "x"), None)
+    )
     yield refused if isinstance(refused, Finding) else AN_EXAMPLE
     lacks: tuple[dict[str, dict[str, Any]], ...] = (
         {"jetson": {"problems": ["systemd does not run for this user: Failed to connect to bus"]}},
         {"jetson": {"tfcompose": None}},
         {"jetson": {"env": {"ROS_DOMAIN_ID": "7", "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}}},
-        {"jetson": {"machine": "b"}, "main": {"env": {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}}},
+        {
+            "jetson": {"machine": "b"},
+            "main": {"env": {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}},
+        },
     )
     for probes in lacks:
-        yield from asyncio.run(rollout_to(StandInHost("main"), StandInHost("jetson"), probes=probes).examine())
-    yield from asyncio.run(rollout_to(StandInHost("main"), StandInHost("jetson", offset_s=2)).examine())
+        yield from asyncio.run(
+            rollout_to(StandInHost("main"), StandInHost("jetson"), probes=probes).examine()
+        )
+    yield from asyncio.run(
+        rollout_to(StandInHost("main"), StandInHost("jetson", offset_s=2)).examine()
+    )
     for answers in (
         {"take_lock": {"holder": "ann@laptop, pid 7, since 12:00:00"}},
         {"state": STATE | STATUS | {"stranger": 4711}},
         {"start": LostError("is lost: the connection has ended"), "back": LostError("is lost")},
-        {"wait": STATUS | {"failed": True, "lines": ["tfcompose: error"]}, "back": {"release": None, "active": False}},
-        {"wait": STATUS | {"robot": RUNNING | {"missing": ["base_link → arm"], "processes": [LATE]}}},
+        {
+            "wait": STATUS | {"failed": True, "lines": ["tfcompose: error"]},
+            "back": {"release": None, "active": False},
+        },
+        {
+            "wait": (
+                STATUS | {"robot": RUNNING | {"missing": ["base_link → arm"], "processes": [LATE]}}
+            )
+        },
         {},
     ):
-        yield from asyncio.run(_rolled_out(rollout_to(StandInHost("main"), StandInHost("jetson", answers))))
+        yield from asyncio.run(
+            _rolled_out(rollout_to(StandInHost("main"), StandInHost("jetson", answers)))
+        )
 
 
 async def _rolled_out(rollout: Rollout) -> list[Finding]:

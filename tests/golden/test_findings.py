@@ -1,8 +1,9 @@
 """Golden findings: which codes stand at which places, for sound robots, marked specs, bad input and mutated files.
 
-A golden holds one row per finding: ``case: code line:col-line:col``, with the file where it is not the case's own,
-``warning`` where it is none of the errors, and the spans of its edits and notes. Messages have their own tests.
-After an intended change: ``python -m tests.golden.test_findings --write``, and read the difference.
+A golden holds one row per finding: ``case: code line:col-line:col``, with the file where it is not
+the case's own, ``warning`` where it is none of the errors, and the spans of its edits and notes.
+Messages have their own tests. After an intended change: ``python -m tests.golden.test_findings
+--write``, and read the difference.
 """
 
 import json
@@ -20,16 +21,16 @@ import pytest
 from tests.support.bad_input import BAD
 from tests.support.goldens import compare, write
 from tests.support.mutations import mutated
-from tfcompose.check import unused_allows
 from tfcompose.cli.compiling import PRESETS, disk, library
 from tfcompose.cli.reading import read_text
-from tfcompose.compile import compile_robot
-from tfcompose.findings import Edit, Finding, RejectedError, Span
-from tfcompose.language import profiles_in, set_value, validate_node_preset
-from tfcompose.load import Source, load
-from tfcompose.resolve import Library
-from tfcompose.urdf.packages import Packages
-from tfcompose.urdf.xacro import Expansion, Use
+from tfcompose.compiler.check import unused_allows
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.resolve import Library
+from tfcompose.compiler.urdf.packages import Packages
+from tfcompose.compiler.urdf.xacro import Expansion, Use
+from tfcompose.foundation.findings import Edit, Finding, RejectedError, Span
+from tfcompose.spec.language import profiles_in, set_value, validate_node_preset
+from tfcompose.spec.load import Source, load
 
 ROOT = Path(__file__).parents[2]
 #: A case's name, the file that it is about, and what is found.
@@ -38,11 +39,20 @@ Case = tuple[str, str, "Iterable[Finding]"]
 GOLDEN = Path(__file__).parent / "findings"
 TEXTS = GOLDEN / "texts"
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
-INCLUDING = "tfcompose: 1\nrobot: r\ninclude: [below.yaml]\nframes: {odom: {rate: 3 Hz}, tip: {parent: base_link}}\n"
+INCLUDING = (
+    "tfcompose: 1\nrobot: r\ninclude: [below.yaml]\nframes: {odom: {rate: 3 Hz}, tip: {parent:"
+    " base_link}}\n"
+)
 
 ROBOTS = sorted((ROOT / "robots").glob("*.yaml"))
-SPECS = [*sorted((ROOT / "tests/check/specs").glob("*.yaml")), *sorted((ROOT / "tests/check/sound").glob("*.yaml"))]
-CALIBRATIONS = [*sorted((TEXTS / "calibration").iterdir()), *sorted((ROOT / "robots/calibration").iterdir())]
+SPECS = [
+    *sorted((ROOT / "tests/compiler/check/specs").glob("*.yaml")),
+    *sorted((ROOT / "tests/compiler/check/sound").glob("*.yaml")),
+]
+CALIBRATIONS = [
+    *sorted((TEXTS / "calibration").iterdir()),
+    *sorted((ROOT / "robots/calibration").iterdir()),
+]
 
 #: Values as --set gives them, laid over robots/autonomous_robot.yaml.
 SETTINGS = (
@@ -54,7 +64,9 @@ SETTINGS = (
 )  # fmt: skip
 
 
-def within(text: str, file: str, texts: dict[str, str] | None = None, **more: Any) -> list[Finding]:
+def within(
+    text: str, file: str, texts: dict[str, str] | None = None, **more: Any
+) -> list[Finding]:
     """Return everything that is found in a robot; ``texts`` stand in the place of files."""
     known = texts or {}
 
@@ -66,10 +78,15 @@ def within(text: str, file: str, texts: dict[str, str] | None = None, **more: An
 
     files = replace(disk(), read=read, is_file=is_file, expand=expanded)
     compiled = compile_robot(text, file, presets(), read=read, disk=files, **more)
-    return [*compiled.found, *(unused_allows(compiled.allows, set(compiled.used)) if not more else [])]
+    return [
+        *compiled.found,
+        *(unused_allows(compiled.allows, set(compiled.used)) if not more else []),
+    ]
 
 
-def expanded(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None) -> Expansion:
+def expanded(
+    file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None
+) -> Expansion:
     """Expand a file with xacro, once for all mutations that leave it and its use as they are."""
     key = repr((Path(file).absolute(), arguments, use))
     if key not in _expansions:
@@ -126,7 +143,11 @@ def bad_input() -> Iterator[Case]:
         os.chdir(folder)
         for name, (data, *_) in BAD.items():
             Path("robot.yaml").write_bytes(data)
-            yield name, "robot.yaml", refusals(lambda: within(read_text("robot.yaml"), "robot.yaml"))
+            yield (
+                name,
+                "robot.yaml",
+                refusals(lambda: within(read_text("robot.yaml"), "robot.yaml")),
+            )
         os.chdir(ROOT)
 
 
@@ -161,10 +182,14 @@ def mutations_of(path: Path, count: int, file: str = "") -> Iterator[Case]:
     text, name = path.read_text("utf-8"), name_of(path)
     file = file or name
     for number in range(count):
-        wrong = mutated(text, f"{name} {number}")
+        wrong = mutated(text, f"{path.name} {number}")
         yield f"{name} {number}", file, within(wrong, file)
         for profile in profiles(wrong)[:1] if number % 4 == 0 else []:
-            yield f"{name} {number} --profile {profile}", file, within(wrong, file, profiles=(profile,))
+            yield (
+                f"{name} {number} --profile {profile}",
+                file,
+                within(wrong, file, profiles=(profile,)),
+            )
 
 
 def overlays() -> Iterator[Case]:
@@ -183,9 +208,14 @@ def overlays() -> Iterator[Case]:
         yield f"overlay {number}", file, laid(load, wrong, "overlay.yaml")
         wrong = mutated(text, f"included {number}")
         including = (
-            "tfcompose: 1\nrobot: r\ninclude: [below.yaml]\nframes: {odom: {rate: 3 Hz}, tip: {parent: base_link}}\n"
+            "tfcompose: 1\nrobot: r\ninclude: [below.yaml]\nframes: {odom: {rate: 3 Hz}, tip:"
+            " {parent: base_link}}\n"
         )
-        yield f"included {number}", "robot.yaml", within(including, "robot.yaml", {"below.yaml": wrong})
+        yield (
+            f"included {number}",
+            "robot.yaml",
+            within(including, "robot.yaml", {"below.yaml": wrong}),
+        )
         wrong = mutated((ROOT / "robots/rover.yaml").read_text("utf-8"), f"part {number}")
         both = (ROOT / "robots/two_rovers.yaml").read_text("utf-8")
         yield (
@@ -207,8 +237,14 @@ def sensor_presets() -> Iterator[Case]:
             text = path.read_text("utf-8")
             name = f"{path.parent.name}/{path.stem}"
             for number, more in ((-1, ""), (-1, without), (0, ""), (1, without)):
-                file.write_text(mutated(text, f"{name} {number}") if number >= 0 else text, "utf-8")
-                yield f"{name} {number}{more}", file.as_posix(), within(HEAD + uses % more, "robot.yaml")
+                file.write_text(
+                    mutated(text, f"{name} {number}") if number >= 0 else text, "utf-8"
+                )
+                yield (
+                    f"{name} {number}{more}",
+                    file.as_posix(),
+                    within(HEAD + uses % more, "robot.yaml"),
+                )
         os.chdir(ROOT)
 
 
@@ -230,12 +266,16 @@ def of_node_preset(text: str, file: str) -> Iterable[Finding]:
 
 
 def calibrations() -> Iterator[Case]:
-    robot = HEAD.replace("{}", "{visual: {box: [2, 2, 2]}}") + (
-        "frames:\n  kit_link: {parent: base_link}\n  tool0: {parent: base_link}\n"
-        "  lens: {parent: base_link, calibration: FILE}\n"
-        "  cam1: {parent: base_link}\n  cam0: {parent: cam1, calibration: {file: FILE, parent: cam1, child: cam0}}\n"
+    robot = (
+        HEAD.replace("{}", "{visual: {box: [2, 2, 2]}}")
+        + "frames:\n  kit_link: {parent: base_link}\n  tool0: {parent: base_link}\n  lens:"
+        " {parent: base_link, calibration: FILE}\n  cam1: {parent: base_link}\n  cam0: {parent:"
+        " cam1, calibration: {file: FILE, parent: cam1, child: cam0}}\n"
     )
-    full = HEAD + "frames: {kit_link: {parent: base_link}, lens: {parent: base_link}}\ncalibrations: [FILE]\n"
+    full = (
+        HEAD + "frames: {kit_link: {parent: base_link}, lens: {parent: base_link}}\ncalibrations:"
+        " [FILE]\n"
+    )
     for path in CALIBRATIONS:
         text = path.read_text("utf-8")
         for number in range(-1, 20):
@@ -264,7 +304,9 @@ def rows(name: str) -> list[str]:
     with in_the_repository():
         made = []
         for case, file, found in CORPORA[name]():
-            made += [f"{case}: {row}\n" for row in sorted(row_of(one, file) for one in found)] or [f"{case}: none\n"]
+            made += [f"{case}: {row}\n" for row in sorted(row_of(one, file) for one in found)] or [
+                f"{case}: none\n"
+            ]
         return made
 
 
@@ -272,8 +314,13 @@ def row_of(found: Finding, file: str) -> str:
     """Return a finding's code and places, in which the name of the case's own file is left out."""
     words = [found.code, place(found.span, file)]
     words += ["warning"] if found.severity == "warning" else []
-    words += [f"fix {place(one.span, file)} {json.dumps(one.text, ensure_ascii=False)}" for one in ordered(found.edits)]
-    return " ".join([*words, *sorted(f"note {place(one.span, file)}" for one in found.notes if one.span)])
+    words += [
+        f"fix {place(one.span, file)} {json.dumps(one.text, ensure_ascii=False)}"
+        for one in ordered(found.edits)
+    ]
+    return " ".join(
+        [*words, *sorted(f"note {place(one.span, file)}" for one in found.notes if one.span)]
+    )
 
 
 def ordered(edits: Iterable[Edit]) -> list[Edit]:

@@ -1,6 +1,7 @@
 """Golden files: what build writes for the example robots, byte for byte.
 
-After an intended change: ``TFCOMPOSE_UPDATE_GOLDEN=1 pytest tests/golden``, and read the difference.
+After an intended change: ``TFCOMPOSE_UPDATE_GOLDEN=1 pytest tests/golden``, and read the
+difference.
 """
 
 import os
@@ -56,12 +57,22 @@ def test_build_writes_the_golden_files_byte_for_byte(case: str, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_files_do_not_depend_on_folder_spelling_of_the_path_or_hash_seed(case: str, tmp_path: Path) -> None:
+def test_the_files_do_not_depend_on_folder_spelling_of_the_path_or_hash_seed(
+    case: str, tmp_path: Path
+) -> None:
     file, *options = CASES[case]
     golden = contents(HERE / case)
     shutil.copytree(ROBOTS, tmp_path, dirs_exist_ok=True)
-    assert build((str(ROBOTS / file), *options), tmp_path / "a", tmp_path, PYTHONHASHSEED="1") == golden
-    assert build((f"../{tmp_path.name}/{file}", *options), tmp_path / "b", tmp_path, PYTHONHASHSEED="2") == golden
+    assert (
+        build((str(ROBOTS / file), *options), tmp_path / "a", tmp_path, PYTHONHASHSEED="1")
+        == golden
+    )
+    assert (
+        build(
+            (f"../{tmp_path.name}/{file}", *options), tmp_path / "b", tmp_path, PYTHONHASHSEED="2"
+        )
+        == golden
+    )
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -69,7 +80,11 @@ def test_building_over_an_earlier_build_leaves_the_same_files(
     case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(HERE.parents[1])
-    for other in ("autonomous_robot", "my_robot", case):  # the first has a parameter file that the others have not
+    for other in (
+        "autonomous_robot",
+        "my_robot",
+        case,
+    ):  # the first has a parameter file that the others have not
         file, *options = CASES[other]
         tfcompose("build", f"robots/{file}", *options, "-o", tmp_path)
     assert contents(tmp_path) == contents(HERE / case)

@@ -1,7 +1,8 @@
 """Golden views: what commands print, one file each; other tests assert names, numbers and exit codes.
 
-No process runs: commands that look at recordings stand for those that look at a live tree, and statuses and notices are
-given as a launcher would. After an intended change: ``python -m tests.golden.test_views --write``.
+No process runs: commands that look at recordings stand for those that look at a live tree, and
+statuses and notices are given as a launcher would. After an intended change: ``python -m
+tests.golden.test_views --write``.
 """
 
 from collections.abc import Callable
@@ -17,9 +18,9 @@ from tests.support.robots import ROVER
 from tests.support.tree_history import SECOND_NS
 from tfcompose.cli.commands import ps
 from tfcompose.cli.console import Console
-from tfcompose.findings import Note, finding
-from tfcompose.geometry import Pose
-from tfcompose.ipc import (
+from tfcompose.foundation.findings import Note, finding
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.messages import (
     AllReady,
     AllStarted,
     Ended,
@@ -39,15 +40,18 @@ from tfcompose.ipc import (
     TreeComplete,
     Waiting,
 )
-from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.tf2 import Buffer, TransformException, TypeException
-from tfcompose.tf2.messages import Header
+from tfcompose.model.plan import Plan, PlanProcess, RosSettings
+from tfcompose.tf.tf2 import Buffer, TransformException, TypeException
+from tfcompose.tf.tf2.messages import Header
 
 GOLDEN = Path(__file__).parent / "views"
 FIXED: list[Sent] = [("/tf_static", 0.0, "base_link", "lidar", 0.0, (0.0, 0.0, 0.3), UP)]
 #: In the repository's folder, and in one with rover.yaml and a recording of it.
 COMMANDS = {
-    "pose": ["pose robots/autonomous_robot.yaml laser_link camera_link", "pose rover.yaml odom lidar"],
+    "pose": [
+        "pose robots/autonomous_robot.yaml laser_link camera_link",
+        "pose rover.yaml odom lidar",
+    ],
     "explain": [
         "explain TF301",
         "explain robots/autonomous_robot.yaml base_link laser_link",
@@ -67,7 +71,14 @@ COMMANDS = {
     "wrong_use": ["lnit", "pose rover.yaml odom lidr", "lint none.yaml", "explain TF999"],
 }
 
-PLAN = Plan("rover", "0", None, RosSettings(), (), tuple(PlanProcess(name, "run") for name in ("static", "drive")))
+PLAN = Plan(
+    "rover",
+    "0",
+    None,
+    RosSettings(),
+    (),
+    tuple(PlanProcess(name, "run") for name in ("static", "drive")),
+)
 NOTICES: tuple[Notice, ...] = (
     ProcessState("static", "running", 7),
     ProcessState("drive", "expected"),
@@ -76,7 +87,16 @@ NOTICES: tuple[Notice, ...] = (
     OwnerLive("static", "/static", ("base_link → lidar", "base_link → imu"), 1.25),
     ProcessReady("drive", "/scan", 1.5),
     Waiting((Missing("drive", "/drive", ("odom → base_link",), 1),)),
-    FindingShown(finding("TF803", "an example", None, severity="warning", notes=[Note("a note")], help="a way out")),
+    FindingShown(
+        finding(
+            "TF803",
+            "an example",
+            None,
+            severity="warning",
+            notes=[Note("a note")],
+            help="a way out",
+        )
+    ),
     RecoveredShown("an example is over", 3.0),
     TreeComplete(3, 4.5),
     AllReady((StartRow("static", 0.0, 1.25), StartRow("drive", None, 4.5)), 4.5, ("camera",)),
@@ -113,8 +133,16 @@ def buffer_errors() -> str:
     """Return what the buffer answers where it has no transform, and what moves nothing."""
     buffer = Buffer()
     for second in (1, 3):
-        buffer.set("odom", "base", Pose((float(second), 0.0, 0.0)), second * SECOND_NS, static=False)
-    for parent, child in (("base", "laser"), ("world", "table"), ("a", "b"), ("b", "a"), ("a", "tool")):
+        buffer.set(
+            "odom", "base", Pose((float(second), 0.0, 0.0)), second * SECOND_NS, static=False
+        )
+    for parent, child in (
+        ("base", "laser"),
+        ("world", "table"),
+        ("a", "b"),
+        ("b", "a"),
+        ("a", "tool"),
+    ):
         buffer.set(parent, child, Pose(), 0, static=True)
     below_map = Buffer()
     for parent, child, second in (("map", "odom", 9), ("odom", "base", 1)):
@@ -164,7 +192,9 @@ def views() -> dict[str, str]:
         write_bag(folder / "bag", [*FIXED, *drive(rate=20.0)])
         made = {}
         for view, commands in COMMANDS.items():
-            each = [printed(ROOT if "robots/" in command else folder, command) for command in commands]
+            each = [
+                printed(ROOT if "robots/" in command else folder, command) for command in commands
+            ]
             made[view] = "\n".join(each)
         with mock.patch.object(ps, "_robots", return_value=({"rover@0": STATUS}, 0)):
             made["ps"] = printed(folder, "ps")

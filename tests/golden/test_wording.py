@@ -1,8 +1,8 @@
 """Golden wording: what findings say, in one file for each family of codes; other tests assert code, place and names.
 
-They come from what people wrote for these tests, not from mutations: marked specs, bad input, values, calibrations,
-presets, URDFs of others, and histories of live trees and processes (``scenes``). After an intended change:
-``python -m tests.golden.test_wording --write``.
+They come from what people wrote for these tests, not from mutations: marked specs, bad input,
+values, calibrations, presets, URDFs of others, and histories of live trees and processes
+(``scenes``). After an intended change: ``python -m tests.golden.test_wording --write``.
 """
 
 import os
@@ -14,18 +14,21 @@ from pathlib import Path
 from tests.golden.scenes import SCENES
 from tests.golden.test_findings import CORPORA, ROOT, in_the_repository, refusals, within
 from tests.support.goldens import compare, write
-from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import disk
-from tfcompose.findings import Finding
-from tfcompose.render.text import render_text
-from tfcompose.urdf.lint import lint_urdf
-from tfcompose.urdf.packages import Packages
+from tfcompose.compiler.render.text import render_text
+from tfcompose.compiler.urdf.lint import lint_urdf
+from tfcompose.compiler.urdf.packages import Packages
+from tfcompose.foundation.catalogue import CATALOGUE
+from tfcompose.foundation.findings import Finding
 
 GOLDEN = Path(__file__).parent / "wording"
 IN_SOURCE = ("robots", "specs", "bad_input", "values")
 #: What marked specs leave out: parts, sweeps, claims of nodes.
-TEXTS = [GOLDEN / "texts" / f"{name}.yaml" for name in ("claims", "fleet", "parts", "same_names", "sweeps")]
-URDFS = sorted((ROOT / "tests/urdf/urdfs").glob("*.urdf"))
+TEXTS = [
+    GOLDEN / "texts" / f"{name}.yaml"
+    for name in ("claims", "fleet", "parts", "same_names", "sweeps")
+]
+URDFS = sorted((ROOT / "tests/compiler/urdf/urdfs").glob("*.urdf"))
 FAMILIES = ("TF0", "TF1", "TF2", "TF3", "TF4", "TF5", "TF6", "TF7", "TF8", "TF9")
 
 
@@ -49,7 +52,9 @@ def texts() -> dict[str, str]:
     """Return what is said, each text once, by its family: TF1xx."""
     output = {text_of(one) for one in findings()}
     return {
-        f"{family}xx": "\n".join(sorted(text for text in output if f"[{family}" in text.partition(" ")[0]))
+        f"{family}xx": "\n".join(
+            sorted(text for text in output if f"[{family}" in text.partition(" ")[0])
+        )
         for family in FAMILIES
     }
 
@@ -63,7 +68,9 @@ def text_of(found: Finding) -> str:
 def test_findings_say_what_the_golden_files_say_and_every_code_is_there() -> None:
     """All in one test, since all families come from one look at everything."""
     compare(GOLDEN, texts())
-    assert {code for text in texts().values() for code in re.findall(r"\[(TF\d+)\]", text)} == set(CATALOGUE)
+    assert {code for text in texts().values() for code in re.findall(r"\[(TF\d+)\]", text)} == set(
+        CATALOGUE
+    )
 
 
 if __name__ == "__main__":

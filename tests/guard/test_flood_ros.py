@@ -5,12 +5,17 @@ from itertools import count
 import pytest
 
 from tfcompose.guard.flood import SLICE_S, FloodReader
-from tfcompose.live.flood import BUSY_S
-from tfcompose.live.topics import TFData
-from tfcompose.ros.node import Received
-from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.live.flood import BUSY_S
+from tfcompose.tf.live.topics import TFData
+from tfcompose.tf.ros.node import Received
+from tfcompose.tf.ros.tf_codec import Transform, decode, encode
 
-LONG = encode([Transform(0, "map", f"rogue_{n}", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for n in range(20_000)])
+LONG = encode(
+    [
+        Transform(0, "map", f"rogue_{n}", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        for n in range(20_000)
+    ]
+)
 DECLARED = encode([Transform(0, "map", "odom", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
 
 
@@ -32,7 +37,9 @@ def test_a_moment_of_reading_ends_after_its_time_and_a_second_has_so_much_of_it(
         taken.append(next(times) - before)
     assert max(taken) < 10
     assert len(taken) == pytest.approx(BUSY_S / SLICE_S, abs=2)
-    assert not reader.is_reading, "the guard does not wake up for what it may not read in this second"
+    assert not reader.is_reading, (
+        "the guard does not wake up for what it may not read in this second"
+    )
     begun = next(times)
     reader.read(1.0)
     assert next(times) > begun + 2

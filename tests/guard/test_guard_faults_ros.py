@@ -19,7 +19,7 @@ from tests.support import processes
 from tests.support.guard_without_ids import guard_without_ids
 from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, until
 from tfcompose.guard.judge import FINDING_S
-from tfcompose.plan import SILENT_PERIODS
+from tfcompose.model.plan import SILENT_PERIODS
 
 pytestmark = pytest.mark.ros
 
@@ -37,16 +37,19 @@ processes:
   drive: {external: true, node: /drive}
 guard: {allow: [{parent: map, child: "person_*"}]}
 """
-#: Its owner comes far more often than it must, so that it falls silent only if it is kept from running for long.
+#: Its owner comes far more often than it must, so that it falls silent only if it is kept from
+#: running for long.
 PATIENT = ROBOT.replace("owner: slam, rate: 10 Hz", "owner: slam, rate: 1 Hz")
-ISOLATED = ROBOT.replace("discovery: localhost", "discovery: localhost, namespace: rover, isolate: topics")
+ISOLATED = ROBOT.replace(
+    "discovery: localhost", "discovery: localhost, namespace: rover, isolate: topics"
+)
 #: A node that sends edges at 20 Hz: full name, QoS, how it stamps, edges.
 NODE = """
 import os, signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import open_node, qos
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import open_node, qos
+from tfcompose.tf.ros.typesupport import tf_message_type
 name, reliability, stamps, *edges = sys.argv[1:]
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 begun = time.time_ns()
@@ -79,7 +82,9 @@ class Running:
             self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out)
         self.nodes: list[subprocess.Popen[str]] = []
 
-    def joins(self, name: str, *edges: str, reliability: str = "reliable", stamps: str = "right") -> int:
+    def joins(
+        self, name: str, *edges: str, reliability: str = "reliable", stamps: str = "right"
+    ) -> int:
         """Let a node send these edges, and return its process id."""
         return self.starts(NODE, name, reliability, stamps, *edges)
 
@@ -105,14 +110,20 @@ class Running:
 
         def reports() -> bool:
             lines = complete_lines(self.output)
-            found = ("\n".join(lines[at : at + 8]) for at, line in enumerate(lines) if all(w in line for w in words))
+            found = (
+                "\n".join(lines[at : at + 8])
+                for at, line in enumerate(lines)
+                if all(w in line for w in words)
+            )
             return any(all(note in block for note in notes) for block in found)
 
         assert until(reports), f"{words} {notes} not in\n{self.output.read_text('utf-8')}"
 
     def child(self, name: str) -> psutil.Process:
         """Return one of the robot's processes."""
-        return next(p for p in psutil.Process(self.popen.pid).children() if name in command_of(p)[-1:])
+        return next(
+            p for p in psutil.Process(self.popen.pid).children() if name in command_of(p)[-1:]
+        )
 
     def count(self, *words: str) -> int:
         """Return how many lines hold all the words."""
@@ -151,13 +162,17 @@ def up(domain: object, tmp_path: Path) -> Iterator[Callable[[str], Running]]:
         robot.end()
 
 
-def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(up: Callable[[str], Running]) -> None:
+def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(
+    up: Callable[[str], Running],
+) -> None:
     robot = up(ROBOT)
     robot.joins("/drive", "odom base_link")
     robot.says("complete")
     pid = robot.joins("/strange/loop", "base_link map")
     loop = ("map → odom → base_link → map", "base_link → map from /strange/loop")
-    robot.says("error[TF820]", *loop, notes=(f"/strange/loop runs on this machine as pid {pid}: ",))
+    robot.says(
+        "error[TF820]", *loop, notes=(f"/strange/loop runs on this machine as pid {pid}: ",)
+    )
     robot.joins("/strange/itself", "odom odom")
     robot.says("warning[TF821]", "/strange/itself", "odom → odom")
     robot.joins("/strange/best", "base_link cup", reliability="best_effort")
@@ -178,7 +193,9 @@ def test_owners_whose_stamps_are_wrong_are_named(up: Callable[[str], Running]) -
         "back": "warning[TF824]",
     }
     names = {stamps: stamps.replace(" ", "_") for stamps in wrong}
-    frames = "".join(f"  on_{name}: {{parent: base_link, owner: {name}}}\n" for name in names.values())
+    frames = "".join(
+        f"  on_{name}: {{parent: base_link, owner: {name}}}\n" for name in names.values()
+    )
     owners = "".join(f"  {name}: {{external: true, node: /{name}}}\n" for name in names.values())
     robot = up(ROBOT.replace("processes:\n", f"{frames}processes:\n{owners}"))
     robot.joins("/drive", "odom base_link")
@@ -189,11 +206,12 @@ def test_owners_whose_stamps_are_wrong_are_named(up: Callable[[str], Running]) -
     robot.says("complete")
 
 
-#: A node that latches its edges one message each: before anybody can have found it, if nobody looks meanwhile.
+#: A node that latches its edges one message each: before anybody can have found it, if nobody
+#: looks meanwhile.
 LATCHES = """
 import signal, sys, time
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 with open_node("mounts", "/") as node:
     publisher = TFPublisher(node, static=True)
@@ -205,10 +223,14 @@ with open_node("mounts", "/") as node:
 """
 
 
-def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(up: Callable[[str], Running]) -> None:
+def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(
+    up: Callable[[str], Running],
+) -> None:
     mounts = "  camera: {parent: base_link, owner: mounts, static: true}\n"
     mounts += "  lidar: {parent: base_link, owner: mounts, static: true}\nprocesses:\n"
-    robot = up(ROBOT.replace("processes:\n", mounts + "  mounts: {external: true, node: /mounts}\n"))
+    robot = up(
+        ROBOT.replace("processes:\n", mounts + "  mounts: {external: true, node: /mounts}\n")
+    )
     robot.joins("/drive", "odom base_link")
     guard = robot.child("guard")
     guard.send_signal(signal.SIGSTOP)
@@ -219,7 +241,9 @@ def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(up: 
     assert robot.count("TF850") == 1
 
 
-def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Callable[[str], Running]) -> None:
+def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(
+    up: Callable[[str], Running],
+) -> None:
     robot = up(ISOLATED)
     robot.joins("/other_robot/drive", "odom base_link")
     robot.joins("/rover/drive", "odom base_link")
@@ -228,7 +252,9 @@ def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Ca
     assert ("/other_robot" in reports, reports.count("TF827")) == (False, 1)
 
 
-def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[[str], Running]) -> None:
+def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(
+    up: Callable[[str], Running],
+) -> None:
     robot = up(ROBOT)
     robot.joins("/drive", "odom base_link")
     robot.says("complete")
@@ -237,7 +263,11 @@ def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[
     pages: list[Any] = []
 
     def last() -> dict[str, Any]:
-        return {line.name.removeprefix("tfcompose faulty: "): line for line in pages[-1].status} if pages else {}
+        return (
+            {line.name.removeprefix("tfcompose faulty: "): line for line in pages[-1].status}
+            if pages
+            else {}
+        )
 
     def reported() -> bool:
         """Return whether the page says what is; a process that was kept from running is slow for a while."""
@@ -260,7 +290,9 @@ def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[
     assert "from /slam" in slam.values[0].value
 
 
-def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twice(up: Callable[[str], Running]) -> None:
+def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twice(
+    up: Callable[[str], Running],
+) -> None:
     robot = up(PATIENT)
     robot.joins("/drive", "odom base_link")
     robot.says("complete")
@@ -275,7 +307,11 @@ def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twic
     robot.leaves()
     robot.says("over", "map → odom", "/rogue")
     assert robot.count("TF801", "/rogue;") == 1
-    assert (robot.count("| live "), robot.count("complete"), robot.count("watching 2 edges again")) == (2, 1, 1)
+    assert (
+        robot.count("| live "),
+        robot.count("complete"),
+        robot.count("watching 2 edges again"),
+    ) == (2, 1, 1)
     assert robot.count("fell silent", "slam") == 0
 
 
@@ -301,9 +337,12 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
     up: Callable[[str], Running], tmp_path: Path
 ) -> None:
     (tmp_path / "traitor.py").write_text(TRAITOR, encoding="utf-8")
-    run = json.dumps([sys.executable, "traitor.py", "/traitor", "reliable", "right", "odom cup", "map odom"])
+    run = json.dumps(
+        [sys.executable, "traitor.py", "/traitor", "reliable", "right", "odom cup", "map odom"]
+    )
     text = ROBOT.replace(
-        "processes:\n", f"  cup: {{parent: odom, owner: traitor}}\nprocesses:\n  traitor: {{run: {run}}}\n"
+        "processes:\n",
+        f"  cup: {{parent: odom, owner: traitor}}\nprocesses:\n  traitor: {{run: {run}}}\n",
     )
     robot = up(text.replace("guard: {", "guard: {on_violation: stop-offender, "))
     robot.joins("/drive", "odom base_link")
@@ -311,7 +350,9 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
     robot.joins("/stranger", "map odom")
     robot.says("error[TF801]", "map → odom", "/stranger;")
     (tmp_path / "lie").touch()
-    robot.says("error[TF801]", "map → odom", "/traitor;", "slam (/slam)", notes=("traitor is stopped",))
+    robot.says(
+        "error[TF801]", "map → odom", "/traitor;", "slam (/slam)", notes=("traitor is stopped",)
+    )
     robot.says("over", "map → odom", "/traitor")
     assert robot.count("traitor is stopped") == 1
     assert robot.popen.poll() is None
@@ -326,8 +367,8 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
 #: A node that sends edges of others at 1 kHz.
 FLOOD = """
 import signal, sys, time
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Template
+from tfcompose.tf.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 with open_node("rogue", "/") as node:
     publisher, template, due = TFPublisher(node, static=False), Template([("map", "odom")]), time.monotonic()
@@ -343,7 +384,7 @@ LISTENER = """
 import signal, sys
 import rclpy
 from rclpy.qos import QoSProfile
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.typesupport import tf_message_type
 from rclpy.signals import SignalHandlerOptions
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -357,8 +398,8 @@ rclpy.spin(node)
 #: A node with so many latched publishers: one for each frame, as a static_transform_publisher is.
 MANY = """
 import signal
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
 with open_node("foreign", "/") as node:
     publishers = [TFPublisher(node, static=True) for _ in range(120)]
     for n, publisher in enumerate(publishers):
@@ -385,9 +426,14 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_p
     def attempt(_: int) -> bool:
         """Return whether nobody fell silent: one who is kept from running does, and not each time."""
         nonlocal silent
-        before_s, before_bytes = [sum(each.cpu_times()[:2]) for each in both], both[0].memory_info().rss
+        before_s, before_bytes = (
+            [sum(each.cpu_times()[:2]) for each in both],
+            both[0].memory_info().rss,
+        )
         time.sleep(4)
-        guard_s, listener_s = (sum(each.cpu_times()[:2]) - s for each, s in zip(both, before_s, strict=True))
+        guard_s, listener_s = (
+            sum(each.cpu_times()[:2]) - s for each, s in zip(both, before_s, strict=True)
+        )
         assert guard_s < 2 * listener_s
         assert both[0].memory_info().rss < 1.1 * before_bytes
         before, silent = silent, robot.count("fell silent")
@@ -414,7 +460,9 @@ def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_received(
         reported = re.compile(r"dock_\d+(?: and (\d+) more)?.* published by /foreign")
 
         def named() -> int:
-            return sum(1 + int(more or 0) for more in reported.findall(robot.output.read_text("utf-8")))
+            return sum(
+                1 + int(more or 0) for more in reported.findall(robot.output.read_text("utf-8"))
+            )
 
         assert until(lambda: named() == 120), named()
     finally:

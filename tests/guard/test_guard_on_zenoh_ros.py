@@ -13,7 +13,7 @@ from tests.support.domains import Domain
 from tests.support.guard_on_zenoh import guard_on_zenoh
 from tests.support.waiting import until
 from tests.support.zenoh_peers import RosPeer, free_port, session
-from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import Transform, encode
 
 pytestmark = pytest.mark.ros
 
@@ -69,7 +69,9 @@ def sending(domain: Domain) -> Iterator[tuple[str, Callable[[str, str, str], Sen
 
 
 def test_a_live_guard_names_owners_and_strangers_on_zenoh(
-    sending: tuple[str, Callable[[str, str, str], Sending]], start: Callable[..., Any], tmp_path: Path
+    sending: tuple[str, Callable[[str, str, str], Sending]],
+    start: Callable[..., Any],
+    tmp_path: Path,
 ) -> None:
     router, peer = sending
     (tmp_path / "robot.yaml").write_text(ROBOT, encoding="utf-8")
@@ -95,7 +97,9 @@ def test_a_live_guard_names_owners_and_strangers_on_zenoh(
     assert "/rogue" in found, found
     rogue.close()
     slam.close()
-    assert until(lambda: any("TF804" in line and "map → odom" in line for line in robot.lines)), robot.output
+    assert until(lambda: any("TF804" in line and "map → odom" in line for line in robot.lines)), (
+        robot.output
+    )
     peer("/robot1/slam", "map", "odom")
     robot.until_says("map → odom is back")
     assert robot.end() == 0

@@ -15,21 +15,22 @@ import pytest
 from tests.support import processes
 from tests.support.domains import reserved_domain
 from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, offences, until
-from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.tf_codec import decode
-from tfcompose.signals import Stop
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import TFSubscription, open_node, wait
+from tfcompose.tf.ros.tf_codec import decode
 
 pytestmark = [pytest.mark.ros, pytest.mark.xdist_group("one robot for all of these")]
 
 ROBOT = Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml"
-#: A stranger with stock settings: node name, topic's kind, rate, seconds, edges. It sends when there is somebody who
-#: hears it, and says so; and it stays until it was heard, and then so many seconds.
+#: A stranger with stock settings: node name, topic's kind, rate, seconds, edges. It sends when
+#: there is somebody who hears it, and says so; and it stays until it was heard, and then so many
+#: seconds.
 STRANGER = """
 import signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node, qos
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node, qos
+from tfcompose.tf.ros.typesupport import tf_message_type
 name, kind, hertz, seconds, *edges = sys.argv[1:]
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leave in order: what is killed haunts the graph for 20 s
 transforms = [Transform(time.time_ns(), *edge.split(), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for edge in edges]
@@ -63,7 +64,9 @@ class Robot:
 
     def lines(self, *words: str) -> list[str]:
         """Return the lines that hold all the words."""
-        return [line for line in complete_lines(self.output) if all(word in line for word in words)]
+        return [
+            line for line in complete_lines(self.output) if all(word in line for word in words)
+        ]
 
     def says(self, *words: str, times: int = 1) -> None:
         """Wait for such a line, or so many."""
@@ -72,7 +75,9 @@ class Robot:
 
     def child(self, name: str) -> psutil.Process:
         """Return one of the robot's processes."""
-        return next(p for p in psutil.Process(self.popen.pid).children() if name in p.cmdline()[-1:])
+        return next(
+            p for p in psutil.Process(self.popen.pid).children() if name in p.cmdline()[-1:]
+        )
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +122,9 @@ class Stranger:
 
     popen: subprocess.Popen[str] | None = None
 
-    def __call__(self, name: str, kind: str, *edges: str, hertz: float = 20.0, seconds: float = 600.0) -> None:
+    def __call__(
+        self, name: str, kind: str, *edges: str, hertz: float = 20.0, seconds: float = 600.0
+    ) -> None:
         """Let it join and send its first message."""
         self.leaves()
         command = [sys.executable, "-c", STRANGER, name, kind, str(hertz), str(seconds), *edges]
@@ -142,7 +149,11 @@ def stranger(domain: int) -> Iterator[Stranger]:
 
 def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: Robot) -> None:
     live = robot.lines("| live ")
-    owners = ["static (/tfcompose_static)", "joints (/tfcompose_joints)", "base_drive (/diff_drive_controller)"]
+    owners = [
+        "static (/tfcompose_static)",
+        "joints (/tfcompose_joints)",
+        "base_drive (/diff_drive_controller)",
+    ]
     for owner in [*owners, "slam (/slam_toolbox)"]:
         assert len([line for line in live if owner in line]) == 1
     assert len(live) == 4
@@ -180,13 +191,27 @@ def test_a_stranger_that_leaves_is_reported_to_have(robot: Robot, stranger: Stra
     robot.says("over", "map → odom", "/strange/rogue_guest")
 
 
-def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(robot: Robot, stranger: Stranger) -> None:
-    # A message that is sent before anybody is discovered reaches nobody; a latched one waits for its readers.
+def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(
+    robot: Robot, stranger: Stranger
+) -> None:
+    # A message that is sent before anybody is discovered reaches nobody; a latched one waits for
+    # its readers.
     def attempt(number: int) -> bool:
-        stranger(f"rogue_{number}", "static", "base_link laser_link", "base_link imu_link", hertz=2, seconds=0.5)
-        return until(lambda: robot.lines("TF801", "base_link → laser_link", f"/strange/rogue_{number};"), 10)
+        stranger(
+            f"rogue_{number}",
+            "static",
+            "base_link laser_link",
+            "base_link imu_link",
+            hertz=2,
+            seconds=0.5,
+        )
+        return until(
+            lambda: robot.lines("TF801", "base_link → laser_link", f"/strange/rogue_{number};"), 10
+        )
 
-    assert in_one_of_a_few(attempt), "a guard that is kept from looking sees a node come and go no more"
+    assert in_one_of_a_few(attempt), (
+        "a guard that is kept from looking sees a node come and go no more"
+    )
 
 
 def test_a_second_parent_is_named_with_both_parents(robot: Robot, stranger: Stranger) -> None:
@@ -242,7 +267,9 @@ def test_a_guard_that_hangs_is_replaced(robot: Robot) -> None:
 
 def test_an_owner_that_is_too_slow_is_a_warning(robot: Robot, tmp_path: Path) -> None:
     assert robot
-    text = ROBOT.read_text(encoding="utf-8").replace("speed: 0.5 rad/s}, rate: 50 Hz", "speed: 0.5 rad/s}, rate: 20 Hz")
+    text = ROBOT.read_text(encoding="utf-8").replace(
+        "speed: 0.5 rad/s}, rate: 50 Hz", "speed: 0.5 rad/s}, rate: 20 Hz"
+    )
     with reserved_domain() as other:
         text = text.replace("ros: {", f"ros: {{domain_id: {other}, ")
         (tmp_path / "slow.yaml").write_text(text, encoding="utf-8")

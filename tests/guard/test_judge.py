@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import FIXED, SETTLE_S, TICK_S, History, Publisher
-from tfcompose.ipc import Clear, Complete, Found, Live, OwnerReady, Recovered
-from tfcompose.plan import EdgePattern, GuardPolicy
+from tfcompose.model.messages import Clear, Complete, Found, Live, OwnerReady, Recovered
+from tfcompose.model.plan import EdgePattern, GuardPolicy
 
 
 def test_owners_are_live_and_nothing_is_found(running: History) -> None:
@@ -18,9 +18,16 @@ def test_owners_are_live_and_nothing_is_found(running: History) -> None:
     running.send(static, FIXED)
     for _ in range(40):
         running.send(joints, "base left").send(slam, "map odom").send(drive, "odom base").wait(0.1)
-    live = (("static", ("lidar", "camera")), ("joints", ("left",)), ("slam", ("odom",)), ("drive", ("base",)))
+    live = (
+        ("static", ("lidar", "camera")),
+        ("joints", ("left",)),
+        ("slam", ("odom",)),
+        ("drive", ("base",)),
+    )
     assert running.all(Live) == [Live(owner, children) for owner, children in live]
-    assert running.all(OwnerReady) == [OwnerReady(name) for name in ("static", "joints", "slam", "drive")]
+    assert running.all(OwnerReady) == [
+        OwnerReady(name) for name in ("static", "joints", "slam", "drive")
+    ]
     assert running.all(Complete) == [Complete(5)]
     assert running.reports() == []
 
@@ -38,14 +45,18 @@ def test_an_external_owner_that_is_there_before_the_start_is_right(history: Hist
     assert Live("drive", ("base",)) in history.events
 
 
-def test_a_restarted_owner_is_right_also_while_its_old_publisher_is_still_in_the_graph(running: History) -> None:
+def test_a_restarted_owner_is_right_also_while_its_old_publisher_is_still_in_the_graph(
+    running: History,
+) -> None:
     for _ in range(4):
         running.repeat(running.joins("/slam"), "map odom", 10)
     assert running.reports() == []
 
 
 def test_an_owner_may_send_other_edges_that_are_allowed() -> None:
-    running = History(GuardPolicy(unknown_edges="error", allow=(EdgePattern("map", "goal_*"),))).clear()
+    running = History(
+        GuardPolicy(unknown_edges="error", allow=(EdgePattern("map", "goal_*"),))
+    ).clear()
     running.repeat(running.joins("/slam"), "map odom, map goal_1", 5)
     assert running.reports() == []
 
@@ -53,7 +64,11 @@ def test_an_owner_may_send_other_edges_that_are_allowed() -> None:
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(
-        st.tuples(st.sampled_from(("/static", "/joints", "/slam", "/drive")), st.floats(0, 0.3), st.floats(0, 0.65)),
+        st.tuples(
+            st.sampled_from(("/static", "/joints", "/slam", "/drive")),
+            st.floats(0, 0.3),
+            st.floats(0, 0.65),
+        ),
         max_size=40,
     )
 )
@@ -70,12 +85,16 @@ def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_na
             named.append((running.now + delay, publishers[node], node))
         for at, publisher, name in named:
             publisher.node = name if running.now >= at else publisher.node
-        running.send(publishers[node], edges[node], ago=min(delay, running.now - 1000 - SETTLE_S - TICK_S)).wait(pause)
+        running.send(
+            publishers[node], edges[node], ago=min(delay, running.now - 1000 - SETTLE_S - TICK_S)
+        ).wait(pause)
     for _, publisher, name in named:
         publisher.node = name
     running.wait(2)
     assert running.reports() == []
-    assert {e.owner for e in running.all(Live) if isinstance(e, Live)} == {name[1:] for name in publishers}
+    assert {e.owner for e in running.all(Live) if isinstance(e, Live)} == {
+        name[1:] for name in publishers
+    }
 
 
 def test_a_foreign_publisher_is_named_once_and_at_the_next_check(running: History) -> None:
@@ -98,7 +117,9 @@ def test_a_foreign_publisher_that_ended_is_reported_to_have_and_is_reported_when
     assert len(running.found()) == 2
 
 
-def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(running: History) -> None:
+def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(
+    running: History,
+) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "map odom", 10, every=5)
     assert len(running.found()) == 1
@@ -106,7 +127,9 @@ def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(runn
     assert len(running.wait(31).all(Recovered)) == 1
 
 
-def test_a_foreign_publisher_that_pauses_for_long_is_reported_again_when_it_goes_on(running: History) -> None:
+def test_a_foreign_publisher_that_pauses_for_long_is_reported_again_when_it_goes_on(
+    running: History,
+) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "map odom", 5).wait(40).repeat(rogue, "map odom", 5)
     assert (len(running.found()), len(running.all(Recovered))) == (2, 1)
@@ -120,7 +143,9 @@ def test_a_latched_offence_lasts_while_its_publisher_does(running: History) -> N
     assert len(running.wait(4).all(Recovered)) == 1
 
 
-def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_message_of_its_own(running: History) -> None:
+def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_message_of_its_own(
+    running: History,
+) -> None:
     rogue = running.joins("/rogue", static=True)
     running.send(rogue, "base lidar").send(rogue, "base camera").wait(TICK_S)
     (found,) = running.found()
@@ -128,7 +153,9 @@ def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_messag
     assert [note.message for note in found.notes][:2] == ["base → lidar", "base → camera"]
 
 
-def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood_together(running: History) -> None:
+def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood_together(
+    running: History,
+) -> None:
     rogue = running.joins("/rogue")
     for n in range(100):
         running.send(rogue, f"base thing_{n}").wait(0.02)
@@ -147,10 +174,18 @@ def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood
             "TF801",
             ["map → odom and 1 more", "slam (/slam), drive"],
         ),
-        (("/rogue", "base_footprint base", False), "TF802", ["base_footprint (from /rogue)", "odom", "drive (/drive)"]),
+        (
+            ("/rogue", "base_footprint base", False),
+            "TF802",
+            ["base_footprint (from /rogue)", "odom", "drive (/drive)"],
+        ),
         (("/drive", "odom base, map base", False), "TF802", ["map → base", "drive (/drive)"]),
         (("/slam", "map odom", True), "TF809", ["map → odom", "/tf_static", "/slam"]),
-        (("/rogue", "base odom", False), "TF820", ["odom → base → odom", "base → odom from /rogue"]),
+        (
+            ("/rogue", "base odom", False),
+            "TF820",
+            ["odom → base → odom", "base → odom from /rogue"],
+        ),
         (("/slam", "odom odom", False), "TF821", ["/slam", "odom → odom"]),
     ],
 )
@@ -160,14 +195,23 @@ def test_what_one_node_does_wrong_is_one_finding_with_its_names(
     node, edges, static = sent
     running.repeat(running.joins(node, static=static), edges, 10)
     expect(running.only(), code, *names)
-    assert [event.owner for event in running.all(Live) if isinstance(event, Live)] in ([], ["drive"])
+    assert [event.owner for event in running.all(Live) if isinstance(event, Live)] in (
+        [],
+        ["drive"],
+    )
 
 
-@pytest.mark.parametrize(("policy", "severities"), [("ignore", []), ("warn", ["warning"]), ("error", ["error"])])
-def test_an_undeclared_edge_is_reported_as_the_policy_says(policy: str, severities: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("policy", "severities"), [("ignore", []), ("warn", ["warning"]), ("error", ["error"])]
+)
+def test_an_undeclared_edge_is_reported_as_the_policy_says(
+    policy: str, severities: list[str]
+) -> None:
     running = History(GuardPolicy(unknown_edges=policy)).clear()  # type: ignore[arg-type]
     running.repeat(running.joins("/tracker"), "map person", 10)
-    assert [(found.code, found.severity) for found in running.found()] == [("TF803", one) for one in severities]
+    assert [(found.code, found.severity) for found in running.found()] == [
+        ("TF803", one) for one in severities
+    ]
 
 
 def test_only_undeclared_edges_that_no_pattern_allows_are_reported() -> None:
@@ -179,7 +223,9 @@ def test_only_undeclared_edges_that_no_pattern_allows_are_reported() -> None:
     assert [note.message for note in found.notes] == ["odom → person_2", "map → person"]
 
 
-def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(running: History) -> None:
+def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(
+    running: History,
+) -> None:
     running.joins("/static", static=True, volatile=True)
     running.joins("/slam", volatile=True)
     running.wait(5)
@@ -206,7 +252,9 @@ def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_reported_o
 
 
 @pytest.mark.parametrize("edges", ["base lidar, base camera", "base camera"])
-def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_nothing(edges: str) -> None:
+def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_nothing(
+    edges: str,
+) -> None:
     running = History().clear()
     static = running.joins("/static", static=True)
     static.sent = 0 if edges == "base camera" else 3

@@ -13,7 +13,9 @@ def stamped(running: History, publisher: Publisher, edges: str, stamps: list[flo
     return running
 
 
-def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_right_again(running: History) -> None:
+def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_right_again(
+    running: History,
+) -> None:
     slam = running.joins("/slam")
     stamped(running, slam, "map odom", [5 + n / 10 for n in range(10)])
     (found,) = running.found()
@@ -36,11 +38,15 @@ def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_righ
         (None, "without"),
     ],
 )
-def test_a_clock_that_is_more_than_ten_seconds_off_is_wrong(running: History, off: float | None, reports: str) -> None:
+def test_a_clock_that_is_more_than_ten_seconds_off_is_wrong(
+    running: History, off: float | None, reports: str
+) -> None:
     slam = running.joins("/slam")
     for _ in range(10):
         running.send(slam, "map odom", stamp_s=0 if off is None else wall(running) + off).wait(0.1)
-    assert [found.code for found in running.found() if found.code != "TF823"] == (["TF825"] if reports else [])
+    assert [found.code for found in running.found() if found.code != "TF823"] == (
+        ["TF825"] if reports else []
+    )
     assert not reports or reports in running.reports()[0]
 
 
@@ -64,7 +70,9 @@ def test_what_waited_while_the_guard_was_kept_from_running_reports_nothing_of_it
     assert running.check().reports() == []
     for _ in range(60):
         running.send(slam, "map odom", stamp_s=wall(running) + off).wait(0.1)
-    assert [found.code for found in running.found() if found.code != "TF824"] == (["TF825"] if off else [])
+    assert [found.code for found in running.found() if found.code != "TF824"] == (
+        ["TF825"] if off else []
+    )
 
 
 def test_in_simulated_time_the_systems_time_is_the_wrong_one_and_clock_decides() -> None:
@@ -78,7 +86,9 @@ def test_in_simulated_time_the_systems_time_is_the_wrong_one_and_clock_decides()
         running.judge.clock(round((102 + n / 10) * 1e9), running.now)
         running.send(slam, "map odom", stamp_s=wall(running))
         running.send(drive, "odom base", stamp_s=102 + n / 10).wait(0.1)
-    expect(running.only(), "TF825", "/slam", "map → odom", "the system's time", "/clock", "102.2 s")
+    expect(
+        running.only(), "TF825", "/slam", "map → odom", "the system's time", "/clock", "102.2 s"
+    )
 
 
 @pytest.mark.parametrize(
@@ -144,7 +154,9 @@ def test_a_clock_that_is_read_twice_at_one_time_takes_no_stamps_with_it() -> Non
     assert [found.code for found in running.found()] == ["TF823"]
 
 
-def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing(running: History) -> None:
+def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing(
+    running: History,
+) -> None:
     slam, drive = running.joins("/slam"), running.joins("/drive")
     begun = wall(running)
     for n in range(40):
@@ -154,7 +166,9 @@ def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing
     assert running.only().severity == "warning"
 
 
-@pytest.mark.parametrize(("steps", "codes"), [([-3.0], ["TF824"]), ([-0.2], []), ([-0.3] * 4, ["TF824"])])
+@pytest.mark.parametrize(
+    ("steps", "codes"), [([-3.0], ["TF824"]), ([-0.2], []), ([-0.3] * 4, ["TF824"])]
+)
 def test_stamps_that_go_back_are_a_warning_if_far_or_often(
     running: History, steps: list[float], codes: list[str]
 ) -> None:

@@ -8,16 +8,29 @@ from hypothesis import strategies as st
 
 from tests.support.findings import expect
 from tests.support.guard_history import EDGES, FIXED, History, edge, wall
-from tfcompose.geometry import Pose
+from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.diagnostics import statuses
-from tfcompose.ipc import Clear, Found, Live, Recovered
-from tfcompose.live.publishers import Publisher
-from tfcompose.plan import EdgePattern, GuardPolicy, PlanClaim, PlanEdge, PlanProcess, SourceLine
+from tfcompose.model.messages import Clear, Found, Live, Recovered
+from tfcompose.model.plan import (
+    EdgePattern,
+    GuardPolicy,
+    PlanClaim,
+    PlanEdge,
+    PlanProcess,
+    SourceLine,
+)
+from tfcompose.tf.live.publishers import Publisher
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from("sdrjx"), st.sampled_from((0.0, 0.05, 0.1, 0.7))), max_size=60))
-def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tuple[str, float]]) -> None:
+@given(
+    st.lists(
+        st.tuples(st.sampled_from("sdrjx"), st.sampled_from((0.0, 0.05, 0.1, 0.7))), max_size=60
+    )
+)
+def test_remembered_verdicts_are_those_that_would_be_given_anew(
+    sends: list[tuple[str, float]],
+) -> None:
     """The same history, judged with and without memory of what was judged before."""
     reports = []
     for forgets in (False, True):
@@ -40,7 +53,16 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tupl
 
 def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: History) -> None:
     rates = tuple(
-        PlanEdge("base", f"part_{n}", "dynamic", "drive", "/drive", Pose(), 10.0, SourceLine("r.yaml", 1))
+        PlanEdge(
+            "base",
+            f"part_{n}",
+            "dynamic",
+            "drive",
+            "/drive",
+            Pose(),
+            10.0,
+            SourceLine("r.yaml", 1),
+        )
         for n in range(99)
     )
     running = History(edges=rates).clear()
@@ -66,9 +88,16 @@ def test_each_edge_has_its_publisher_rate_age_and_delay_and_none_before_it_came(
     assert odom.rate is not None
     assert odom.age_s is not None
     assert odom.delay_s is not None
-    assert [round(value, 2) for value in (odom.rate, odom.age_s, odom.delay_s)] == [10.0, 0.3, 0.25]
+    assert [round(value, 2) for value in (odom.rate, odom.age_s, odom.delay_s)] == [
+        10.0,
+        0.3,
+        0.25,
+    ]
     assert (health["lidar"].text, health["base"].text) == ("latched, from /static", "not seen yet")
-    levels = {line.name: line.level for line in statuses("rover", list(health.values()), running.judge.wrong())}
+    levels = {
+        line.name: line.level
+        for line in statuses("rover", list(health.values()), running.judge.wrong())
+    }
     assert levels == {
         "tfcompose rover: tree": 0,
         "tfcompose rover: slam": 0,
@@ -104,7 +133,11 @@ def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
 
 
 def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: History) -> None:
-    static, slam, rogue = running.joins("/static", static=True), running.joins("/slam"), running.joins("/rogue")
+    static, slam, rogue = (
+        running.joins("/static", static=True),
+        running.joins("/slam"),
+        running.joins("/rogue"),
+    )
     volatile = running.joins("/volatile", static=True, volatile=True)
     running.send(static, FIXED).repeat(slam, "map odom", 5).repeat(rogue, "map odom, map cup", 5)
     assert [line[:5] for line in running.reports()] == ["TF806", "TF801", "TF803"]
@@ -123,9 +156,17 @@ def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: H
     expect(running.only(), "TF801", "map → odom", "/other", "slam (/slam)")
 
 
-def test_a_judge_that_follows_another_does_not_miss_whom_it_has_not_found_yet(running: History) -> None:
-    running = History(edges=(edge("map odom", "slam", rate=10.0), edge("base lidar", "static", "static"))).clear()
-    static, slam, rogue = running.joins("/static", static=True), running.joins("/slam"), running.joins("/rogue")
+def test_a_judge_that_follows_another_does_not_miss_whom_it_has_not_found_yet(
+    running: History,
+) -> None:
+    running = History(
+        edges=(edge("map odom", "slam", rate=10.0), edge("base lidar", "static", "static"))
+    ).clear()
+    static, slam, rogue = (
+        running.joins("/static", static=True),
+        running.joins("/slam"),
+        running.joins("/rogue"),
+    )
     running.send(static, FIXED[:10]).repeat(slam, "map odom", 30).repeat(rogue, "map odom", 3)
     running.graph.clear()
     running.dies().wait(4)
@@ -147,17 +188,25 @@ def test_an_owner_that_was_silent_is_not_reported_to_be_again_and_is_back_when_i
     running.dies().wait(8)
     assert running.events == [Clear()]
     running.repeat(slam, "map odom", 5)
-    assert [event for event in running.events if not isinstance(event, Clear)] == running.all(Recovered) != []
+    assert (
+        [event for event in running.events if not isinstance(event, Clear)]
+        == running.all(Recovered)
+        != []
+    )
 
 
-def test_a_namesake_is_still_distinguished_from_the_owner_after_the_guard_died(running: History) -> None:
+def test_a_namesake_is_still_distinguished_from_the_owner_after_the_guard_died(
+    running: History,
+) -> None:
     slam, other = running.joins("/slam"), running.joins("/slam")
     running.repeat(slam, "map odom", 5).dies()
     running.send(other, "map odom").repeat(slam, "map odom", 5)
     expect(running.found()[0], "TF801", "map → odom", "another /slam")
 
 
-def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has_a_name(running: History) -> None:
+def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has_a_name(
+    running: History,
+) -> None:
     slam = running.joins(None)
     for name, edges, admitted in (
         (None, "map odom", set()),
@@ -174,10 +223,17 @@ def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has
         assert running.judge.admitted == admitted, edges
 
 
-@pytest.mark.parametrize(("process", "stopped"), [("slam", "slam"), ("", ""), (None, ""), ("drive", "")])
-def test_only_a_process_that_is_proven_to_have_done_it_can_be_stopped_for_it(process: str | None, stopped: str) -> None:
+@pytest.mark.parametrize(
+    ("process", "stopped"), [("slam", "slam"), ("", ""), (None, ""), ("drive", "")]
+)
+def test_only_a_process_that_is_proven_to_have_done_it_can_be_stopped_for_it(
+    process: str | None, stopped: str
+) -> None:
     """A node's name proves nothing: whoever has it may be of another run, or of no ROS at all."""
-    processes = (PlanProcess("slam", "run", nodes=("/slam",)), PlanProcess("drive", "external", nodes=("/drive",)))
+    processes = (
+        PlanProcess("slam", "run", nodes=("/slam",)),
+        PlanProcess("drive", "external", nodes=("/drive",)),
+    )
     running = History(GuardPolicy(on_violation="stop-offender"), processes).clear()
     running.repeat(running.joins("/slam", process=process), "odom base", 5)
     (found,) = [event for event in running.events if isinstance(event, Found)]
@@ -186,7 +242,8 @@ def test_only_a_process_that_is_proven_to_have_done_it_can_be_stopped_for_it(pro
 
 
 @pytest.mark.parametrize(
-    ("process", "edges", "ours"), [("slam", "map odom", True), ("slam", "odom base", False), ("", "map odom", False)]
+    ("process", "edges", "ours"),
+    [("slam", "map odom", True), ("slam", "odom base", False), ("", "map odom", False)],
 )
 def test_an_owner_whose_node_has_another_name_is_advised_to_declare_it_and_not_to_end_itself(
     process: str, edges: str, *, ours: bool

@@ -7,12 +7,12 @@ import pytest
 from tests.support.findings import expect
 from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History, edge
 from tfcompose.guard.judge import Judge
-from tfcompose.ipc import Clear, Found, Live, Recovered, Taken, Unfenced
-from tfcompose.live.publishers import OtherRun, Publisher
-from tfcompose.live.state import NAMELESS, NO_NODE
-from tfcompose.live.topics import Identity, RunMarks
-from tfcompose.plan import GuardPolicy, Plan, RosSettings
-from tfcompose.verdict.publishers import unfenced
+from tfcompose.guard.verdict.publishers import unfenced
+from tfcompose.model.messages import Clear, Found, Live, Recovered, Taken, Unfenced
+from tfcompose.model.plan import GuardPolicy, Plan, RosSettings
+from tfcompose.tf.live.publishers import OtherRun, Publisher
+from tfcompose.tf.live.state import NAMELESS, NO_NODE
+from tfcompose.tf.live.topics import Identity, RunMarks
 
 
 def test_a_publisher_whose_name_comes_later_is_judged_when_it_is_known(running: History) -> None:
@@ -32,7 +32,9 @@ def test_an_owner_whose_name_comes_after_seconds_is_not_blamed(running: History)
     assert Live("slam", ("odom",)) in running.events
 
 
-def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_is_known(running: History) -> None:
+def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_is_known(
+    running: History,
+) -> None:
     slam, stranger = running.joins("/slam"), running.joins(None)
     for _ in range(9):
         running.send(slam, "map odom").send(stranger, "map odom").wait(0.1)
@@ -63,11 +65,16 @@ def test_a_publisher_that_sends_once_and_leaves_is_named(running: History) -> No
     assert "/rogue" in running.send(rogue, "map odom").wait(TICK_S).reports()[0]
 
 
-def test_two_publishers_of_one_name_that_alternate_are_reported_and_the_edge_is_not_silent() -> None:
+def test_two_publishers_of_one_name_that_alternate_are_reported_and_the_edge_is_not_silent() -> (
+    None
+):
     rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
     running = History()
     running.judge = Judge(
-        Plan("r", "0", "base", RosSettings(), rated, PROCESSES), SETTLE_S, running.now, running.wall_ns()
+        Plan("r", "0", "base", RosSettings(), rated, PROCESSES),
+        SETTLE_S,
+        running.now,
+        running.wall_ns(),
     )
     running.clear()
     a, b = running.joins("/slam"), running.joins("/slam")
@@ -85,10 +92,14 @@ def test_two_that_latch_alternately_may_be_one_owner_that_is_heard_again() -> No
     assert running.reports() == []
 
 
-def test_a_second_static_process_is_reported_while_both_are_there_and_over_when_it_has_left(running: History) -> None:
+def test_a_second_static_process_is_reported_while_both_are_there_and_over_when_it_has_left(
+    running: History,
+) -> None:
     first, second = (running.joins("/static", static=True) for _ in range(2))
     running.send(first, FIXED).wait(2).send(second, FIXED).wait(10)
-    expect(running.only(), "TF801", "base → lidar and 1 more", "another /static", "static (/static)")
+    expect(
+        running.only(), "TF801", "base → lidar and 1 more", "another /static", "static (/static)"
+    )
     assert running.all(Recovered) == []
     running.leaves(second)
     assert len(running.wait(4).all(Recovered)) == 2
@@ -116,7 +127,9 @@ def test_without_ids_nobody_is_blamed_where_the_owner_may_have_sent_it() -> None
     assert running.reports() == []
 
 
-def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobody_was_first() -> None:
+def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobody_was_first() -> (
+    None
+):
     running = History(gids=False)
     drive = running.joins("/drive")
     running.repeat(drive, "odom base", 20)
@@ -141,7 +154,9 @@ def test_ids_that_do_not_say_whose_they_are_distinguish_two_that_alternate() -> 
     assert len(running.all(Recovered)) == 1
 
 
-def test_where_ids_do_not_say_whose_they_are_who_came_just_now_is_one_of_those_that_may_have_sent_it() -> None:
+def test_where_ids_do_not_say_whose_they_are_who_came_just_now_is_one_of_those_that_may_have_sent_it() -> (
+    None
+):
     """Messages of a newcomer can be heard before the graph shows it."""
     running = History(says_who=False).clear()
     slam, rogue = running.joins("/slam"), running.joins("/rogue", hidden=True)
@@ -154,7 +169,9 @@ def test_where_ids_do_not_say_whose_they_are_who_came_just_now_is_one_of_those_t
     expect(running.only(), "TF801", "map → odom", "one of /drive, /rogue, /slam;", "slam (/slam)")
 
 
-def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_started_anew() -> None:
+def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_started_anew() -> (
+    None
+):
     running = History(says_who=False).clear()
     slam, drive = running.joins("/slam"), running.joins("/drive")
     static = running.joins("/static", static=True)
@@ -166,10 +183,14 @@ def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_st
     for _ in range(30):
         running.send(again, "map odom").send(drive, "odom base").wait(0.1)
     assert running.reports() == []
-    assert {child for one in running.all(Live) if isinstance(one, Live) for child in one.children} >= {"odom", "base"}
+    assert {
+        child for one in running.all(Live) if isinstance(one, Live) for child in one.children
+    } >= {"odom", "base"}
 
 
-def test_ids_that_do_not_say_whose_they_are_name_all_who_may_have_sent_what_nobody_there_owns() -> None:
+def test_ids_that_do_not_say_whose_they_are_name_all_who_may_have_sent_what_nobody_there_owns() -> (
+    None
+):
     running = History(says_who=False).clear()
     drive, rogue = running.joins("/drive"), running.joins("/rogue")
     for _ in range(30):
@@ -191,7 +212,9 @@ def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:
 
 @pytest.mark.parametrize("foreign_first", [False, True])
 @pytest.mark.parametrize("process", ["", None, "joints"])
-@pytest.mark.parametrize(("node", "edges", "owner"), [("/slam", "map odom", "slam"), ("/static", FIXED, "static")])
+@pytest.mark.parametrize(
+    ("node", "edges", "owner"), [("/slam", "map odom", "slam"), ("/static", FIXED, "static")]
+)
 def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
     node: str, edges: str, owner: str, process: str | None, *, foreign_first: bool
 ) -> None:
@@ -227,7 +250,9 @@ def test_a_child_with_a_stopped_owners_name_is_not_the_owner() -> None:
     expect(running.only(), "TF801", "another /slam")
 
 
-def test_an_owner_that_is_started_again_is_the_owner_and_one_that_runs_out_of_sight_is_too() -> None:
+def test_an_owner_that_is_started_again_is_the_owner_and_one_that_runs_out_of_sight_is_too() -> (
+    None
+):
     for before, after in (("slam", "slam"), (None, None), ("", "")):
         running = History().clear()
         slam = running.joins("/slam", process=before)
@@ -264,7 +289,10 @@ def identity(process: str, *, fenced: bool, profile: str = "") -> Identity:
         (None, Identity()),
         ([], Identity(ours=False)),
         ([{"RUN": "other"}], Identity(ours=False)),
-        ([{"RUN": "1", "P": "arm/a", "XML": "/run/plan-1/fence/arm.a.xml"}], identity("arm/a", fenced=True)),
+        (
+            [{"RUN": "1", "P": "arm/a", "XML": "/run/plan-1/fence/arm.a.xml"}],
+            identity("arm/a", fenced=True),
+        ),
         (
             [{"RUN": "1", "P": "a", "XML": "/home/me/fast.xml"}],
             identity("a", fenced=False, profile="/home/me/fast.xml"),
@@ -292,9 +320,17 @@ def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_s
     def left() -> list[Unfenced]:
         return [event for event in running.events if isinstance(event, Unfenced)]
 
-    for fenced, process in ((True, "slam"), (None, "slam"), (False, ""), (False, "slam"), (False, "slam")):
+    for fenced, process in (
+        (True, "slam"),
+        (None, "slam"),
+        (False, ""),
+        (False, "slam"),
+        (False, "slam"),
+    ):
         gid = b"1" * 16 if fenced is False and process else bytes([7]) * 16
-        one = Publisher(gid, "/slam", static=False, ours=bool(process), process=process, fenced=fenced)
+        one = Publisher(
+            gid, "/slam", static=False, ours=bool(process), process=process, fenced=fenced
+        )
         running.events += running.judge.graph([one], running.now)
     assert not left(), "what it sends may be judged first"
     for _ in range(2):
@@ -321,12 +357,16 @@ def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped
         ("", ["keep FASTRTPS_DEFAULT_PROFILES_FILE"]),
     ],
 )
-def test_the_finding_about_who_leaves_the_fence_names_the_line_to_move(profile: str, words: list[str]) -> None:
+def test_the_finding_about_who_leaves_the_fence_names_the_line_to_move(
+    profile: str, words: list[str]
+) -> None:
     found = unfenced("/slam", "slam", "/tf", profile, remapped=False)
     assert all(word in found.help for word in words)
 
 
-@pytest.mark.parametrize(("static", "fenced", "kept"), [(True, None, True), (True, True, False), (False, None, False)])
+@pytest.mark.parametrize(
+    ("static", "fenced", "kept"), [(True, None, True), (True, True, False), (False, None, False)]
+)
 def test_when_a_stranger_has_left_its_latched_edges_stay_with_listeners(
     *, static: bool, fenced: bool | None, kept: bool
 ) -> None:
@@ -347,17 +387,29 @@ def test_what_another_robot_publishes_is_one_finding_that_names_it_and_the_ways_
     slam, wheels = running.joins("/other/slam"), running.joins("/other/wheels")
     slam.run = wheels.run = OTHER
     for _ in range(20):
-        running.send(wheels, "cart left_wheel, cart right_wheel").send(slam, "map odom, odom cart").wait(0.1)
+        running.send(wheels, "cart left_wheel, cart right_wheel").send(
+            slam, "map odom, odom cart"
+        ).wait(0.1)
     found = running.found()
     assert {one.code for one in found} == {"TF854"}
     assert len(found) <= 2, "a warning of its own frames, and an error of those that both have"
-    expect(found[-1], "TF854", "other@0", "pid 4711", "domain_id", "isolate: topics", "both robots have odom")
+    expect(
+        found[-1],
+        "TF854",
+        "other@0",
+        "pid 4711",
+        "domain_id",
+        "isolate: topics",
+        "both robots have odom",
+    )
     running.leaves(slam)
     running.leaves(wheels)
     assert any("other@0" in over for over in running.wait(10.0).over())
 
 
-def test_another_robot_with_frames_of_its_own_is_warned_of_and_keeps_nobody_from_starting() -> None:
+def test_another_robot_with_frames_of_its_own_is_warned_of_and_keeps_nobody_from_starting() -> (
+    None
+):
     running = History()
     wheels = running.joins("/other/wheels")
     wheels.run = OTHER
@@ -383,6 +435,13 @@ def test_the_environment_of_another_robots_process_says_whose_run_it_is() -> Non
     assert found is not None
     assert (found.name, found.pid) == ("other@0", 4711)
     own: list[dict[str, str]] = [other | {"RUN": "rover@0:1"}]
-    unsure: list[list[dict[str, str]] | None] = [[other, {}], [other | {"L": ""}], own, [{}], [], None]
+    unsure: list[list[dict[str, str]] | None] = [
+        [other, {}],
+        [other | {"L": ""}],
+        own,
+        [{}],
+        [],
+        None,
+    ]
     for environments in unsure:
         assert marks.identify(environments).run is None

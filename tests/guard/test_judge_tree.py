@@ -8,10 +8,10 @@ import pytest
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
 from tfcompose.guard.judge import MOST_VERDICT_EDGES, Judge
-from tfcompose.ipc import Found, Taken
-from tfcompose.live.publishers import Publisher
-from tfcompose.plan import EdgePattern, GuardPolicy, Plan, RosSettings
-from tfcompose.verdict.ownership import MOST_UNDECLARED
+from tfcompose.guard.verdict.ownership import MOST_UNDECLARED
+from tfcompose.model.messages import Found, Taken
+from tfcompose.model.plan import EdgePattern, GuardPolicy, Plan, RosSettings
+from tfcompose.tf.live.publishers import Publisher
 
 
 def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_other() -> None:
@@ -32,16 +32,23 @@ def test_another_node_may_not_publish_a_switched_edge_on_any_of_its_parents() ->
 
 
 @pytest.mark.parametrize(
-    "policy", [GuardPolicy(), GuardPolicy(allow=(EdgePattern("*", "*"),)), GuardPolicy("watch", "ignore")]
+    "policy",
+    [GuardPolicy(), GuardPolicy(allow=(EdgePattern("*", "*"),)), GuardPolicy("watch", "ignore")],
 )
-def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop_is_named(policy: GuardPolicy) -> None:
+def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop_is_named(
+    policy: GuardPolicy,
+) -> None:
     running = History(policy).clear()
     running.repeat(running.joins("/rogue"), "base map", 5)
-    expect(running.only(), "TF820", "map → odom → base → map", "base → map from /rogue", "end /rogue")
+    expect(
+        running.only(), "TF820", "map → odom → base → map", "base → map from /rogue", "end /rogue"
+    )
     assert running.only().severity == "error"
 
 
-def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(running: History) -> None:
+def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(
+    running: History,
+) -> None:
     one, other = running.joins("/one"), running.joins("/other")
     for _ in range(5):
         running.send(one, "base cup").send(other, "cup map").wait(0.1)
@@ -52,8 +59,12 @@ def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(runn
     )
 
 
-def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_are_allowed() -> None:
-    running = History(GuardPolicy(allow=(EdgePattern("cup", "saucer"), EdgePattern("saucer", "cup")))).clear()
+def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_are_allowed() -> (
+    None
+):
+    running = History(
+        GuardPolicy(allow=(EdgePattern("cup", "saucer"), EdgePattern("saucer", "cup")))
+    ).clear()
     running.repeat(running.joins("/waiter"), "cup saucer, saucer cup", 10)
     assert running.reports() == []
 
@@ -72,7 +83,9 @@ def test_a_stranger_that_sends_for_long_closes_a_loop_all_the_same(running: Hist
     assert "TF820" in [reports[:5] for reports in running.reports()]
 
 
-def test_a_loop_is_reported_to_be_over_and_to_have_been_there_before_the_start(running: History) -> None:
+def test_a_loop_is_reported_to_be_over_and_to_have_been_there_before_the_start(
+    running: History,
+) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "base map", 5).leaves(rogue)
     (over,) = running.wait(4).over()
@@ -116,9 +129,15 @@ def test_only_the_plans_own_nodes_leak_to_the_global_topic() -> None:
     judge = Judge(plan, SETTLE_S, 0.0, 0)
     writers = [
         Publisher(bytes([n]) * 16, node, static=n == 1)
-        for n, node in enumerate(["/rover/ekf", "/rover/static", "/other/ekf", None, "/roverette/ekf"])
+        for n, node in enumerate(
+            ["/rover/ekf", "/rover/static", "/other/ekf", None, "/roverette/ekf"]
+        )
     ]
-    events = [event for _ in range(3) for event in judge.leaks(writers, ("/rover/tf", "/rover/tf_static"))]
+    events = [
+        event
+        for _ in range(3)
+        for event in judge.leaks(writers, ("/rover/tf", "/rover/tf_static"))
+    ]
     first, second = [event.found for event in events if isinstance(event, Found)]
     expect(first, "TF827", "/rover/ekf", " /tf,", "/rover/tf")
     expect(second, "TF827", "/rover/static", " /tf_static,", "/rover/tf_static")
@@ -135,12 +154,18 @@ def test_where_a_publisher_runs_is_a_note(running: History) -> None:
 
 
 def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> None:
-    running = History(processes=tuple(replace(one, nodes=(f"/{one.name}",)) for one in PROCESSES)).clear()
+    running = History(
+        processes=tuple(replace(one, nodes=(f"/{one.name}",)) for one in PROCESSES)
+    ).clear()
     running.repeat(running.joins("/slam", process="slam"), "odom base", 3)
     running.repeat(running.joins("/rogue", process=""), "base lidar", 3)
     running.repeat(running.joins("/drive", process=""), "base camera", 3)
     found = [event for event in running.events if isinstance(event, Found)]
-    assert [(event.found.code, event.process) for event in found] == [("TF801", "slam"), ("TF801", ""), ("TF801", "")]
+    assert [(event.found.code, event.process) for event in found] == [
+        ("TF801", "slam"),
+        ("TF801", ""),
+        ("TF801", ""),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -150,9 +175,13 @@ def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> Non
         ("map base", "let /mapper"),
     ],
 )
-def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_out(edges: str, advice: str) -> None:
+def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_out(
+    edges: str, advice: str
+) -> None:
     slam = next(one for one in PROCESSES if one.name == "slam")
-    history = History(processes=(*(one for one in PROCESSES if one != slam), replace(slam, nodes=("/mapper",)))).clear()
+    history = History(
+        processes=(*(one for one in PROCESSES if one != slam), replace(slam, nodes=("/mapper",)))
+    ).clear()
     history.repeat(history.joins("/mapper"), edges, 5).repeat(history.joins("/rogue"), edges, 5)
     own, stranger = history.found()
     expect(own, own.code, advice)
@@ -178,7 +207,12 @@ def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_jud
     codes = [one.code for one in running.found()]
     assert codes.count("TF853") == 1
     assert "TF801" in codes, "the declared edge in the flood"
-    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue", "3,000 frames")
+    expect(
+        next(one for one in running.found() if one.code == "TF853"),
+        "TF853",
+        "/rogue",
+        "3,000 frames",
+    )
 
 
 def test_a_flood_is_reported_with_how_much_and_how_often() -> None:
@@ -188,7 +222,13 @@ def test_a_flood_is_reported_with_how_much_and_how_often() -> None:
     for _ in range(25):
         running.judge.flooded_by(rogue.gid, 10_000, running.now)
         running.wait(0.05)
-    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue", "10,000 frames", "20 Hz")
+    expect(
+        next(one for one in running.found() if one.code == "TF853"),
+        "TF853",
+        "/rogue",
+        "10,000 frames",
+        "20 Hz",
+    )
 
 
 def test_others_are_judged_during_a_flood_and_what_is_allowed_passes() -> None:
@@ -199,7 +239,12 @@ def test_others_are_judged_during_a_flood_and_what_is_allowed_passes() -> None:
     assert running.judge.admitted == frozenset({("map", "person_7")})
     running.send(tracker, "map person_1").send(tracker, "map person_2, map cup").wait(1)
     assert running.judge.admitted == frozenset({("map", "person_2")})
-    found = [(one.code, word) for one in running.found() for word in ("/rogue", "/tracker") if word in one.message]
+    found = [
+        (one.code, word)
+        for one in running.found()
+        for word in ("/rogue", "/tracker")
+        if word in one.message
+    ]
     assert sorted(set(found)) == [("TF803", "/rogue"), ("TF803", "/tracker"), ("TF853", "/rogue")]
 
 
@@ -210,7 +255,9 @@ def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:
     for number in range(60):
         running.send(rogue, flood_of(500, number * 500)).wait(0.1)
     assert len(running.judge.cases.open) <= MOST_UNDECLARED + len(EDGES) + 500
-    assert sum(len(edges) for _, _, edges in running.judge._verdicts._verdicts) <= MOST_VERDICT_EDGES
+    assert (
+        sum(len(edges) for _, _, edges in running.judge._verdicts._verdicts) <= MOST_VERDICT_EDGES
+    )
     assert [one.code for one in running.found()].count("TF853") == 1
 
 

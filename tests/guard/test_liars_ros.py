@@ -13,9 +13,9 @@ import pytest
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
-from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.tf_codec import decode
-from tfcompose.signals import Stop
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import TFSubscription, open_node, wait
+from tfcompose.tf.ros.tf_codec import decode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,8 +26,8 @@ pytestmark = pytest.mark.ros
 #: A node that sends edges at 20 Hz; x says who it is.
 NODE = """
 import signal, sys, time
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
 words, _, ros = " ".join(sys.argv[1:]).partition(" --ros-args ")
 name, x, *edges = words.split(" ", 2)
 edges, ros = edges[0].split(", "), ["--ros-args", *ros.split()] if ros else []
@@ -83,7 +83,9 @@ class Liars:
         """Wait for a line with all these words, and return it."""
 
         def found() -> list[str]:
-            return [line for line in complete_lines(self.output) if all(word in line for word in words)]
+            return [
+                line for line in complete_lines(self.output) if all(word in line for word in words)
+            ]
 
         assert until(found, 60), (words, self.text)
         return found()[0]
@@ -124,7 +126,9 @@ def heard_until(child: str, x: float, times: int = 20) -> list[float]:
 
         def enough() -> bool:
             wait(node, [reader], 0.1, Stop())
-            found.extend(t.xyz[0] for one in reader.take() for t in decode(one.data) if t.child == child)
+            found.extend(
+                t.xyz[0] for one in reader.take() for t in decode(one.data) if t.child == child
+            )
             return found.count(x) >= times
 
         assert until(enough), found
@@ -156,7 +160,9 @@ def test_of_two_with_the_owners_name_the_stranger_is_accused_and_the_owner_is_he
 
 
 @pytest.mark.parametrize("guard", ["mode: strict", "mode: strict, fence: remap"])
-def test_a_child_with_an_owners_name_gets_nothing_of_that_owners_through(run: Callable[..., Liars], guard: str) -> None:
+def test_a_child_with_an_owners_name_gets_nothing_of_that_owners_through(
+    run: Callable[..., Liars], guard: str
+) -> None:
     liar = [sys.executable, "node.py", "slam", str(CHILD_X), "map odom, base_link hand"]
     robot = run(guard, liar)
     robot.says("error[TF801]", "map → odom", "another /slam")
@@ -164,7 +170,8 @@ def test_a_child_with_an_owners_name_gets_nothing_of_that_owners_through(run: Ca
 
 
 @pytest.mark.parametrize(
-    "slip", ["export FASTRTPS_DEFAULT_PROFILES_FILE=own.xml\n", "unset FASTRTPS_DEFAULT_PROFILES_FILE\n"]
+    "slip",
+    ["export FASTRTPS_DEFAULT_PROFILES_FILE=own.xml\n", "unset FASTRTPS_DEFAULT_PROFILES_FILE\n"],
 )
 def test_a_child_that_leaves_the_fence_is_named_and_stopped(
     run: Callable[..., Liars], tmp_path: Path, slip: str
@@ -183,8 +190,8 @@ def test_a_child_that_leaves_the_fence_is_named_and_stopped(
 #: A node that sends new frames in each message: so many transforms, ten times a second.
 FLOOD = """
 import signal, sys, time
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 with open_node("flood", "/") as node:
     publisher, n = TFPublisher(node, static=False), 0

@@ -11,23 +11,35 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support.findings import expect
-from tfcompose.geometry import Pose
+from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.liveness import Liveness
-from tfcompose.ipc import GUARD_EVENTS, Complete, Found, GuardEvent, Live, OwnerReady, Recovered
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.messages import (
+    GUARD_EVENTS,
+    Complete,
+    Found,
+    GuardEvent,
+    Live,
+    OwnerReady,
+    Recovered,
+)
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from tfcompose.findings import Finding
-    from tfcompose.plan import EdgeKind
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.plan import EdgeKind
 
 TICK_S = 0.1
 
 
-def edge(names: str, owner: str, rate: float | None = None, kind: EdgeKind = "dynamic") -> PlanEdge:
+def edge(
+    names: str, owner: str, rate: float | None = None, kind: EdgeKind = "dynamic"
+) -> PlanEdge:
     parent, child = names.split()
-    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, SourceLine("rover.yaml", 3))
+    return PlanEdge(
+        parent, child, kind, owner, f"/{owner}", Pose(), rate, SourceLine("rover.yaml", 3)
+    )
 
 
 @dataclass
@@ -47,12 +59,17 @@ class History:
         ticks = [(TICK_S * n, "") for n in range(1, round(seconds / TICK_S) + 1)]
         for at, child in sorted([*arrivals, *ticks]):
             self.now = begun + at
-            self.events += self.live.arrived((child,), self.now) if child else self.live.judge(self.now)
+            self.events += (
+                self.live.arrived((child,), self.now) if child else self.live.judge(self.now)
+            )
         self.now = begun + seconds
         return self
 
     def steadily(self, seconds: float, hertz: float, *children: str) -> History:
-        return self.run(seconds, [(n / hertz, child) for n in range(round(seconds * hertz)) for child in children])
+        return self.run(
+            seconds,
+            [(n / hertz, child) for n in range(round(seconds * hertz)) for child in children],
+        )
 
     def found(self) -> list[Finding]:
         return [event.found for event in self.events if isinstance(event, Found)]
@@ -75,20 +92,35 @@ def watch() -> Callable[..., History]:
     return make
 
 
-def test_what_comes_in_one_message_is_announced_in_few_events(watch: Callable[..., History]) -> None:
+def test_what_comes_in_one_message_is_announced_in_few_events(
+    watch: Callable[..., History],
+) -> None:
     names = [f"frame_{n}" for n in range(2500)]
     history = watch(*(edge(f"base {name}", "static", kind="static") for name in names))
-    live = [event for event in history.live.arrived(tuple(names), history.now) if isinstance(event, Live)]
+    live = [
+        event
+        for event in history.live.arrived(tuple(names), history.now)
+        if isinstance(event, Live)
+    ]
     assert [len(event.children) for event in live] == [1000, 1000, 500]
     assert [child for event in live for child in event.children] == names
     assert [GUARD_EVENTS.read(GUARD_EVENTS.line(event)) for event in live] == live
 
 
 def test_edges_owners_and_the_tree_are_each_announced_once(watch: Callable[..., History]) -> None:
-    history = watch(edge("map odom", "slam", 10), edge("odom a", "drive", 10), edge("odom b", "drive", 10))
+    history = watch(
+        edge("map odom", "slam", 10), edge("odom a", "drive", 10), edge("odom b", "drive", 10)
+    )
     history.steadily(1, 10, "a", "odom").steadily(1, 10, "a", "b", "odom")
-    assert [event.children for event in history.events if isinstance(event, Live)] == [("a",), ("odom",), ("b",)]
-    assert [event.process for event in history.events if isinstance(event, OwnerReady)] == ["slam", "drive"]
+    assert [event.children for event in history.events if isinstance(event, Live)] == [
+        ("a",),
+        ("odom",),
+        ("b",),
+    ]
+    assert [event.process for event in history.events if isinstance(event, OwnerReady)] == [
+        "slam",
+        "drive",
+    ]
     assert [event for event in history.events if isinstance(event, Complete)] == [Complete(3)]
 
 
@@ -105,7 +137,9 @@ def test_an_owner_that_was_never_heard_is_not_silent(watch: Callable[..., Histor
     assert watch(edge("map odom", "slam", 10)).run(60).events == []
 
 
-def test_edges_without_a_rate_and_static_ones_are_never_silent(watch: Callable[..., History]) -> None:
+def test_edges_without_a_rate_and_static_ones_are_never_silent(
+    watch: Callable[..., History],
+) -> None:
     history = watch(edge("base left", "joints"), edge("base lidar", "lidar", 10, "static"))
     assert history.steadily(0.1, 10, "left", "lidar").run(60).found() == []
 
@@ -120,7 +154,9 @@ def test_several_edges_of_one_owner_that_falls_silent_are_one_finding_and_come_b
     watch: Callable[..., History],
 ) -> None:
     children = [f"wheel_{n}" for n in range(8)]
-    history = watch(*(edge(f"base {child}", "drive", 20) for child in children), edge("map odom", "slam", 10))
+    history = watch(
+        *(edge(f"base {child}", "drive", 20) for child in children), edge("map odom", "slam", 10)
+    )
     history.steadily(2, 10, *children, *children, "odom").steadily(2, 10, "odom")
     expect(history.only(), "TF804", "base → wheel_5 and 2 more")
     history.steadily(2, 10, *children, *children, "odom")
@@ -129,19 +165,27 @@ def test_several_edges_of_one_owner_that_falls_silent_are_one_finding_and_come_b
     assert re.search(r"and 2 more .* 2\.\d s", over)
 
 
-def test_an_owner_that_is_back_and_falls_silent_again_is_named_again(watch: Callable[..., History]) -> None:
-    history = watch(edge("map odom", "slam", 10)).steadily(2, 10, "odom").run(2).steadily(2, 10, "odom")
+def test_an_owner_that_is_back_and_falls_silent_again_is_named_again(
+    watch: Callable[..., History],
+) -> None:
+    history = (
+        watch(edge("map odom", "slam", 10)).steadily(2, 10, "odom").run(2).steadily(2, 10, "odom")
+    )
     (over,) = history.over()
     assert (over.startswith("map → odom "), over.endswith(" 2.3 s")) == (True, True)
     assert len(history.run(2).found()) == 2
 
 
-@pytest.mark.parametrize(("declared", "hertz"), [(10, 7), (50, 30), (100, 79), (300, 200), (1000, 500), (1, 0.7)])
+@pytest.mark.parametrize(
+    ("declared", "hertz"), [(10, 7), (50, 30), (100, 79), (300, 200), (1000, 500), (1, 0.7)]
+)
 def test_an_owner_that_is_too_slow_is_named_once_with_its_rate(
     watch: Callable[..., History], declared: float, hertz: float
 ) -> None:
     history = watch(edge("map odom", "slam", declared)).steadily(30, hertz, "odom")
-    expect(history.only(), "TF805", "map → odom", f" {hertz} Hz", "slam (/slam)", f" {declared} Hz")
+    expect(
+        history.only(), "TF805", "map → odom", f" {hertz} Hz", "slam (/slam)", f" {declared} Hz"
+    )
     assert history.only().severity == "warning"
 
 
@@ -152,7 +196,9 @@ def test_an_owner_that_is_nearly_as_fast_as_declared_or_faster_is_right(
     assert watch(edge("map odom", "slam", 10)).steadily(20, hertz, "odom").found() == []
 
 
-def test_an_owner_that_is_fast_enough_again_is_reported_to_be(watch: Callable[..., History]) -> None:
+def test_an_owner_that_is_fast_enough_again_is_reported_to_be(
+    watch: Callable[..., History],
+) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(6, 5, "odom").steadily(6, 10, "odom")
     assert len(history.found()) == 1
     (over,) = history.over()
@@ -167,7 +213,9 @@ def test_an_owner_a_little_below_what_it_declares_is_neither_slow_anew_nor_fast_
 
 
 def test_several_slow_edges_of_one_owner_are_one_finding(watch: Callable[..., History]) -> None:
-    history = watch(edge("odom a", "drive", 10), edge("odom b", "drive", 10)).steadily(6, 5, "a", "b")
+    history = watch(edge("odom a", "drive", 10), edge("odom b", "drive", 10)).steadily(
+        6, 5, "a", "b"
+    )
     expect(history.only(), "TF805", "odom → a, odom → b", " 5 Hz", "drive (/drive)", " 10 Hz")
 
 
@@ -180,8 +228,15 @@ def test_an_owner_that_sends_a_tenth_of_what_is_declared_is_silent_then_slow_and
     assert len(history.steadily(5, 10, "odom").over()) == 1
 
 
-def test_a_hiccup_of_half_a_second_is_neither_silence_nor_slowness(watch: Callable[..., History]) -> None:
-    history = watch(edge("odom base", "drive", 50)).steadily(3, 50, "base").run(0.5).steadily(5, 50, "base")
+def test_a_hiccup_of_half_a_second_is_neither_silence_nor_slowness(
+    watch: Callable[..., History],
+) -> None:
+    history = (
+        watch(edge("odom base", "drive", 50))
+        .steadily(3, 50, "base")
+        .run(0.5)
+        .steadily(5, 50, "base")
+    )
     assert history.found() == []
 
 
@@ -192,7 +247,9 @@ def test_a_guard_that_was_kept_from_running_reports_nothing_false(
     history = watch(edge("map odom", "slam", 10), edge("odom base", "drive", 50))
     history.steadily(3, 50, "base").steadily(3, 10, "odom", "base", "base", "base", "base", "base")
     history.now += stall_s
-    history.events += history.live.judge(history.now)  # before what has come meanwhile is delivered
+    history.events += history.live.judge(
+        history.now
+    )  # before what has come meanwhile is delivered
     history.run(late_s)
     for child in ["odom"] * 20 + ["base"] * 100:
         history.live.arrived((child,), history.now)
@@ -207,7 +264,9 @@ def test_a_guard_that_was_kept_from_running_reports_nothing_false(
     st.lists(st.floats(-0.45, 0.45), min_size=400, max_size=400),
     st.lists(st.sampled_from((0.05, 0.1, 0.2, 0.4, 1.5)), max_size=12),
 )
-def test_jitter_and_checks_at_uneven_times_find_nothing(hertz: float, jitter: list[float], ticks: list[float]) -> None:
+def test_jitter_and_checks_at_uneven_times_find_nothing(
+    hertz: float, jitter: list[float], ticks: list[float]
+) -> None:
     plan = Plan("rover", "0", None, RosSettings(), (edge("map odom", "slam", hertz),), ())
     live, at, now, sent = Liveness(plan), 500.0, 500.0, 0
     times = [500.0 + (n + part) / hertz for n, part in enumerate(jitter)]
@@ -224,7 +283,9 @@ def test_jitter_and_checks_at_uneven_times_find_nothing(hertz: float, jitter: li
 def test_a_latching_owner_that_leaves_the_graph_is_reported_once_with_its_edges_and_when_it_is_back(
     watch: Callable[..., History],
 ) -> None:
-    live = watch(edge("base lidar", "static", None, "static"), edge("base imu", "static", None, "static")).live
+    live = watch(
+        edge("base lidar", "static", None, "static"), edge("base imu", "static", None, "static")
+    ).live
     assert live.static_writers([]) == []
     live.arrived(("lidar",), 1)
     live.arrived(("imu",), 1)

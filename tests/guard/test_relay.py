@@ -10,16 +10,16 @@ import pytest
 from tests.support.guard_history import EDGES, PROCESSES
 from tfcompose.guard import relay
 from tfcompose.guard.relay import Feedback, Relay
-from tfcompose.live.publishers import Message, Publisher
-from tfcompose.live.topics import TFData
-from tfcompose.plan import Plan, RosSettings
-from tfcompose.ros.node import Received
-from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.model.plan import Plan, RosSettings
+from tfcompose.tf.live.publishers import Message, Publisher
+from tfcompose.tf.live.topics import TFData
+from tfcompose.tf.ros.node import Received
+from tfcompose.tf.ros.tf_codec import Transform, decode, encode
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from tfcompose.live.topics import TFGraph
+    from tfcompose.tf.live.topics import TFGraph
 
 SLAM, DRIVE, CAMERA = b"s" * 16, b"d" * 16, b"c" * 16
 TOPICS = ("/tf", "/tf_static")
@@ -60,10 +60,19 @@ class Bus:
 
     def latched(self, topic: str = TOPICS[1]) -> list[set[tuple[str, str]]]:
         """Return the edges of the newest message of each latched publisher on the topic."""
-        return [edges_of(one.sent[-1]) for one in self.senders if one.static and one.topic == topic and one.sent]
+        return [
+            edges_of(one.sent[-1])
+            for one in self.senders
+            if one.static and one.topic == topic and one.sent
+        ]
 
     def moving(self, topic: str = TOPICS[0]) -> list[set[tuple[str, str]]]:
-        return [edges_of(data) for one in self.senders if not one.static and one.topic == topic for data in one.sent]
+        return [
+            edges_of(data)
+            for one in self.senders
+            if not one.static and one.topic == topic
+            for data in one.sent
+        ]
 
 
 @pytest.fixture(autouse=True)
@@ -83,8 +92,13 @@ def message_of(gid: bytes, edges: str, *, static: bool) -> Message:
     return Message(pairs(edges), static, gid, 0, 1)
 
 
-def data_of(gid: bytes, edges: str, *, static: bool, fenced: bool = True, process: str = "") -> TFData:
-    transforms = [Transform(0, parent, child, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for parent, child in pairs(edges)]
+def data_of(
+    gid: bytes, edges: str, *, static: bool, fenced: bool = True, process: str = ""
+) -> TFData:
+    transforms = [
+        Transform(0, parent, child, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        for parent, child in pairs(edges)
+    ]
     return TFData(Received(encode(transforms), gid, 0, 0, 1, gid), static, fenced, process)
 
 
@@ -108,7 +122,9 @@ class Passing:
         feedback = None if self.remapped is None else Feedback(node, self.remapped, self.own)
         self.relay = Relay(node, graph, plan, self.own, feedback)
 
-    def send(self, gid: bytes, edges: str, admitted: str | None = None, *, who: str = "/x", **more: Any) -> Passing:
+    def send(
+        self, gid: bytes, edges: str, admitted: str | None = None, *, who: str = "/x", **more: Any
+    ) -> Passing:
         """Let a message come, of which these edges are admitted; None: all."""
         static = more.pop("static", True)
         may = None if admitted is None else frozenset(pairs(admitted) if admitted else ())
@@ -134,8 +150,14 @@ def test_fixed_edges_of_one_who_has_left_are_latched_no_more() -> None:
     assert running.bus.latched() == [{("base", "camera")}, {("map", "odom")}]
 
 
-def test_fixed_edges_of_one_sender_come_together_and_what_is_not_admitted_is_left_out_and_counted() -> None:
-    running = Passing().send(CAMERA, "base camera", who="/camera").send(CAMERA, "base lidar, map odom", "base lidar")
+def test_fixed_edges_of_one_sender_come_together_and_what_is_not_admitted_is_left_out_and_counted() -> (
+    None
+):
+    running = (
+        Passing()
+        .send(CAMERA, "base camera", who="/camera")
+        .send(CAMERA, "base lidar, map odom", "base lidar")
+    )
     assert running.bus.latched() == [{("base", "camera"), ("base", "lidar")}]
     assert running.relay.held.counts == {("/x", "map", "odom"): 1}
     running.send(SLAM, "map odom", "")
@@ -144,10 +166,16 @@ def test_fixed_edges_of_one_sender_come_together_and_what_is_not_admitted_is_lef
     assert not running.relay.held.report()
 
 
-def test_a_guard_that_follows_latches_again_what_may_still_pass_and_forgets_nobody_before_all_are_found() -> None:
-    memory = Passing().send(CAMERA, "base camera, base lidar").send(SLAM, "map odom").relay.memory()
+def test_a_guard_that_follows_latches_again_what_may_still_pass_and_forgets_nobody_before_all_are_found() -> (
+    None
+):
+    memory = (
+        Passing().send(CAMERA, "base camera, base lidar").send(SLAM, "map odom").relay.memory()
+    )
     following = Passing()
-    following.relay.recall(memory, lambda message: {("base", "camera")} & {*message.edges}, until=105.0)
+    following.relay.recall(
+        memory, lambda message: {("base", "camera")} & {*message.edges}, until=105.0
+    )
     assert following.bus.latched() == [{("base", "camera")}]
     following.observe()
     assert following.bus.latched() == [{("base", "camera")}]
@@ -159,9 +187,13 @@ def test_a_guard_that_follows_latches_again_what_may_still_pass_and_forgets_nobo
 def test_moving_edges_pass_byte_for_byte_or_without_what_is_not_admitted() -> None:
     running = Passing()
     sent = data_of(DRIVE, "odom base, base arm", static=False)
-    running.relay.pass_on(sent, message_of(DRIVE, "odom base, base arm", static=False), None, "/drive")
+    running.relay.pass_on(
+        sent, message_of(DRIVE, "odom base, base arm", static=False), None, "/drive"
+    )
     assert running.bus.senders[0].sent == [sent.received.data]
-    running.send(DRIVE, "odom base, base arm", "odom base", static=False).send(DRIVE, "base arm", "", static=False)
+    running.send(DRIVE, "odom base, base arm", "odom base", static=False).send(
+        DRIVE, "base arm", "", static=False
+    )
     assert running.bus.moving() == [{("odom", "base"), ("base", "arm")}, {("odom", "base")}]
 
 
@@ -169,7 +201,12 @@ def test_names_that_were_not_all_that_was_sent_are_sent_as_they_were_judged() ->
     running = Passing()
     message = replace(message_of(DRIVE, "odom base", static=False), exact=False)
     sent = data_of(DRIVE, "odom base_more", static=False)
-    sent = replace(sent, received=replace(sent.received, data=sent.received.data.replace(b"base_more", b"base\0more")))
+    sent = replace(
+        sent,
+        received=replace(
+            sent.received, data=sent.received.data.replace(b"base_more", b"base\0more")
+        ),
+    )
     running.relay.pass_on(sent, message, None, "/drive")
     assert running.bus.moving() == [{("odom", "base")}]
     assert running.bus.senders[0].sent != [sent.received.data]
@@ -185,14 +222,19 @@ def test_what_comes_past_the_fence_or_from_nobody_that_is_known_is_not_passed_on
     running.send(CAMERA, "base camera", who="")
     running.bus.fenced[CAMERA] = None
     running.send(CAMERA, "base lidar", who="/camera")
-    assert [message.edges for _, message in running.relay.waiting] == [pairs("base camera"), pairs("base lidar")]
+    assert [message.edges for _, message in running.relay.waiting] == [
+        pairs("base camera"),
+        pairs("base lidar"),
+    ]
 
 
 def test_a_remapped_process_receives_the_rest_of_the_tree_and_nothing_of_its_own() -> None:
     private = {"slam": ("/slam/tf", "/slam/tf_static"), "drive": ("/drive/tf", "/drive/tf_static")}
     running = Passing(private)
     running.bus.listeners |= dict.fromkeys((*private["slam"], *private["drive"]), 2)
-    running.observe().send(SLAM, "map odom", process="slam").send(CAMERA, "base camera", fenced=False)
+    running.observe().send(SLAM, "map odom", process="slam").send(
+        CAMERA, "base camera", fenced=False
+    )
     running.observe(publisher(SLAM, "/slam"), publisher(CAMERA, "/camera", fenced=False))
     assert running.bus.latched("/slam/tf_static") == [{("base", "camera")}]
     assert running.bus.latched("/drive/tf_static") == [{("map", "odom"), ("base", "camera")}]

@@ -16,18 +16,19 @@ from tests.support import processes
 from tests.support.guard_without_ids import guard_without_ids
 from tests.support.processes import Started
 from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
-from tfcompose.ros.graph import writers
-from tfcompose.ros.node import Received, TFPublisher, TFSubscription, open_node, wait
-from tfcompose.ros.tf_codec import Transform, decode, encode
-from tfcompose.signals import Stop
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.graph import writers
+from tfcompose.tf.ros.node import Received, TFPublisher, TFSubscription, open_node, wait
+from tfcompose.tf.ros.tf_codec import Transform, decode, encode
 
 pytestmark = pytest.mark.ros
 
-#: A node that latches edges, sends others at 20 Hz with stamps that do not change, and says whom it hears on TF.
+#: A node that latches edges, sends others at 20 Hz with stamps that do not change, and says whom
+#: it hears on TF.
 CHILD = """
 import json, signal, sys, time
-from tfcompose.ros.tf_codec import Transform, decode, encode
-from tfcompose.ros.node import TFPublisher, TFSubscription, open_node
+from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.node import TFPublisher, TFSubscription, open_node
 name, fixed, moving = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[3])
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 def message(edges):
@@ -95,13 +96,17 @@ class Fenced:
             fence=fence,
             drive=child("drive", [], ["odom base_link"], folder),
             arm=child("arm", ["base_link arm", "arm tool"], [], folder),
-            rogue=child("rogue", ["base_link laser"], ["map odom", "tool hand", "tool cup"], folder),
+            rogue=child(
+                "rogue", ["base_link laser"], ["map odom", "tool hand", "tool cup"], folder
+            ),
         )
         (folder / "robot.yaml").write_text(text, encoding="utf-8")
         self.output = folder / "output.txt"
         with self.output.open("wb") as out:
             command = [sys.executable, "-m", "tfcompose", "up"]
-            self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out, env=os.environ | env)
+            self.popen = processes.start(
+                command, cwd=folder, stdout=out, stderr=out, env=os.environ | env
+            )
 
     def lines(self, word: str) -> list[str]:
         return [line for line in complete_lines(self.output) if word in line]
@@ -111,11 +116,18 @@ class Fenced:
         return self.output.read_text(encoding="utf-8")
 
     def says(self, *words: str) -> None:
-        there = until(lambda: any(all(word in line for word in words) for line in complete_lines(self.output)), 60)
+        there = until(
+            lambda: any(
+                all(word in line for word in words) for line in complete_lines(self.output)
+            ),
+            60,
+        )
         assert there, (words, self.text)
 
     def guard(self) -> psutil.Process:
-        return next(p for p in psutil.Process(self.popen.pid).children() if "guard" in p.cmdline()[-1:])
+        return next(
+            p for p in psutil.Process(self.popen.pid).children() if "guard" in p.cmdline()[-1:]
+        )
 
     def end(self) -> int:
         self.popen.send_signal(signal.SIGINT)
@@ -144,7 +156,9 @@ class Listener:
         self.node: object = node
         self.readers = [TFSubscription(node, static=static) for static in (False, True)]  # type: ignore[arg-type]
 
-    def hears(self, seconds: float, enough: Callable[[list[Received]], bool] | None = None) -> list[Received]:
+    def hears(
+        self, seconds: float, enough: Callable[[list[Received]], bool] | None = None
+    ) -> list[Received]:
         """Return what comes in this time, or until it is enough."""
         received: list[Received] = []
         end = time.monotonic() + seconds
@@ -166,17 +180,25 @@ def reported(robot: Fenced) -> list[str]:
     return [line for line in robot.lines(" published by /rogue") if "note" not in line]
 
 
-def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_back_is_named(robot: Fenced) -> None:
+def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_back_is_named(
+    robot: Fenced,
+) -> None:
     robot.says("error[TF801]", "/rogue;")
     robot.says("warning[TF803]", "tool → cup", "/rogue")
     with open_node("late", "/test") as node:
         listener = Listener(node)
-        received = listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES and len(of_the_base(some)) > 10)
+        received = listener.hears(
+            TIMEOUT_S, lambda some: children(some) >= FRAMES and len(of_the_base(some)) > 10
+        )
         received += listener.hears(2)
         names: dict[bytes | None, str] = {}
 
         def named() -> bool:
-            names.update((one.gid, one.node) for topic in ("/tf", "/tf_static") for one in writers(node, topic))
+            names.update(
+                (one.gid, one.node)
+                for topic in ("/tf", "/tf_static")
+                for one in writers(node, topic)
+            )
             return all(names.get(one.gid) == "/tfcompose_guard" for one in received if one.gid)
 
         assert until(named), names
@@ -184,11 +206,16 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
     poses = {t.xyz for one in received for t in decode(one.data) if t.child in {"odom", "laser"}}
     assert (0.1, 0.2, 0.3) not in poses, "the rogue's edge got through"
     fixed = [one for one in received if children([one]) <= FIXED]
-    assert sorted(map(len, map(decode, (one.data for one in fixed)))) == [1, 2], "each sender's edges in one message"
+    assert sorted(map(len, map(decode, (one.data for one in fixed)))) == [
+        1,
+        2,
+    ], "each sender's edges in one message"
     got = of_the_base(received)
     assert len(got) > 10
     # What a child says of a message comes through the launcher, and later than the message.
-    assert until(lambda: got <= {line.split()[-1] for line in robot.lines(" sent ")}), "something is not as it was sent"
+    assert until(lambda: got <= {line.split()[-1] for line in robot.lines(" sent ")}), (
+        "something is not as it was sent"
+    )
 
     def heard_by_the_drive() -> set[str]:
         hears = [line for line in robot.lines(" hears ") if line.startswith("drive")]
@@ -202,12 +229,16 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
     assert "tool → hand from" not in robot.text
 
 
-def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_again(robot: Fenced) -> None:
+def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_again(
+    robot: Fenced,
+) -> None:
     with open_node("early", "/test") as node, open_node("meanwhile", "/test") as other:
         listener = Listener(node)
         assert children(listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
         more = re.compile(r"(?: and (\d+) more edge)? (?:is|are) published by /rogue")
-        assert until(lambda: sum(1 + int(more.findall(line)[0] or 0) for line in reported(robot)) == 3), robot.text
+        assert until(
+            lambda: sum(1 + int(more.findall(line)[0] or 0) for line in reported(robot)) == 3
+        ), robot.text
         before = reported(robot)
         dead = robot.guard()
         dead.kill()
@@ -225,20 +256,24 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
         joined = Listener(other)
         robot.says("warning[TF808]", "guard", "SIGKILL", "/tf")
         robot.says("over", "guard")
-        assert children(listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES - FIXED)) >= FRAMES - FIXED
+        assert (
+            children(listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES - FIXED))
+            >= FRAMES - FIXED
+        )
         assert children(joined.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
     assert robot.text.count("tree complete") == 1
     assert reported(robot) == before
 
 
-#: A node that latches an edge, and counts what it hears: a line of JSON, by frame, whenever it has changed.
+#: A node that latches an edge, and counts what it hears: a line of JSON, by frame, whenever it has
+#: changed.
 LISTENER = """
 import json, signal, sys, time
 from collections import Counter
-from tfcompose.ros.tf_codec import Transform, decode, encode
-from tfcompose.ros.node import open_node
-from tfcompose.signals import Stop
-from tfcompose.ros.node import TFPublisher, TFSubscription, wait
+from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.node import open_node
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import TFPublisher, TFSubscription, wait
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("ear", "/", args=sys.argv[2:]) as node:
     readers = [TFSubscription(node, static=static) for static in (False, True)]
@@ -275,7 +310,9 @@ def heard_by(up: Started) -> dict[str, int]:
 
 
 def one(parent: str, child: str) -> bytes:
-    return encode([Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+    return encode(
+        [Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]
+    )
 
 
 def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_late(

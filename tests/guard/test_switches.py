@@ -13,16 +13,16 @@ from tests.support.findings import expect
 from tfcompose.guard import gates
 from tfcompose.guard.channel import SwitchMemory, recalled
 from tfcompose.guard.gates import Switches
-from tfcompose.ipc import Found, GuardEvent, Remember
-from tfcompose.plan import Driven, Plan, PlanProcess, RosSettings
-from tfcompose.variables import MEMORY_FD
-from tfcompose.verdict.drivers import not_taken
+from tfcompose.guard.verdict.drivers import not_taken
+from tfcompose.model.messages import Found, GuardEvent, Remember
+from tfcompose.model.plan import Driven, Plan, PlanProcess, RosSettings
+from tfcompose.model.variables import MEMORY_FD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from tfcompose.ros.parameters import Value
+    from tfcompose.tf.ros.parameters import Value
 
 DRIVEN = (Driven("front", "realsense/d455", publishes=False, switch={"publish_tf": False}),)
 
@@ -52,7 +52,14 @@ def test_a_parameter_is_reported_exactly_where_it_is_another_value(
 
 def test_the_finding_names_the_node_the_parameter_and_both_values() -> None:
     (one,) = not_taken("/front/front", {"publish_tf": False}, {"publish_tf": True}, DRIVEN)
-    expect(one, "TF829", "/front/front", "publish_tf: true", "publish_tf: false", "front (realsense/d455)")
+    expect(
+        one,
+        "TF829",
+        "/front/front",
+        "publish_tf: true",
+        "publish_tf: false",
+        "front (realsense/d455)",
+    )
     (one,) = not_taken("/drive", {"enable_odom_tf": False}, {"enable_odom_tf": None})
     expect(one, "TF829", "/drive", "no parameter enable_odom_tf", "enable_odom_tf: false")
 

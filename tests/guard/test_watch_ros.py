@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from tfcompose.guard.process import plans_by_topics, together
-from tfcompose.ipc import Clear, Complete, GuardEvent, OwnerReady
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.model.messages import Clear, Complete, GuardEvent, OwnerReady
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings
 
 OWN = {"/tf": "/one/tf", "/tf_static": "/one/tf_static"}
 
@@ -18,7 +18,9 @@ def plan(*edges: PlanEdge) -> Plan:
     return Plan("fleet", "0", None, RosSettings(), edges, processes)
 
 
-def test_each_judge_gets_the_edges_of_the_owners_on_its_topics(edge: Callable[..., PlanEdge]) -> None:
+def test_each_judge_gets_the_edges_of_the_owners_on_its_topics(
+    edge: Callable[..., PlanEdge],
+) -> None:
     mine, theirs = edge("map dock"), edge("map one/base", "one/static")
     full = plan(mine, theirs)
     plans = plans_by_topics(full, full.process("guard"))
@@ -28,12 +30,16 @@ def test_each_judge_gets_the_edges_of_the_owners_on_its_topics(edge: Callable[..
     }
 
 
-def test_the_guards_own_topics_are_watched_where_nothing_is_planned_on_them(edge: Callable[..., PlanEdge]) -> None:
+def test_the_guards_own_topics_are_watched_where_nothing_is_planned_on_them(
+    edge: Callable[..., PlanEdge],
+) -> None:
     full = plan(edge("map one/base", "one/static"))
     assert plans_by_topics(full, full.process("guard"))["/tf", "/tf_static"].edges == ()
 
 
-def test_all_is_clear_and_complete_once_the_last_judge_says_so(edge: Callable[..., PlanEdge]) -> None:
+def test_all_is_clear_and_complete_once_the_last_judge_says_so(
+    edge: Callable[..., PlanEdge],
+) -> None:
     reports: list[GuardEvent] = []
     one, two, none = plan(edge("a b")), plan(edge("c d"), edge("c e")), plan()
     tell = together(reports.append, [one, two, none])

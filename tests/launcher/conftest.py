@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.launcher import Launcher, launched
-from tfcompose.plan import PlanProcess
+from tfcompose.model.plan import PlanProcess
 
 
 @pytest.fixture

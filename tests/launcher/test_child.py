@@ -19,13 +19,19 @@ from tfcompose.launcher.supervisor import Signals
 @given(st.text(alphabet="ab\né", max_size=60), st.integers(1, 7))
 def test_lines_are_the_same_however_the_bytes_arrive(text: str, size: int) -> None:
     data, lines = text.encode(), Lines()
-    lines_read = [line for start in range(0, len(data), size) for line in lines.feed(data[start : start + size])]
+    lines_read = [
+        line
+        for start in range(0, len(data), size)
+        for line in lines.feed(data[start : start + size])
+    ]
     expected = text.split("\n")
     assert [*lines_read, *lines.end()] == (expected if expected[-1] else expected[:-1])
 
 
 @given(st.lists(st.binary(max_size=40), max_size=20))
-def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(chunks: list[bytes]) -> None:
+def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(
+    chunks: list[bytes],
+) -> None:
     lines = Lines(8)
     lines_read: list[str] = []
     for chunk in (chunk.replace(b"\r", b"").replace(b"\n", b"x") for chunk in chunks):
@@ -42,7 +48,9 @@ def read_flood(source_text: bytes, ending: bytes) -> list[str]:
     lines_read: list[str] = []
     read_end, write_end = os.pipe()
     with os.fdopen(write_end, "wb", buffering=0) as writer:
-        pipe = Pipe(os.fdopen(read_end, "rb", buffering=0), lines_read.append, bucket=Bucket(lambda: 0.0))
+        pipe = Pipe(
+            os.fdopen(read_end, "rb", buffering=0), lines_read.append, bucket=Bucket(lambda: 0.0)
+        )
         for start in range(0, len(source_text), 4096):
             writer.write(source_text[start : start + 4096])
             pipe.read()
@@ -99,7 +107,13 @@ def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
 def test_an_own_process_that_is_ordered_to_end_while_it_starts_ends_by_its_own_rules(
     number: int, seconds: float, tmp_path: Path
 ) -> None:
-    argv = (sys.executable, "-m", "tfcompose.publishers.static", str(tmp_path / "plan.json"), "static")
+    argv = (
+        sys.executable,
+        "-m",
+        "tfcompose.launcher.publishers.static",
+        str(tmp_path / "plan.json"),
+        "static",
+    )
     popen = spawn(Command(argv, dict(os.environ), tmp_path, own=True), ())
     time.sleep(seconds)
     popen.send_signal(number)
@@ -118,20 +132,30 @@ def test_a_child_holder_stays_that_is_ordered_to_end_in_its_first_moment(number:
 
 
 def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_path: Path) -> None:
-    popen = spawn(Command((sys.executable, "-c", "import time; time.sleep(180)"), dict(os.environ), tmp_path), ())
+    popen = spawn(
+        Command(
+            (sys.executable, "-c", "import time; time.sleep(180)"), dict(os.environ), tmp_path
+        ),
+        (),
+    )
     popen.send_signal(signal.SIGTERM)
     assert popen.wait(60) == -signal.SIGTERM
     popen.communicate()
 
 
-def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last_words_are_read(tmp_path: Path) -> None:
+def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last_words_are_read(
+    tmp_path: Path,
+) -> None:
     code = (
         "import os, sys\n"
         "print(sys.stdout.isatty(), sys.stderr.isatty(), os.get_terminal_size(1).columns)\n"
         "print('error', file=sys.stderr)\n"
         "os._exit(3)  # nothing is flushed: a terminal has its lines already\n"
     )
-    popen = spawn(Command((sys.executable, "-I", "-c", code), dict(os.environ), tmp_path, emulate_tty=True), ())
+    popen = spawn(
+        Command((sys.executable, "-I", "-c", code), dict(os.environ), tmp_path, emulate_tty=True),
+        (),
+    )
     assert popen.stdout
     assert popen.stderr
     assert popen.wait(TIMEOUT_S) == 3

@@ -8,7 +8,20 @@ import pytest
 
 from tests.support.findings import expect
 from tests.support.machine_history import GUARD, History, begin, run_process
-from tfcompose.ipc import (
+from tfcompose.launcher.components import writer_of
+from tfcompose.launcher.events import (
+    Exited,
+    LoadComponent,
+    NewPlan,
+    Order,
+    Start,
+    Started,
+    Tick,
+    UnloadComponent,
+)
+from tfcompose.launcher.machine import step
+from tfcompose.launcher.readiness import waits_for
+from tfcompose.model.messages import (
     Absent,
     Clear,
     DownRequest,
@@ -20,19 +33,22 @@ from tfcompose.ipc import (
     Remember,
     Unloaded,
 )
-from tfcompose.launcher.components import writer_of
-from tfcompose.launcher.events import Exited, LoadComponent, NewPlan, Order, Start, Started, Tick, UnloadComponent
-from tfcompose.launcher.machine import step
-from tfcompose.launcher.readiness import waits_for
-from tfcompose.plan import Component, PlanProcess, Ready
+from tfcompose.model.plan import Component, PlanProcess, Ready
 
-BOX = PlanProcess("box", "run", ("box",), nodes=("/box",), ready=Ready("service", "/box/_container/load_node"))
+BOX = PlanProcess(
+    "box", "run", ("box",), nodes=("/box",), ready=Ready("service", "/box/_container/load_node")
+)
 
 
 def component(name: str, **more: Any) -> PlanProcess:
     after = {"box": "ready"} | more.pop("after", {})
     return PlanProcess(
-        name, "component", nodes=(f"/{name}",), component=Component("box", "demo", f"demo::{name}"), after=after, **more
+        name,
+        "component",
+        nodes=(f"/{name}",),
+        component=Component("box", "demo", f"demo::{name}"),
+        after=after,
+        **more,
     )
 
 
@@ -48,7 +64,9 @@ def test_components_are_loaded_in_the_plans_order_once_their_container_is_ready(
     assert history.loads() == []
     history.feed(GateOpen("box", "there"))
     assert history.loads() == ["b", "a"]
-    assert history.started == ["guard", "box"], "no process of the operating system is started for them"
+    assert history.started == ["guard", "box"], (
+        "no process of the operating system is started for them"
+    )
     assert history.answer("a", "b").states("a") == ["starting", "running"]
     assert history.state.tracked["a"].pid == history.state.tracked["box"].pid
 
@@ -71,7 +89,9 @@ def test_a_component_that_fails_to_load_ends_everything_with_the_containers_word
 
 
 def test_an_optional_component_that_fails_leaves_the_rest_running() -> None:
-    history = begin(GUARD, BOX, component("a", required=False), component("b")).feed(Clear(), GateOpen("box", "there"))
+    history = begin(GUARD, BOX, component("a", required=False), component("b")).feed(
+        Clear(), GateOpen("box", "there")
+    )
     history.answer("a", why="no device").answer("b")
     assert history.only().severity == "warning"
     assert history.state.tracked["b"].state == "running"
@@ -80,7 +100,9 @@ def test_an_optional_component_that_fails_leaves_the_rest_running() -> None:
 
 @pytest.mark.parametrize("policy", ["on-failure", "always"])
 def test_a_component_is_loaded_again_after_a_while_as_its_policy_says(policy: Any) -> None:
-    history = begin(GUARD, BOX, component("a", restart=policy, max_restarts=1)).feed(Clear(), GateOpen("box", "there"))
+    history = begin(GUARD, BOX, component("a", restart=policy, max_restarts=1)).feed(
+        Clear(), GateOpen("box", "there")
+    )
     history.answer("a", why="no device")
     assert history.states("a")[-1] == "backoff"
     assert history.sleep_until_due() == pytest.approx(1.0)
@@ -141,7 +163,9 @@ def test_a_component_is_stopped_started_and_restarted_alone() -> None:
 
 
 def test_a_component_that_is_stopped_while_it_is_loaded_is_unloaded() -> None:
-    history = begin(GUARD, BOX, component("a")).feed(Clear(), GateOpen("box", "there"), ProcessRequest("stop", "a"))
+    history = begin(GUARD, BOX, component("a")).feed(
+        Clear(), GateOpen("box", "there"), ProcessRequest("stop", "a")
+    )
     assert isinstance(history.requested[-1], UnloadComponent)
     assert history.answer("a").state.tracked["a"].state == "stopped"
 
@@ -157,7 +181,9 @@ def test_a_container_is_restarted_with_its_components_but_not_with_one_that_was_
 
 
 def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() -> None:
-    history = loaded(component("a"), component("b", after={"a": "ready"})).feed(GateOpen("box", "there"))
+    history = loaded(component("a"), component("b", after={"a": "ready"})).feed(
+        GateOpen("box", "there")
+    )
     history.answer("b")
     history.feed(DownRequest())
     assert not any(isinstance(one, UnloadComponent) for one in history.requested)
@@ -166,7 +192,11 @@ def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() ->
 
 
 def test_a_stop_of_everything_waits_for_no_answer_of_a_container() -> None:
-    history = begin(GUARD, BOX, component("a"), component("b")).feed(Clear(), GateOpen("box", "there")).answer("b")
+    history = (
+        begin(GUARD, BOX, component("a"), component("b"))
+        .feed(Clear(), GateOpen("box", "there"))
+        .answer("b")
+    )
     history.feed(ProcessRequest("stop", "b"), DownRequest())
     assert history.killed == [("box", SIGINT)]
     assert history.feed(Exited("box", 0), Exited("guard", 0)).exit_code == 0
@@ -182,10 +212,17 @@ def test_components_of_a_container_that_is_external_are_unloaded_at_the_end() ->
 
 
 def test_a_guard_that_follows_another_is_given_what_is_not_answered_yet() -> None:
-    history = begin(GUARD, BOX, component("a"), component("b")).feed(Clear(), GateOpen("box", "there")).answer("b")
+    history = (
+        begin(GUARD, BOX, component("a"), component("b"))
+        .feed(Clear(), GateOpen("box", "there"))
+        .answer("b")
+    )
     first, second = history.requested
     history.feed(Exited("guard", 1)).wait(1.0)
-    again = [LoadComponent(name, number, again=True) for name, number in (("a", first.number), ("b", second.number))]
+    again = [
+        LoadComponent(name, number, again=True)
+        for name, number in (("a", first.number), ("b", second.number))
+    ]
     assert history.requested[2:] == again
     history.answer("b")
     assert history.states("b") == ["starting", "running"], "it runs already"
@@ -201,9 +238,14 @@ def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -
 
 def test_a_changed_component_is_unloaded_and_loaded_and_one_that_vanished_is_unloaded() -> None:
     history = loaded(component("a"), component("b"))
-    plan = replace(history.plan, processes=tuple(one for one in history.plan.processes if one.name != "b"))
+    plan = replace(
+        history.plan, processes=tuple(one for one in history.plan.processes if one.name != "b")
+    )
     history.feed(NewPlan(plan, frozenset({"a"})))
-    assert [(type(one), one.name) for one in history.requested[2:]] == [(UnloadComponent, "b"), (UnloadComponent, "a")]
+    assert [(type(one), one.name) for one in history.requested[2:]] == [
+        (UnloadComponent, "b"),
+        (UnloadComponent, "a"),
+    ]
     history.answer("b", "a")
     assert "b" not in history.state.tracked
     assert history.loads() == ["a", "b", "a"]
@@ -235,7 +277,9 @@ def gone(history: History, name: str) -> History:
     return history.feed(Unloaded(name, number, f"/box has no /{name} any more"))
 
 
-def test_a_component_that_somebody_unloads_has_ended_and_is_loaded_again_as_its_policy_says() -> None:
+def test_a_component_that_somebody_unloads_has_ended_and_is_loaded_again_as_its_policy_says() -> (
+    None
+):
     history = gone(loaded(component("a")), "a")
     expect(history.only(), "TF808", "a", "/box")
     assert [name for name, _ in history.killed] == ["box"]
@@ -255,10 +299,14 @@ def test_a_load_that_fails_slowly_is_given_up_as_one_that_fails_at_once() -> Non
 
 
 def test_a_guard_that_follows_another_hears_of_an_owner_before_it_is_to_load_it() -> None:
-    history = begin(GUARD, BOX, component("a", owns=(("odom", "base"),))).feed(Clear(), Remember({"x": 1}))
+    history = begin(GUARD, BOX, component("a", owns=(("odom", "base"),))).feed(
+        Clear(), Remember({"x": 1})
+    )
     history.feed(GateOpen("box", "there"), Exited("guard", 1))
     actions = step(history.wait(0.9).state, Tick(), history.now + 0.1)[1]
-    again = step(step(history.state, Tick(), history.now + 0.1)[0], Started("guard", 9), history.now + 0.1)[1]
+    again = step(
+        step(history.state, Tick(), history.now + 0.1)[0], Started("guard", 9), history.now + 0.1
+    )[1]
     assert Start("guard") in actions
     orders = [one.order if isinstance(one, Order) else one for one in again]
     load = next(one for one in orders if isinstance(one, LoadComponent))

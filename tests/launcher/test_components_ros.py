@@ -20,14 +20,21 @@ from tests.support.fake_nodes import FakeNodes
 from tests.support.findings import expect
 from tests.support.waiting import until
 from tfcompose.cli.compiling import library
-from tfcompose.compile import compile_robot
-from tfcompose.emit.plan import plan_of
-from tfcompose.findings import Finding
-from tfcompose.ipc import AllReady, FindingShown, LogLine, Notice, ProcessState, TreeComplete
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.emit.plan import plan_of
+from tfcompose.foundation.findings import Finding
 from tfcompose.launcher.supervisor import supervise
-from tfcompose.plan.components import LoadRequest
-from tfcompose.plan.file import write_plan
-from tfcompose.ros.node import open_node
+from tfcompose.model.messages import (
+    AllReady,
+    FindingShown,
+    LogLine,
+    Notice,
+    ProcessState,
+    TreeComplete,
+)
+from tfcompose.model.plan.components import LoadRequest
+from tfcompose.model.plan.file import write_plan
+from tfcompose.tf.ros.node import open_node
 
 pytestmark = [
     pytest.mark.ros,
@@ -70,11 +77,17 @@ def stand_in(package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     for name in ("component_container", "component_container_isolated"):
         program = tmp_path / "ros/lib/rclcpp_components" / name
         program.parent.mkdir(parents=True, exist_ok=True)
-        program.write_text(f'#!/bin/sh\nexec {sys.executable} -m tests.support.stand_in_container "$@"\n')
+        program.write_text(
+            f'#!/bin/sh\nexec {sys.executable} -m tests.support.stand_in_container "$@"\n'
+        )
         program.chmod(0o755)
     log = tmp_path / "requested.jsonl"
     path = os.pathsep.join(dict.fromkeys((str(package), str(Path.cwd()), *sys.path)))
-    for name, value in (("CONTAINER_LOG", log), ("AMENT_PREFIX_PATH", tmp_path / "ros"), ("PYTHONPATH", path)):
+    for name, value in (
+        ("CONTAINER_LOG", log),
+        ("AMENT_PREFIX_PATH", tmp_path / "ros"),
+        ("PYTHONPATH", path),
+    ):
         monkeypatch.setenv(name, str(value))
     monkeypatch.syspath_prepend(str(package))
     return log
@@ -150,13 +163,21 @@ def test_components_are_loaded_with_names_parameters_and_remappings_as_launch_gi
         name: (type(value), value) for name, value in params.items()
     }
     assert odometry["node"] == "/robot1/odometry"
-    lines = {one.process: one.text for one in notices if isinstance(one, LogLine) and "is up" in one.text}
+    lines = {
+        one.process: one.text
+        for one in notices
+        if isinstance(one, LogLine) and "is up" in one.text
+    }
     assert lines.keys() == {"rectify", "odometry"}, "what a component logs is its own"
-    assert found(notices) == [], "an edge of a component is its owner's, though the container sends it"
+    assert found(notices) == [], (
+        "an edge of a component is its owner's, though the container sends it"
+    )
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_container_that_is_killed_comes_back_with_its_components(tmp_path: Path, stand_in: Path) -> None:
+def test_a_container_that_is_killed_comes_back_with_its_components(
+    tmp_path: Path, stand_in: Path
+) -> None:
     def kill(notices: list[Notice]) -> bool:
         if are_ready(notices):
             os.kill(requested(stand_in)[-1]["pid"], SIGKILL)
@@ -164,7 +185,8 @@ def test_a_container_that_is_killed_comes_back_with_its_components(tmp_path: Pat
 
     def is_back(notices: list[Notice]) -> bool:
         return (
-            sum(isinstance(one, TreeComplete) for one in notices) == 2 and states(notices, "rectify")[-1] == "running"
+            sum(isinstance(one, TreeComplete) for one in notices) == 2
+            and states(notices, "rectify")[-1] == "running"
         )
 
     notices = run(tmp_path, ROBOT, kill, is_back)
@@ -177,14 +199,25 @@ def test_a_container_that_is_killed_comes_back_with_its_components(tmp_path: Pat
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_component_that_cannot_be_loaded_is_named_with_the_containers_words(tmp_path: Path, stand_in: Path) -> None:
+def test_a_component_that_cannot_be_loaded_is_named_with_the_containers_words(
+    tmp_path: Path, stand_in: Path
+) -> None:
     notices = run(tmp_path, ROBOT.replace("demo::Empty", "demo::Missing"), has_found("TF808"))
     assert requested(stand_in)
-    expect(found(notices)[0], "TF808", "rectify", "/robot1/box", "image_proc/demo::Missing", "requested plugin name.")
+    expect(
+        found(notices)[0],
+        "TF808",
+        "rectify",
+        "/robot1/box",
+        "image_proc/demo::Missing",
+        "requested plugin name.",
+    )
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_component_is_tried_again_until_its_constructor_succeeds(tmp_path: Path, stand_in: Path) -> None:
+def test_a_component_is_tried_again_until_its_constructor_succeeds(
+    tmp_path: Path, stand_in: Path
+) -> None:
     broken = stand_in.with_name("BROKEN")
     broken.touch()
 
@@ -204,11 +237,18 @@ def test_a_component_that_takes_its_time_is_loaded_once_and_another_container_do
     tmp_path: Path, stand_in: Path
 ) -> None:
     other = "  other: {component: demo/demo::Empty, container: second}\n"
-    text = ROBOT.replace("demo::Empty", "demo::Slow").replace("containers: {", "containers: {second: {}, ") + other
+    text = (
+        ROBOT.replace("demo::Empty", "demo::Slow").replace(
+            "containers: {", "containers: {second: {}, "
+        )
+        + other
+    )
     notices = run(tmp_path, text, are_ready)
     plugins = [one["plugin"] for one in requested(stand_in)]
     assert sorted(plugins) == ["demo/demo::Empty", "drive/demo::Moving", "image_proc/demo::Slow"]
-    running = [one.process for one in notices if isinstance(one, ProcessState) and one.state == "running"]
+    running = [
+        one.process for one in notices if isinstance(one, ProcessState) and one.state == "running"
+    ]
     assert running.index("other") < running.index("rectify") < running.index("odometry")
 
 
@@ -218,7 +258,11 @@ def run_and_kill(folder: Path, log: Path, name: str) -> list[Notice]:
 
     def kill() -> None:
         until(partial(has_requests, log, 1))
-        states = [one for one in given[0] if isinstance(one, ProcessState) and one.process == name and one.pid]
+        states = [
+            one
+            for one in given[0]
+            if isinstance(one, ProcessState) and one.process == name and one.pid
+        ]
         os.kill(states[-1].pid or 0, SIGKILL)
 
     def begin(notices: list[Notice]) -> bool:
@@ -234,7 +278,9 @@ def run_and_kill(folder: Path, log: Path, name: str) -> list[Notice]:
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_container_that_is_killed_in_the_middle_of_a_load_comes_back_with_all(tmp_path: Path, stand_in: Path) -> None:
+def test_a_container_that_is_killed_in_the_middle_of_a_load_comes_back_with_all(
+    tmp_path: Path, stand_in: Path
+) -> None:
     notices = run_and_kill(tmp_path, stand_in, "box")
     plugins = ["image_proc/demo::Slow", "drive/demo::Moving"]
     assert [one["plugin"] for one in requested(stand_in)] == [plugins[0], *plugins]
@@ -248,7 +294,10 @@ def test_a_guard_that_is_killed_in_the_middle_of_a_load_has_nothing_loaded_twice
     tmp_path: Path, stand_in: Path
 ) -> None:
     notices = run_and_kill(tmp_path, stand_in, "guard")
-    assert [one["plugin"] for one in requested(stand_in)] == ["image_proc/demo::Slow", "drive/demo::Moving"]
+    assert [one["plugin"] for one in requested(stand_in)] == [
+        "image_proc/demo::Slow",
+        "drive/demo::Moving",
+    ]
     assert [one.code for one in found(notices)] == ["TF808"], "of the guard"
 
 
@@ -270,8 +319,12 @@ def test_who_sends_the_edge_of_a_component_is_named(tmp_path: Path, stand_in: Pa
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_component_that_sends_another_ones_edge_is_named_with_its_container(tmp_path: Path, stand_in: Path) -> None:
-    thief = "  thief: {component: d/demo::Moving, container: box, params: {edge: odom base_link}}\n"
+def test_a_component_that_sends_another_ones_edge_is_named_with_its_container(
+    tmp_path: Path, stand_in: Path
+) -> None:
+    thief = (
+        "  thief: {component: d/demo::Moving, container: box, params: {edge: odom base_link}}\n"
+    )
     notices = run(tmp_path, ROBOT + thief, has_found("TF801"))
     assert requested(stand_in)
     expect(found(notices)[0], "TF801", "/robot1/thief", "odometry", "thief", "box")
@@ -293,7 +346,9 @@ def theirs(stand_in: Path, domain: Domain) -> Path:  # noqa: ARG001 (the contain
 EXTERNAL = ROBOT.replace("{restart: on-failure, restart_delay: 0.2 s}", "{external: true}")
 
 
-def test_components_are_unloaded_from_a_container_that_is_external(tmp_path: Path, theirs: Path) -> None:
+def test_components_are_unloaded_from_a_container_that_is_external(
+    tmp_path: Path, theirs: Path
+) -> None:
     notices = run(tmp_path, EXTERNAL, are_ready)
     assert [one["unloaded"] for one in requested(theirs) if "unloaded" in one] == [2, 1]
     assert found(notices) == []
@@ -309,28 +364,44 @@ def test_components_come_back_with_an_external_container_that_somebody_starts_ag
         return are_ready(notices)
 
     def are_back(notices: list[Notice]) -> bool:
-        return all(states(notices, name)[-2:] == ["starting", "running"] for name in ("rectify", "odometry")) and (
-            "backoff" in states(notices, "rectify")
-        )
+        return all(
+            states(notices, name)[-2:] == ["starting", "running"]
+            for name in ("rectify", "odometry")
+        ) and ("backoff" in states(notices, "rectify"))
 
     restart = "container: box\n    restart: on-failure\n"
     notices = run(tmp_path, EXTERNAL.replace("container: box\n", restart), change, are_back)
     loads = [one["node"] for one in requested(theirs) if "node" in one]
     assert sorted(loads) == ["/robot1/front/rectify"] * 2 + ["/robot1/odometry"] * 2
-    assert {one.code for one in found(notices)} <= {"TF804"}, "the edge of a container that died is silent"
+    assert {one.code for one in found(notices)} <= {"TF804"}, (
+        "the edge of a container that died is silent"
+    )
 
 
-def test_a_component_whose_node_a_container_has_already_is_refused(tmp_path: Path, theirs: Path) -> None:
-    from tfcompose.ros.composition import Container  # noqa: PLC0415 (its messages are built by then)
+def test_a_component_whose_node_a_container_has_already_is_refused(
+    tmp_path: Path, theirs: Path
+) -> None:
+    # Its messages are built by then.
+    from tfcompose.tf.ros.composition import Container  # noqa: PLC0415
 
     with open_node("somebody", "") as node:
         container = Container(node, "/robot1/box")
         assert until(lambda: container.load.is_there)
-        container.ask_to_load(LoadRequest("/robot1/box", "/robot1/front/rectify", "image_proc", "demo::Empty"))
+        container.ask_to_load(
+            LoadRequest("/robot1/box", "/robot1/front/rectify", "image_proc", "demo::Empty")
+        )
         assert until(container.load.answer)
         container.close()
     notices = run(tmp_path, EXTERNAL, has_found("TF808"))
-    expect(found(notices)[0], "TF808", "rectify", "/robot1/front/rectify", "/robot1/box", "unload", "1")
+    expect(
+        found(notices)[0],
+        "TF808",
+        "rectify",
+        "/robot1/front/rectify",
+        "/robot1/box",
+        "unload",
+        "1",
+    )
     assert len(requested(theirs)) == 1
 
 

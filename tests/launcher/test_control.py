@@ -9,12 +9,12 @@ from socket import AF_UNIX, socket
 
 import pytest
 
-from tfcompose.ipc import REQUESTS, Done, Refusal, Request, UpdateRequest
 from tfcompose.launcher import answers
 from tfcompose.launcher.answers import answer
 from tfcompose.launcher.control import LONGEST_REQUEST, Control
 from tfcompose.launcher.state import initial
-from tfcompose.plan import Plan, RosSettings
+from tfcompose.model.messages import REQUESTS, Done, Refusal, Request, UpdateRequest
+from tfcompose.model.plan import Plan, RosSettings
 
 PLAN = Plan("rover", "", None, RosSettings(), (), ())
 
@@ -66,7 +66,9 @@ def connection(tmp_path: Path) -> Iterator[Connection]:
     made.close()
 
 
-@pytest.mark.parametrize("line", [b"{", b"[" * 50_000, b"\xff\xfe", b"7", b'{"request": []}', b'"\\ud800"', b"\0"])
+@pytest.mark.parametrize(
+    "line", [b"{", b"[" * 50_000, b"\xff\xfe", b"7", b'{"request": []}', b'"\\ud800"', b"\0"]
+)
 def test_what_is_no_request_is_answered_with_an_error_and_the_next_is_heard(
     connection: Connection, line: bytes
 ) -> None:
@@ -92,7 +94,9 @@ def plan_file(folder: Path, kind: str) -> str:
         file.write_bytes(b" " * 2000)
     elif kind == "bytes":
         file.write_bytes(b"\xff\xfe")
-    return {"device": "/dev/zero", "NUL": "plan\0.json", "nothing": str(folder / "x")}.get(kind, str(file))
+    return {"device": "/dev/zero", "NUL": "plan\0.json", "nothing": str(folder / "x")}.get(
+        kind, str(file)
+    )
 
 
 @pytest.mark.parametrize("kind", ["device", "NUL", "nothing", "pipe", "folder", "large", "bytes"])

@@ -15,7 +15,10 @@ from tests.support.waiting import until
 
 pytestmark = pytest.mark.ros
 
-HELLO = ROVER + "  hello: {run: [sh, -c, 'echo $GREETING; exec sleep 180'], env: {GREETING: good day}}\n"
+HELLO = (
+    ROVER
+    + "  hello: {run: [sh, -c, 'echo $GREETING; exec sleep 180'], env: {GREETING: good day}}\n"
+)
 
 
 @pytest.fixture
@@ -23,7 +26,16 @@ def units(domain: object, tmp_path: Path) -> Path:
     """The robot's units, exported."""
     assert domain
     (tmp_path / "robot.yaml").write_text(HELLO, "utf-8")
-    words = [sys.executable, "-m", "tfcompose", "export", "systemd", str(tmp_path / "robot.yaml"), "-o", str(tmp_path)]
+    words = [
+        sys.executable,
+        "-m",
+        "tfcompose",
+        "export",
+        "systemd",
+        str(tmp_path / "robot.yaml"),
+        "-o",
+        str(tmp_path),
+    ]
     done = processes.run(words)
     assert done.returncode == 0, done.stderr
     return tmp_path / "systemd"
@@ -42,19 +54,24 @@ def test_a_foreign_process_is_its_own_supervised_process_with_the_plans_environm
 ) -> None:
     hello = start(*module_of(units / "rover-hello.service"))
     assert until(lambda: "good day" in hello.output)
-    assert until(lambda: Path(f"/proc/{hello.process.pid}/exe").readlink() != Path(sys.executable).resolve()), (
-        "nobody stands between"
-    )
+    assert until(
+        lambda: Path(f"/proc/{hello.process.pid}/exe").readlink() != Path(sys.executable).resolve()
+    ), "nobody stands between"
 
 
 @pytest.mark.parametrize(
-    ("name", "shown", "code"), [("nobody", "has no process nobody", 2), ("missing", "no-such-program of missing", 1)]
+    ("name", "shown", "code"),
+    [("nobody", "has no process nobody", 2), ("missing", "no-such-program of missing", 1)],
 )
 def test_what_cannot_be_started_is_reported(
     name: str, shown: str, code: int, units: Path, start: Callable[..., Started]
 ) -> None:
     plan = units.parent / "plan.json"
-    text = plan.read_text("utf-8").replace('"hello"', '"missing"').replace('["sh", ', '["no-such-program", ')
+    text = (
+        plan.read_text("utf-8")
+        .replace('"hello"', '"missing"')
+        .replace('["sh", ', '["no-such-program", ')
+    )
     plan.write_text(text, "utf-8")
     one = start("tfcompose.launcher.exec", plan, name)
     assert one.process.wait(60) == code

@@ -18,21 +18,29 @@ import pytest
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, gone, until
-from tfcompose.ipc import Done, DownRequest, ProcessRequest, ProcessStatus, RobotStatus, StatusRequest, Verb
 from tfcompose.launcher.child import BURST, PER_SECOND
 from tfcompose.launcher.control import ask, connect
 from tfcompose.launcher.procfs import end, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDir
 from tfcompose.launcher.supervisor import LONGEST_SLEEP_S
-from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.plan.file import write_plan
+from tfcompose.model.messages import (
+    Done,
+    DownRequest,
+    ProcessRequest,
+    ProcessStatus,
+    RobotStatus,
+    StatusRequest,
+    Verb,
+)
+from tfcompose.model.plan import Plan, PlanProcess, RosSettings
+from tfcompose.model.plan.file import write_plan
 
 #: A launcher with all that ``up`` gives it, for a plan without ROS.
 LAUNCHER = """
 import resource, sys
 from pathlib import Path
 from tfcompose.cli.console import Console
-from tfcompose.plan.file import read_plan
+from tfcompose.model.plan.file import read_plan
 from tfcompose.launcher.control import listen
 from tfcompose.launcher.output import Logs
 from tfcompose.launcher.output import NonBlockingOutput
@@ -56,10 +64,14 @@ import os, time
 right = time.time
 time.time = lambda: right() - 3600 * os.path.exists("back")
 """
-#: The robot of this run of the tests alone: what it leaves behind is ended, and what others run is not.
+#: The robot of this run of the tests alone: what it leaves behind is ended, and what others run is
+#: not.
 NAME = f"rover{os.getpid()}@0"
 PYTHON = ("${python}", "-I", "-S", "-c")
-SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True); time.sleep(180)"
+SLEEPER = (
+    "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True);"
+    " time.sleep(180)"
+)
 FLOOD_BYTES = 200_000_000
 FLOOD = f"""
 import os, time
@@ -69,7 +81,8 @@ while count < {FLOOD_BYTES}:
 open("flooded", "w").write(str(count))
 time.sleep(180)
 """
-#: A daemon: its child leaves the group and the session, heeds no signal, and goes on when it has ended.
+#: A daemon: its child leaves the group and the session, heeds no signal, and goes on when it has
+#: ended.
 DAEMON = """
 import os, signal, time
 if os.fork() == 0:
@@ -83,7 +96,8 @@ while not os.path.exists("daemon"):  # before, its group is its parent's, and en
     time.sleep(0.01)
 """
 
-#: As DAEMON; and it goes on as a program without a variable in its environment, whose parent stays or goes.
+#: As DAEMON; and it goes on as a program without a variable in its environment, whose parent stays
+#: or goes.
 BARE = """
 import os, sys, time
 if os.fork() == 0:
@@ -100,7 +114,12 @@ class Run:
     """A launcher that runs in a folder, and who can be asked there."""
 
     def __init__(
-        self, folder: Path, planned: tuple[PlanProcess, ...], stdout: int, *words: str, clock: str = ""
+        self,
+        folder: Path,
+        planned: tuple[PlanProcess, ...],
+        stdout: int,
+        *words: str,
+        clock: str = "",
     ) -> None:
         file = folder / "plan.json"
         file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), planned)))
@@ -109,7 +128,10 @@ class Run:
         self.popen = processes.start(command, stdout=stdout, cwd=folder)
 
     def ps(self) -> dict[str, ProcessStatus]:
-        return {process.name: process for process in ask(self.place, StatusRequest(), RobotStatus).processes}
+        return {
+            process.name: process
+            for process in ask(self.place, StatusRequest(), RobotStatus).processes
+        }
 
     def is_up(self) -> bool:
         try:
@@ -133,7 +155,10 @@ def launch(tmp_path: Path) -> Iterator[Callable[..., Run]]:
     runs: list[Run] = []
 
     def start(
-        *processes: PlanProcess, stdout: int = subprocess.DEVNULL, words: tuple[str, ...] = (), clock: str = ""
+        *processes: PlanProcess,
+        stdout: int = subprocess.DEVNULL,
+        words: tuple[str, ...] = (),
+        clock: str = "",
     ) -> Run:
         runs.append(Run(tmp_path, processes, stdout, *words, clock=clock))
         return runs[-1]
@@ -184,7 +209,9 @@ def test_a_reader_that_stops_reading_stops_nobody(launch: Callable[..., Run]) ->
         os.close(reader)
 
 
-def test_a_disk_that_takes_no_more_stops_nobody(launch: Callable[..., Run], tmp_path: Path) -> None:
+def test_a_disk_that_takes_no_more_stops_nobody(
+    launch: Callable[..., Run], tmp_path: Path
+) -> None:
     """A limit on the size of files stands in for the full disk."""
     chatty = "import time\nwhile True: print('x' * 100, flush=True); time.sleep(0.0005)"
     with (tmp_path / "output").open("wb") as output:
@@ -198,7 +225,9 @@ def test_a_disk_that_takes_no_more_stops_nobody(launch: Callable[..., Run], tmp_
 
 
 @pytest.mark.parametrize("how", ["is stopped", "is killed"])
-def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Run], tmp_path: Path, how: str) -> None:
+def test_a_daemon_that_left_its_group_ends_with_the_run(
+    launch: Callable[..., Run], tmp_path: Path, how: str
+) -> None:
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
@@ -217,7 +246,9 @@ def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_ag
 ) -> None:
     """One that ignores signals ends before the next one of its process begins, and others when that is stopped."""
     assert "signal.SIG_IGN" in DAEMON
-    code = (DAEMON if how == "restart" else DAEMON.replace("signal.SIG_IGN", "signal.SIG_DFL")) + "time.sleep(180)\n"
+    code = (
+        DAEMON if how == "restart" else DAEMON.replace("signal.SIG_IGN", "signal.SIG_DFL")
+    ) + "time.sleep(180)\n"
     run = launch(program("lidar", code), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     first = int((tmp_path / "daemon").read_text())
@@ -250,7 +281,9 @@ def test_what_left_its_group_and_its_environment_ends_with_the_run(
     assert until(lambda: gone(pid))
 
 
-def test_a_child_holder_that_is_killed_is_replaced(launch: Callable[..., Run], tmp_path: Path) -> None:
+def test_a_child_holder_that_is_killed_is_replaced(
+    launch: Callable[..., Run], tmp_path: Path
+) -> None:
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     first = holder_of(run)
@@ -290,8 +323,12 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
 
 
 @pytest.mark.slow
-def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: Callable[..., Run]) -> None:
-    run = launch(*(PlanProcess(f"p{number}", "run", argv=("sleep", "180")) for number in range(200)))
+def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(
+    launch: Callable[..., Run],
+) -> None:
+    run = launch(
+        *(PlanProcess(f"p{number}", "run", argv=("sleep", "180")) for number in range(200))
+    )
     assert until(run.is_up)
     pids = [process.pid for process in run.ps().values() if process.pid]
     assert len(set(pids)) == 200
@@ -300,8 +337,13 @@ def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: C
 
 
 @pytest.mark.slow
-def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launch: Callable[..., Run]) -> None:
-    run = launch(PlanProcess("a", "run", argv=("sleep", "180")), PlanProcess("b", "run", argv=("sleep", "180")))
+def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(
+    launch: Callable[..., Run],
+) -> None:
+    run = launch(
+        PlanProcess("a", "run", argv=("sleep", "180")),
+        PlanProcess("b", "run", argv=("sleep", "180")),
+    )
     assert until(run.is_up)
     launcher = psutil.Process(run.popen.pid)
 
@@ -314,7 +356,11 @@ def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launc
                 assert until(lambda state=state: run.ps()["a"].state == state)  # type: ignore[misc]
 
     cycle(5)
-    fds, children, memory = launcher.num_fds(), len(launcher.children(recursive=True)), launcher.memory_info().rss
+    fds, children, memory = (
+        launcher.num_fds(),
+        len(launcher.children(recursive=True)),
+        launcher.memory_info().rss,
+    )
     cycle(500)
     assert until(lambda: launcher.num_fds() <= fds)
     assert len(launcher.children(recursive=True)) == children
@@ -326,7 +372,9 @@ def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launc
 def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
     launch: Callable[..., Run], tmp_path: Path
 ) -> None:
-    fails = "import os, time\nwhile not os.path.exists('back'): time.sleep(0.01)\nraise SystemExit(3)"
+    fails = (
+        "import os, time\nwhile not os.path.exists('back'): time.sleep(0.01)\nraise SystemExit(3)"
+    )
     failing = program("failing", fails, restart="always", max_restarts=2, required=False)
     run = launch(program("a", SLEEPER), failing, clock=CLOCK_GOES_BACK)
     assert until(run.is_up)
@@ -336,11 +384,15 @@ def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
     assert ask(run.place, ProcessRequest("restart", "a"), Done).ok
     assert until(lambda: run.ps()["a"].restarts == 1)
     assert run.down() == 0
-    stamps = [line.split()[0] for line in (tmp_path / "log" / "tfcompose.log").read_text().splitlines()]
+    stamps = [
+        line.split()[0] for line in (tmp_path / "log" / "tfcompose.log").read_text().splitlines()
+    ]
     assert stamps != sorted(stamps), "the clock did go back"
 
 
-def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(launch: Callable[..., Run]) -> None:
+def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(
+    launch: Callable[..., Run],
+) -> None:
     first = launch(program("a", SLEEPER))
     assert until(first.is_up)
     first.popen.kill()
@@ -354,7 +406,9 @@ def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(lau
 
 
 @pytest.mark.parametrize("line", [b"rubbish", b"[1]", b'{"do": "dance"}', b"x" * 200_000])
-def test_rubbish_on_the_socket_is_answered_and_harms_nobody(launch: Callable[..., Run], line: bytes) -> None:
+def test_rubbish_on_the_socket_is_answered_and_harms_nobody(
+    launch: Callable[..., Run], line: bytes
+) -> None:
     run = launch(program("a", SLEEPER))
     assert until(run.is_up)
     with connect(run.place) as connection:

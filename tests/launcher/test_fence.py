@@ -14,14 +14,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.support.findings import expect
-from tfcompose.findings import Finding
-from tfcompose.geometry import Pose
+from tfcompose.foundation.findings import Finding
+from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.preflight import LAUNCH, commands_of
-from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.plan.topics import private_topics
-from tfcompose.ros.environment import child_environment
-from tfcompose.variables import REMAPPED
+from tfcompose.model.plan import (
+    FenceWay,
+    GuardPolicy,
+    Plan,
+    PlanEdge,
+    PlanProcess,
+    RosSettings,
+    SourceLine,
+)
+from tfcompose.model.plan.topics import private_topics
+from tfcompose.model.variables import REMAPPED
+from tfcompose.tf.ros.environment import child_environment
 
 GUARD = PlanProcess("guard", "guard", argv=("true",))
 SLAM = PlanProcess("slam", "run", argv=("true",), nodes=("/slam",), owns=(("map", "odom"),))
@@ -29,11 +37,22 @@ SLAM = PlanProcess("slam", "run", argv=("true",), nodes=("/slam",), owns=(("map"
 
 def plan_of(*processes: PlanProcess, fence: FenceWay = "auto") -> Plan:
     edges = tuple(
-        PlanEdge(parent, child, "dynamic", one.name, f"/{one.name}", Pose(), None, SourceLine("rover.yaml", 1))
+        PlanEdge(
+            parent,
+            child,
+            "dynamic",
+            one.name,
+            f"/{one.name}",
+            Pose(),
+            None,
+            SourceLine("rover.yaml", 1),
+        )
         for one in processes
         for parent, child in one.owns
     )
-    return Plan("rover", "", None, RosSettings(), edges, processes, GuardPolicy("strict", fence=fence))
+    return Plan(
+        "rover", "", None, RosSettings(), edges, processes, GuardPolicy("strict", fence=fence)
+    )
 
 
 def inspect(
@@ -50,7 +69,9 @@ def partitions(command: Command) -> dict[tuple[str, str], str]:
     root = ET.fromstring(command.fence[1])  # noqa: S314 (made here)
     name = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
     return {
-        (one.tag.removeprefix(name), one.attrib["profile_name"]): one.findtext(f".//{name}value") or ""
+        (one.tag.removeprefix(name), one.attrib["profile_name"]): (
+            one.findtext(f".//{name}value") or ""
+        )
         for one in root.iter()
         if one.tag.startswith(f"{name}data_")
     }
@@ -58,15 +79,23 @@ def partitions(command: Command) -> dict[tuple[str, str], str]:
 
 def moved(command: Command) -> dict[str, str]:
     """Return what the command's ROS arguments remap, by the first rule that fits, as ROS does."""
-    rules = [word.split(":=") for flag, word in zip(command.argv, command.argv[1:], strict=False) if flag == "-r"]
+    rules = [
+        word.split(":=")
+        for flag, word in zip(command.argv, command.argv[1:], strict=False)
+        if flag == "-r"
+    ]
     return dict(reversed(rules))
 
 
 # By partition.
 
 
-def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_alone_read_it(tmp_path: Path) -> None:
-    slam = PlanProcess("slam", "run", argv=("true",), remap={"/tf": "/r/tf"}, owns=(("map", "odom"),))
+def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_alone_read_it(
+    tmp_path: Path,
+) -> None:
+    slam = PlanProcess(
+        "slam", "run", argv=("true",), remap={"/tf": "/r/tf"}, owns=(("map", "odom"),)
+    )
     commands, found = inspect(tmp_path, slam, GUARD)
     assert found == []
     assert partitions(commands["slam"]) == {
@@ -104,18 +133,35 @@ USERS = """<?xml version="1.0" encoding="ISO-8859-1"?>
 def test_the_fence_is_merged_into_a_users_own_profiles(tmp_path: Path) -> None:
     (tmp_path / "own.xml").write_text(USERS, encoding="iso-8859-1")
     drive = replace(SLAM, name="drive", cwd=str(tmp_path), owns=(("odom", "base"),))
-    commands, found = inspect(tmp_path, drive, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=str(tmp_path / "own.xml"))
+    commands, found = inspect(
+        tmp_path, drive, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=str(tmp_path / "own.xml")
+    )
     relative, more = inspect(tmp_path, drive, FASTRTPS_DEFAULT_PROFILES_FILE="own.xml")
     assert found == more == []
-    assert commands["drive"].fence == relative["drive"].fence, "a relative path is one of the process's folder"
+    assert commands["drive"].fence == relative["drive"].fence, (
+        "a relative path is one of the process's folder"
+    )
     text = commands["drive"].fence[1] if commands["drive"].fence else ""
     name = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
     root = ET.fromstring(text)  # noqa: S314 (made here)
-    writers = {one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}data_writer"}
-    writers |= {one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}publisher"}
-    values = {topic: [value.text for value in one.iter(f"{name}value")] for topic, one in writers.items()}
-    assert values == {"all": [], "/scan": [], "/tf_static": ["b", "tfc_rover"], "/tf": ["tfc_rover"]}
-    assert writers["/tf"].findtext(f"{name}historyMemoryPolicy") == "DYNAMIC", "what holds for all writers"
+    writers = {
+        one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}data_writer"
+    }
+    writers |= {
+        one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}publisher"
+    }
+    values = {
+        topic: [value.text for value in one.iter(f"{name}value")] for topic, one in writers.items()
+    }
+    assert values == {
+        "all": [],
+        "/scan": [],
+        "/tf_static": ["b", "tfc_rover"],
+        "/tf": ["tfc_rover"],
+    }
+    assert writers["/tf"].findtext(f"{name}historyMemoryPolicy") == "DYNAMIC", (
+        "what holds for all writers"
+    )
     assert [topic for topic, one in writers.items() if one.get("is_default_profile")] == ["all"]
     assert writers["/scan"].findtext(f"{name}userDefinedID") == "7"
     assert "tfc_rover" in (commands["guard"].fence or ("", ""))[1]
@@ -123,7 +169,12 @@ def test_the_fence_is_merged_into_a_users_own_profiles(tmp_path: Path) -> None:
 
 def test_a_process_that_sends_on_topics_that_nobody_judges_is_left_alone(tmp_path: Path) -> None:
     debug = PlanProcess(
-        "debug", "run", argv=("true",), nodes=("/debug",), owns=(), remap={"/tf": "/x/tf", "/tf_static": "/x/s"}
+        "debug",
+        "run",
+        argv=("true",),
+        nodes=("/debug",),
+        owns=(),
+        remap={"/tf": "/x/tf", "/tf_static": "/x/s"},
     )
     for fence in ("partition", "remap"):
         commands, found = inspect(tmp_path, SLAM, debug, GUARD, fence=fence)
@@ -154,7 +205,10 @@ BAD_PROFILES = (
         ({"/tf": "tf"}, {}, [" tf,", "slash"]),
         ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"}, ["/no/such.xml", "fence: remap"]),
         ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "/dev/zero"}, ["/dev/zero", "fence: remap"]),
-        *(({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": text}, ["own.xml", "fence: remap"]) for text in BAD_PROFILES),
+        *(
+            ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": text}, ["own.xml", "fence: remap"])
+            for text in BAD_PROFILES
+        ),
     ],
 )
 def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
@@ -165,7 +219,10 @@ def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
         if value in BAD_PROFILES:
             own.write_text(value)
             env = {name: str(own)}
-    both = [PlanProcess(name, "run", argv=("true",), remap=remap, owns=(("map", name),)) for name in ("slam", "drive")]
+    both = [
+        PlanProcess(name, "run", argv=("true",), remap=remap, owns=(("map", name),))
+        for name in ("slam", "drive")
+    ]
     _, (found,) = inspect(tmp_path, *both, fence="partition", **env)
     expect(found, "TF902", *names)
     assert found.message.endswith(": slam, drive")
@@ -189,7 +246,9 @@ def test_an_owner_whose_command_names_a_profile_by_itself_is_not_started(
     drive = replace(SLAM, name="drive", argv=argv)
     _, (found,) = inspect(tmp_path, drive, GUARD, fence="partition")
     expect(found, "TF902", "drive", "fence: remap", *names)
-    assert inspect(tmp_path, replace(drive, owns=()), GUARD, fence="partition")[1] == [], "who may send no TF at all"
+    assert inspect(tmp_path, replace(drive, owns=()), GUARD, fence="partition")[1] == [], (
+        "who may send no TF at all"
+    )
 
 
 # By remapping.
@@ -197,7 +256,9 @@ def test_an_owner_whose_command_names_a_profile_by_itself_is_not_started(
 
 def test_another_rmw_is_fenced_off_by_remapping(tmp_path: Path) -> None:
     static = PlanProcess("static", "static", argv=("${python}", "-m", "x", "${plan}", "static"))
-    commands, found = inspect(tmp_path, SLAM, static, GUARD, RMW_IMPLEMENTATION="rmw_cyclonedds_cpp")
+    commands, found = inspect(
+        tmp_path, SLAM, static, GUARD, RMW_IMPLEMENTATION="rmw_cyclonedds_cpp"
+    )
     assert found == []
     for name in ("slam", "static"):
         assert moved(commands[name]) == {
@@ -216,15 +277,33 @@ def test_the_way_can_be_chosen(tmp_path: Path) -> None:
     assert inspect(tmp_path, SLAM, GUARD)[0]["slam"].fence
 
 
-def test_remappings_come_before_those_of_the_plan_and_catch_what_is_sent_on_its_topics(tmp_path: Path) -> None:
-    argv = ("true", "--speed", "3", "--ros-args", "-r", "__node:=slam", "-r", "/tf:=/r/tf", "-p", "a:=1")
+def test_remappings_come_before_those_of_the_plan_and_catch_what_is_sent_on_its_topics(
+    tmp_path: Path,
+) -> None:
+    argv = (
+        "true",
+        "--speed",
+        "3",
+        "--ros-args",
+        "-r",
+        "__node:=slam",
+        "-r",
+        "/tf:=/r/tf",
+        "-p",
+        "a:=1",
+    )
     remap = {"/tf": "/r/tf", "/tf_static": "/r/tf_static"}
-    slam = PlanProcess("slam", "run", argv=argv, nodes=("/r/slam",), remap=remap, owns=(("map", "odom"),))
+    slam = PlanProcess(
+        "slam", "run", argv=argv, nodes=("/r/slam",), remap=remap, owns=(("map", "odom"),)
+    )
     commands, _ = inspect(tmp_path, slam, GUARD, fence="remap")
     words = commands["slam"].argv[1:]
     assert words[:3] == ("--speed", "3", "--ros-args")
     assert words[-6:] == ("-r", "__node:=slam", "-r", "/tf:=/r/tf", "-p", "a:=1")
-    private = {"/tf": "/_tfcompose/rover/slam/tf", "/tf_static": "/_tfcompose/rover/slam/tf_static"}
+    private = {
+        "/tf": "/_tfcompose/rover/slam/tf",
+        "/tf_static": "/_tfcompose/rover/slam/tf_static",
+    }
     assert moved(commands["slam"]) == {
         **private,
         "/r/tf": private["/tf"],
@@ -252,7 +331,13 @@ def test_a_launch_file_is_remapped_in_full(tmp_path: Path) -> None:
 
 
 def test_owners_that_no_remapping_reaches_are_one_finding(tmp_path: Path) -> None:
-    shell = PlanProcess("shell", "run", argv=("/bin/sh", "-c", "drive | tee log"), nodes=("/a",), owns=(("a", "b"),))
+    shell = PlanProcess(
+        "shell",
+        "run",
+        argv=("/bin/sh", "-c", "drive | tee log"),
+        nodes=("/a",),
+        owns=(("a", "b"),),
+    )
     more = replace(shell, name="more", nodes=("/b",), owns=(("b", "c"),))
     _, (found,) = inspect(tmp_path, shell, more, SLAM, GUARD, fence="remap")
     expect(found, "TF902", "shell, more")
@@ -267,7 +352,12 @@ def test_a_command_that_may_be_no_node_gets_no_ros_arguments(tmp_path: Path) -> 
     assert moved(commands["play"])
 
 
-@given(st.lists(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,6}(/[A-Za-z][A-Za-z0-9_]{0,6})?", fullmatch=True), unique=True))
+@given(
+    st.lists(
+        st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,6}(/[A-Za-z][A-Za-z0-9_]{0,6})?", fullmatch=True),
+        unique=True,
+    )
+)
 def test_every_process_has_topics_of_its_own_with_names_that_ros_takes(names: list[str]) -> None:
     processes = (PlanProcess(name, "run", argv=("true",), owns=(("map", name),)) for name in names)
     topics = private_topics(plan_of(*processes, GUARD)).values()

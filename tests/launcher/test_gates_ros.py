@@ -8,12 +8,21 @@ from typing import Any
 import pytest
 
 from tests.support.findings import expect, words_of
-from tfcompose.findings import Finding
-from tfcompose.geometry import Pose
-from tfcompose.ipc import AllReady, FindingShown, Notice, ProcessReady
+from tfcompose.foundation.findings import Finding
+from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.supervisor import supervise
-from tfcompose.plan import LifecycleState, Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation, SourceLine
-from tfcompose.plan.file import write_plan
+from tfcompose.model.messages import AllReady, FindingShown, Notice, ProcessReady
+from tfcompose.model.plan import (
+    LifecycleState,
+    Plan,
+    PlanEdge,
+    PlanProcess,
+    Ready,
+    RosSettings,
+    Simulation,
+    SourceLine,
+)
+from tfcompose.model.plan.file import write_plan
 
 pytestmark = pytest.mark.ros
 
@@ -45,32 +54,52 @@ try:
 except BaseException:
     pass
 """
-GUARD = PlanProcess("guard", "guard", ("${python}", "-m", "tfcompose.guard", "${plan}", "guard"), nodes=("/guard",))
+GUARD = PlanProcess(
+    "guard", "guard", ("${python}", "-m", "tfcompose.guard", "${plan}", "guard"), nodes=("/guard",)
+)
 
 
 def node(
-    name: str, *words: str, ready: Ready | None = None, lifecycle: dict[str, LifecycleState] | None = None
+    name: str,
+    *words: str,
+    ready: Ready | None = None,
+    lifecycle: dict[str, LifecycleState] | None = None,
 ) -> PlanProcess:
     argv = (sys.executable, "-c", NODE, *words)
-    return PlanProcess(name, "run", argv, ready=ready, lifecycle=lifecycle or {}, nodes=(f"/robot/{name}",))
+    return PlanProcess(
+        name, "run", argv, ready=ready, lifecycle=lifecycle or {}, nodes=(f"/robot/{name}",)
+    )
 
 
 def script(name: str, text: str, ready: Ready | None, **more: Any) -> PlanProcess:
-    return PlanProcess(name, "run", ("sh", "-c", text), ready=ready, nodes=(f"/robot/{name}",), **more)
+    return PlanProcess(
+        name, "run", ("sh", "-c", text), ready=ready, nodes=(f"/robot/{name}",), **more
+    )
 
 
 def simulated(ready: Ready) -> PlanProcess:
     """Return the owner of odom → base_link, which stands still there."""
-    argv = ("${python}", "-m", "tfcompose.publishers.simulate", "${plan}", "drive")
+    argv = ("${python}", "-m", "tfcompose.launcher.publishers.simulate", "${plan}", "drive")
     owns = (("odom", "base_link"),)
     still = Simulation("fixed", 20.0, pose=Pose())
-    return PlanProcess("drive", "simulate", argv, ready=ready, nodes=("/robot/drive",), owns=owns, simulate=still)
+    return PlanProcess(
+        "drive", "simulate", argv, ready=ready, nodes=("/robot/drive",), owns=owns, simulate=still
+    )
 
 
 def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
     """Run the plan until all are ready, or as many gates were said to stay shut."""
     edges = tuple(
-        PlanEdge(parent, child, "dynamic", one.name, one.nodes[0], Pose(), None, SourceLine("robot.yaml", 1))
+        PlanEdge(
+            parent,
+            child,
+            "dynamic",
+            one.name,
+            one.nodes[0],
+            Pose(),
+            None,
+            SourceLine("robot.yaml", 1),
+        )
         for one in processes
         for parent, child in one.owns
     )
@@ -81,7 +110,9 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
 
     def report(notice: Notice) -> None:
         notices.append(notice)
-        shut = [one for one in notices if isinstance(one, FindingShown) and one.found.code == "TF817"]
+        shut = [
+            one for one in notices if isinstance(one, FindingShown) and one.found.code == "TF817"
+        ]
         if isinstance(notice, AllReady) or (late and len(shut) == late):
             raise BrokenPipeError  # enough was seen
 
@@ -99,8 +130,12 @@ def late_of(notices: list[Notice]) -> dict[str, Finding]:
 def test_a_topic_and_a_service_open_gates_and_say_what_they_are(tmp_path: Path) -> None:
     lidar, reset = Ready("topic", "/robot/scan"), Ready("service", "/robot/reset")
     notices = run(tmp_path, node("lidar", ready=lidar), node("reset", ready=reset))
-    observed = {notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)}
-    assert "/robot/scan" in words_of(observed["lidar"]), "its node's name may come later than its topic"
+    observed = {
+        notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)
+    }
+    assert "/robot/scan" in words_of(observed["lidar"]), (
+        "its node's name may come later than its topic"
+    )
     assert "/robot/reset" in words_of(observed["reset"])
     assert isinstance(notices[-1], AllReady)
 
@@ -110,20 +145,36 @@ def test_a_lifecycle_node_is_configured_and_activated_and_then_ready(tmp_path: P
     notices = run(tmp_path, node("slam", "lifecycle", lifecycle={"/robot/slam": "active"}))
     (ready,) = [notice for notice in notices if isinstance(notice, ProcessReady)]
     assert ready.seen == "/robot/slam is active"
-    output = [getattr(notice, "text", "") for notice in notices if getattr(notice, "process", "") == "slam"]
+    output = [
+        getattr(notice, "text", "")
+        for notice in notices
+        if getattr(notice, "process", "") == "slam"
+    ]
     assert [text for text in output if text] == ["configured", "activated"]
 
 
 @pytest.mark.usefixtures("domain")
-def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(tmp_path: Path) -> None:
+def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(
+    tmp_path: Path,
+) -> None:
     drive = simulated(Ready("edges"))
-    line = script("line", "echo booting; sleep 0.3; echo ready 17; sleep 180", Ready("log", "ready [0-9]+"))
+    line = script(
+        "line", "echo booting; sleep 0.3; echo ready 17; sleep 180", Ready("log", "ready [0-9]+")
+    )
     code = script("code", "exit 4", Ready("exit", number=4.0))
     later = script("later", "sleep 180", Ready("time", number=0.4))
-    last = script("last", "sleep 180", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready"))
+    last = script(
+        "last", "sleep 180", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready")
+    )
     notices = run(tmp_path, drive, line, code, later, last)
-    observed = {notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)}
-    assert observed == {"drive": "its edges are live", "line": "ready 17", "later": "0.4 s have passed"}
+    observed = {
+        notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)
+    }
+    assert observed == {
+        "drive": "its edges are live",
+        "line": "ready 17",
+        "later": "0.4 s have passed",
+    }
     assert isinstance(notices[-1], AllReady)
     assert {row.process for row in notices[-1].rows} >= {"drive", "line", "code", "later", "last"}
 
@@ -132,7 +183,9 @@ def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(
 def test_edges_a_line_and_an_exit_code_that_do_not_come_are_reported_with_what_was_there_instead(
     tmp_path: Path,
 ) -> None:
-    idle = replace(simulated(Ready("edges", timeout_s=6.0)), kind="run", argv=("sleep", "180"), simulate=None)
+    idle = replace(
+        simulated(Ready("edges", timeout_s=6.0)), kind="run", argv=("sleep", "180"), simulate=None
+    )
     line = script("line", "echo booting; sleep 180", Ready("log", "ready [0-9]+", timeout_s=5.0))
     code = script("code", "sleep 180", Ready("exit", timeout_s=5.0))
     notices = run(tmp_path, idle, line, code, late=3)
@@ -151,12 +204,24 @@ def test_gates_that_stay_shut_report_what_was_there_instead(tmp_path: Path) -> N
     requested = Ready("service", "/robot/asked_for", timeout_s=9.0)
     notices = run(
         tmp_path,
-        *(node("lidar", ready=scan), slam, script("calm", "sleep 180", requested), script("c", "sleep 180", other)),
+        *(
+            node("lidar", ready=scan),
+            slam,
+            script("calm", "sleep 180", requested),
+            script("c", "sleep 180", other),
+        ),
         late=4,
     )
     found = late_of(notices)
     expect(found["lidar"], "TF817", " 9 s", "/robot/scam", "/robot/scan")
-    expect(found["c"], "TF817", "/front/scan", "topics /robot/scan, ")  # the same name elsewhere comes first
-    expect(found["calm"], "TF817", "/robot/asked_for", "services /robot/reset, /robot/slam/change_state, ")
+    expect(
+        found["c"], "TF817", "/front/scan", "topics /robot/scan, "
+    )  # the same name elsewhere comes first
+    expect(
+        found["calm"],
+        "TF817",
+        "/robot/asked_for",
+        "services /robot/reset, /robot/slam/change_state, ",
+    )
     assert "asked_for" not in found["calm"].notes[0].message, "nobody offers it"
     expect(found["slam"], "TF817", " 10 s", "/robot/slam", "unconfigured", "slam: configured")

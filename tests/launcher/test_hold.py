@@ -11,18 +11,18 @@ import pytest
 
 from tests.support.launcher import LISTEN, SLEEPER, Launcher, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
-from tfcompose.ipc import (
+from tfcompose.foundation.signals import Stop
+from tfcompose.launcher.supervisor import supervise
+from tfcompose.model.messages import (
     GUARD_EVENTS,
     Clear,
     LogLine,
     Notice,
     ProcessState,
 )
-from tfcompose.launcher.supervisor import supervise
-from tfcompose.plan import PlanProcess
-from tfcompose.process import wait_for_go
-from tfcompose.signals import Stop
-from tfcompose.variables import GO, HOLD_FD
+from tfcompose.model.plan import PlanProcess
+from tfcompose.model.variables import GO, HOLD_FD
+from tfcompose.tf.process import wait_for_go
 
 #: Says what it has loaded before it is let go, as an own process would.
 HELD = f"""
@@ -39,7 +39,10 @@ time.sleep(180)
 def observing_until(file: str) -> PlanProcess:
     """Return a guard whose look before the start ends when there is such a file."""
     observation = f"import os, time\nwhile not os.path.exists({file!r}): time.sleep(0.01)\n"
-    say = f"os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {GUARD_EVENTS.line(Clear()).encode()!r}); {SLEEPER}"
+    say = (
+        "os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']),"
+        f" {GUARD_EVENTS.line(Clear()).encode()!r}); {SLEEPER}"
+    )
     return program("guard", f"{LISTEN}; {observation}{say}", kind="guard", cwd=".")
 
 
@@ -60,7 +63,9 @@ def test_a_held_process_goes_on_at_the_order_and_ends_when_nobody_is_left_to_giv
     wait_for_go(stop)  # nobody holds it any more
 
 
-def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_started(tmp_path: Path) -> None:
+def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_started(
+    tmp_path: Path,
+) -> None:
     notices: list[tuple[float, Notice]] = []
 
     def report(notice: Notice) -> None:
@@ -69,17 +74,31 @@ def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_st
             os.kill(os.getpid(), signal.SIGINT)
 
     plan = plan_of(
-        observing_until("loaded"), program("static", HELD, kind="static", cwd="."), program("other", SLEEPER)
+        observing_until("loaded"),
+        program("static", HELD, kind="static", cwd="."),
+        program("other", SLEEPER),
     )
     assert supervise(plan, tmp_path / "plan.json", report=report) == 0
     kinds = [notice for _, notice in notices]
-    started = next(i for i, one in enumerate(kinds) if isinstance(one, ProcessState) and one.process == "static")
+    started = next(
+        i
+        for i, one in enumerate(kinds)
+        if isinstance(one, ProcessState) and one.process == "static"
+    )
     output = [one.text if isinstance(one, LogLine) else "" for one in kinds]
     loaded = next(i for i, text in enumerate(output) if text.endswith("loaded"))
     assert loaded < started < output.index("went on")
-    pids = {one.pid for one in kinds if isinstance(one, ProcessState) and one.process == "static" and one.pid}
+    pids = {
+        one.pid
+        for one in kinds
+        if isinstance(one, ProcessState) and one.process == "static" and one.pid
+    }
     assert pids == {int(output[loaded].split()[1])}
-    others = [i for i, one in enumerate(kinds) if isinstance(one, ProcessState) and one.process == "other"]
+    others = [
+        i
+        for i, one in enumerate(kinds)
+        if isinstance(one, ProcessState) and one.process == "other"
+    ]
     assert others[0] > loaded
 
 
@@ -97,19 +116,31 @@ def test_one_that_is_held_when_the_launcher_ends_ends_with_it(
 
 def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: Path) -> None:
     notices: list[Notice] = []
-    dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
+    dies = program(
+        "static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd="."
+    )
     plan = plan_of(observing_until("dies"), dies)
     assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
-    states = [one.state for one in notices if isinstance(one, ProcessState) and one.process == "static"]
+    states = [
+        one.state for one in notices if isinstance(one, ProcessState) and one.process == "static"
+    ]
     assert states == ["starting", "running", "exited"]
     assert not psutil.Process().children(recursive=True)
 
 
-def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(tmp_path: Path) -> None:
+def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(
+    tmp_path: Path,
+) -> None:
     notices: list[Notice] = []
     observation = "import os, time\nwhile not os.path.exists('dies'): time.sleep(0.01)\n"
-    dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
-    plan = plan_of(program("guard", f"{observation}raise SystemExit(4)", kind="guard", cwd="."), dies)
+    dies = program(
+        "static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd="."
+    )
+    plan = plan_of(
+        program("guard", f"{observation}raise SystemExit(4)", kind="guard", cwd="."), dies
+    )
     assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
-    assert {one.process for one in notices if isinstance(one, ProcessState) and one.state == "exited"} == {"guard"}
+    assert {
+        one.process for one in notices if isinstance(one, ProcessState) and one.state == "exited"
+    } == {"guard"}
     assert not psutil.Process().children(recursive=True)

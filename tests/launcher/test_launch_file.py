@@ -9,18 +9,22 @@ from pathlib import Path
 import pytest
 
 from tests.support.findings import expect
-from tfcompose.findings import Finding
-from tfcompose.ipc import LogLine, Notice
+from tfcompose.foundation.findings import Finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.supervisor import supervise
-from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.ros.environment import child_environment
+from tfcompose.model.messages import LogLine, Notice
+from tfcompose.model.plan import Plan, PlanProcess, RosSettings
+from tfcompose.tf.ros.environment import child_environment
 
 NAV2 = PlanProcess(
-    "nav2", "run", ("${launch:nav2_bringup/navigation_launch.py}", "use_composition:=False"), remap={"/tf": "/r/tf"}
+    "nav2",
+    "run",
+    ("${launch:nav2_bringup/navigation_launch.py}", "use_composition:=False"),
+    remap={"/tf": "/r/tf"},
 )
-#: Runs the description of the file that it is given, and prints it; ``launch`` and ``launch_ros`` are stand-ins.
+#: Runs the description of the file that it is given, and prints it; ``launch`` and ``launch_ros``
+#: are stand-ins.
 ROS2 = """#!{python}
 import importlib.util, sys, types
 def module(name, *kinds):
@@ -64,7 +68,9 @@ def inspect(
 def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
     tmp_path: Path, env: dict[str, str], own: str | None, namespace: str
 ) -> None:
-    plan = Plan("rover", "", None, RosSettings("r", clock="sim"), (), (replace(NAV2, namespace=own),))
+    plan = Plan(
+        "rover", "", None, RosSettings("r", clock="sim"), (), (replace(NAV2, namespace=own),)
+    )
     notices: list[Notice] = []
     assert supervise(plan, tmp_path / "plan.json", report=notices.append, base_env=env) == 0
     (line,) = [notice.text for notice in notices if isinstance(notice, LogLine)]
@@ -91,7 +97,9 @@ def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
     ]
 
 
-@pytest.mark.parametrize(("theirs", "output"), [({}, "both"), ({"OVERRIDE_LAUNCH_PROCESS_OUTPUT": "log"}, "log")])
+@pytest.mark.parametrize(
+    ("theirs", "output"), [({}, "both"), ({"OVERRIDE_LAUNCH_PROCESS_OUTPUT": "log"}, "log")]
+)
 def test_output_of_nodes_comes_to_the_log_unless_the_user_sends_it_elsewhere(
     tmp_path: Path, env: dict[str, str], theirs: dict[str, str], output: str
 ) -> None:
@@ -103,12 +111,17 @@ def test_output_of_nodes_comes_to_the_log_unless_the_user_sends_it_elsewhere(
 def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]) -> None:
     _, found = inspect(tmp_path, env | {"PATH": "/nowhere"})
     assert found
-    expect(found, "TF810", "ros2 (for launch nav2_bringup/navigation_launch.py) of nav2", "ros2launch")
+    expect(
+        found, "TF810", "ros2 (for launch nav2_bringup/navigation_launch.py) of nav2", "ros2launch"
+    )
 
 
 @pytest.mark.parametrize(
     ("word", "advice"),
-    [("nav2_bringup/navigaton_launch.py", "navigation_launch.py?"), ("nav2/navigation_launch.py", "package nav2")],
+    [
+        ("nav2_bringup/navigaton_launch.py", "navigation_launch.py?"),
+        ("nav2/navigation_launch.py", "package nav2"),
+    ],
 )
 def test_a_launch_file_that_is_not_there_is_named_with_what_is(
     tmp_path: Path, env: dict[str, str], word: str, advice: str

@@ -22,7 +22,10 @@ def _can_launch() -> bool:
     return processes.run([ros2, "launch", "--help"]).returncode == 0
 
 
-pytestmark = [pytest.mark.ros, pytest.mark.skipif(not _can_launch(), reason="there is no ros2 launch")]
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.skipif(not _can_launch(), reason="there is no ros2 launch"),
+]
 
 ROBOT = """
 tfcompose: 1
@@ -78,13 +81,21 @@ def package(tmp_path: Path) -> Path:
 def test_its_nodes_have_the_plans_namespace_remappings_clock_and_arguments_and_end_with_it(
     package: Path, start: Callable[..., Started], how: str
 ) -> None:
-    paths = os.pathsep.join(filter(None, (str(package / "ws"), os.environ.get("AMENT_PREFIX_PATH"))))
+    paths = os.pathsep.join(
+        filter(None, (str(package / "ws"), os.environ.get("AMENT_PREFIX_PATH")))
+    )
     words = ("up", package / "robot.yaml", "-o", package / "build")
     up = start("tfcompose", *words, AMENT_PREFIX_PATH=paths)
-    for output in ("I am /rover/a /rover/loud True 2.5", "I am /rover/b /rover/loud True 0.0", "ready demo"):
+    for output in (
+        "I am /rover/a /rover/loud True 2.5",
+        "I am /rover/b /rover/loud True 0.0",
+        "ready demo",
+    ):
         up.until_says(output)
     below = psutil.Process(up.process.pid).children(recursive=True)
-    nodes = [process for process in below if str(package / "ws/lib/demo/talker") in process.cmdline()]
+    nodes = [
+        process for process in below if str(package / "ws/lib/demo/talker") in process.cmdline()
+    ]
     assert len(nodes) == 2
     if how == "is killed":
         os.kill(nodes[0].ppid(), signal.SIGKILL)

@@ -38,12 +38,20 @@ def test_processes_of_parts_have_logs_too(tmp_path: Path) -> None:
     logs.close()
     assert logged(tmp_path / "logs") == ["arm/static", "arm/tool/static", "static"]
     for name in logged(tmp_path / "logs"):
-        assert [text for _, _, text in read_logs(tmp_path / "logs", [name])][-1] == f"line 9 of {name}"
+        assert [text for _, _, text in read_logs(tmp_path / "logs", [name])][
+            -1
+        ] == f"line 9 of {name}"
 
 
-def test_the_run_that_wrote_last_is_known_by_its_lines_and_not_by_when_its_files_were_made(tmp_path: Path) -> None:
+def test_the_run_that_wrote_last_is_known_by_its_lines_and_not_by_when_its_files_were_made(
+    tmp_path: Path,
+) -> None:
     begun, later = Logs(tmp_path / "a"), Logs(tmp_path / "b")
-    for logs, name, second in ((begun, "arm/static", 10), (later, "static", 20), (begun, "arm/static", 30)):
+    for logs, name, second in (
+        (begun, "arm/static", 10),
+        (later, "static", 20),
+        (begun, "arm/static", 30),
+    ):
         logs.write(name, "text")
         os.utime(logs.folder / f"{name}.log", (second, second))
     assert [last_modified(tmp_path / name) for name in ("a", "b", "none")] == [30, 20, 0]
@@ -119,7 +127,9 @@ def test_a_folder_that_is_a_link_gets_no_logs(tmp_path: Path, process: str) -> N
     assert list(elsewhere.iterdir()) == []
 
 
-def test_another_users_folder_gets_no_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_users_folder_gets_no_logs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     own = os.geteuid()
     monkeypatch.setattr(os, "geteuid", lambda: own + 1)
     assert "another user" in (Logs(tmp_path).write("a", "text") or "")
@@ -132,6 +142,8 @@ def test_a_folder_that_another_user_could_exchange_gets_no_logs(
     (tmp_path / "robot").mkdir()
     status, lstat = list((tmp_path / "robot").lstat()), Path.lstat
     status[stat.ST_UID] = os.geteuid() + 1
-    monkeypatch.setattr(Path, "lstat", lambda path: os.stat_result(status) if path == tmp_path else lstat(path))
+    monkeypatch.setattr(
+        Path, "lstat", lambda path: os.stat_result(status) if path == tmp_path else lstat(path)
+    )
     assert "another user" in (Logs(tmp_path / "robot").write("a", "text") or "")
     assert list((tmp_path / "robot").iterdir()) == []

@@ -8,8 +8,23 @@ import pytest
 
 from tests.support.findings import expect
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
-from tfcompose.findings import finding
-from tfcompose.ipc import (
+from tfcompose.foundation.findings import finding
+from tfcompose.launcher.events import (
+    Begin,
+    Exited,
+    Finish,
+    Kill,
+    LogMatched,
+    OutputLost,
+    Signalled,
+    Start,
+    Started,
+    StartFailed,
+    TimeUp,
+)
+from tfcompose.launcher.machine import step, wake_time
+from tfcompose.launcher.state import initial
+from tfcompose.model.messages import (
     Clear,
     Complete,
     Ended,
@@ -27,23 +42,8 @@ from tfcompose.ipc import (
     Unfenced,
     Waiting,
 )
-from tfcompose.launcher.events import (
-    Begin,
-    Exited,
-    Finish,
-    Kill,
-    LogMatched,
-    OutputLost,
-    Signalled,
-    Start,
-    Started,
-    StartFailed,
-    TimeUp,
-)
-from tfcompose.launcher.machine import step, wake_time
-from tfcompose.launcher.state import initial
-from tfcompose.plan import GuardPolicy, PlanProcess, Ready, StopRule
-from tfcompose.variables import SETTLE
+from tfcompose.model.plan import GuardPolicy, PlanProcess, Ready, StopRule
+from tfcompose.model.variables import SETTLE
 
 DRIVE = PlanProcess("drive", "external", owns=(("odom", "base_link"),))
 ERROR = finding("TF801", "rogue publishes base_link → laser, which is static's", None)
@@ -53,7 +53,9 @@ WARNING = finding("TF803", "nobody declared base_link → thing", None, severity
 # The start.
 
 
-def test_the_guard_is_started_first_and_the_rest_only_after_it_is_clear_in_the_plans_order() -> None:
+def test_the_guard_is_started_first_and_the_rest_only_after_it_is_clear_in_the_plans_order() -> (
+    None
+):
     history = begin(SLAM, STATIC, GUARD)
     assert history.started == ["guard"]
     history.wait(19)
@@ -90,7 +92,10 @@ def test_a_guard_that_is_off_is_not_waited_for_and_still_says_what_is_live_and_r
     assert history.wait(60).found() == []
     history.feed(Live("slam", ("odom",)), OwnerReady("slam"), Complete(1))
     assert history.started == ["guard", "slam", "b"]
-    assert history.feed(TimeUp(), Exited("b", 0), Exited("slam", 0), Exited("guard", 0)).exit_code == 0
+    assert (
+        history.feed(TimeUp(), Exited("b", 0), Exited("slam", 0), Exited("guard", 0)).exit_code
+        == 0
+    )
 
 
 def test_an_external_process_is_expected_and_not_started() -> None:
@@ -146,7 +151,9 @@ def test_after_started_waits_until_the_process_runs() -> None:
 
 
 def test_a_process_is_started_when_the_operating_system_has_confirmed_it() -> None:
-    state, actions = step(initial(plan_of(run_process("a"), run_process("b", after={"a": "started"}))), Begin(), 0.0)
+    state, actions = step(
+        initial(plan_of(run_process("a"), run_process("b", after={"a": "started"}))), Begin(), 0.0
+    )
     assert [action for action in actions if isinstance(action, Start)] == [Start("a")]
     assert Start("b") in step(state, Started("a", 7), 0.1)[1]
 
@@ -162,7 +169,9 @@ def test_after_ready_waits_for_the_guards_word_also_for_an_external_process() ->
 
 
 def test_a_process_that_owns_no_edge_is_ready_when_it_has_started() -> None:
-    assert begin(GUARD, run_process("b", after={"a": "ready"}), run_process("a")).feed(Clear()).started[1:] == [
+    assert begin(GUARD, run_process("b", after={"a": "ready"}), run_process("a")).feed(
+        Clear()
+    ).started[1:] == [
         "a",
         "b",
     ]
@@ -207,7 +216,10 @@ def test_a_program_that_ends_with_0_is_done_and_the_others_go_on() -> None:
 def test_a_required_program_that_others_wait_for_until_it_is_done_may_end_with_0() -> None:
     """A spawner of controllers: it loads one, ends, and what drives starts then."""
     drive = run_process("drive", after={"spawner": "done"})
-    spawners = (run_process("spawner", required=True), run_process("spawner", required=True, ready=Ready("exit")))
+    spawners = (
+        run_process("spawner", required=True),
+        run_process("spawner", required=True, ready=Ready("exit")),
+    )
     for spawner, others in zip(spawners, ((drive,), ()), strict=True):
         history = begin(spawner, STATIC, *others).feed(Exited("spawner", 0))
         assert (history.found(), history.exit_code) == ([], None)
@@ -260,13 +272,19 @@ def test_a_run_of_10_s_makes_earlier_failures_forgotten() -> None:
 
 
 def test_on_failure_leaves_a_program_that_is_done_and_always_starts_it_again() -> None:
-    history = begin(run_process("a", restart="on-failure"), run_process("b", restart="always"), STATIC)
+    history = begin(
+        run_process("a", restart="on-failure"), run_process("b", restart="always"), STATIC
+    )
     history.feed(Exited("a", 0), Exited("b", 0))
     assert (history.states("a")[-1], history.states("b")[-1]) == ("exited", "backoff")
 
 
 def test_a_process_that_waits_for_its_restart_is_not_started_once_everything_stops() -> None:
-    history = begin(run_process("a", restart="always"), STATIC).feed(Exited("a", 1), Signalled(SIGINT)).wait(2)
+    history = (
+        begin(run_process("a", restart="always"), STATIC)
+        .feed(Exited("a", 1), Signalled(SIGINT))
+        .wait(2)
+    )
     assert history.started == ["a", "static"]
     assert history.states("a")[-1] == "stopped"
     assert history.feed(Exited("static", 0)).exit_code == 0
@@ -285,7 +303,9 @@ def test_what_the_guard_finds_is_reported_with_the_seconds_since_the_start() -> 
 
 
 def test_a_violation_ends_everything_with_exit_1_where_the_policy_is_stop() -> None:
-    history = begin(GUARD, STATIC, guard=GuardPolicy(on_violation="stop")).feed(Clear(), Found(WARNING))
+    history = begin(GUARD, STATIC, guard=GuardPolicy(on_violation="stop")).feed(
+        Clear(), Found(WARNING)
+    )
     assert history.killed == []
     history.feed(Found(ERROR))
     assert history.found() == [WARNING, ERROR]
@@ -293,9 +313,13 @@ def test_a_violation_ends_everything_with_exit_1_where_the_policy_is_stop() -> N
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
 
 
-def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop_offender() -> None:
+def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop_offender() -> (
+    None
+):
     policy = GuardPolicy(on_violation="stop-offender")
-    history = begin(GUARD, STATIC, run_process("slam", restart="always"), guard=policy).feed(Clear())
+    history = begin(GUARD, STATIC, run_process("slam", restart="always"), guard=policy).feed(
+        Clear()
+    )
     history.feed(Found(WARNING, "slam"), Found(ERROR))
     assert (history.killed, history.found()) == ([], [WARNING, ERROR])
     history.feed(Found(ERROR, "slam"))
@@ -311,15 +335,21 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
 
 
 def test_a_process_past_the_fence_is_stopped_where_violations_are_only_reported() -> None:
-    history = begin(GUARD, STATIC, run_process("slam", restart="always")).feed(Clear(), Unfenced(ERROR, "slam"))
+    history = begin(GUARD, STATIC, run_process("slam", restart="always")).feed(
+        Clear(), Unfenced(ERROR, "slam")
+    )
     assert history.killed == [("slam", SIGINT)]
     expect(history.found()[-1], "TF801", "slam is stopped", "strict")
-    everything = begin(GUARD, STATIC, guard=GuardPolicy(on_violation="stop")).feed(Clear(), Unfenced(ERROR, "static"))
+    everything = begin(GUARD, STATIC, guard=GuardPolicy(on_violation="stop")).feed(
+        Clear(), Unfenced(ERROR, "static")
+    )
     assert everything.all(Stopping) == [Stopping("TF801 foreign_publisher")]
 
 
 def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:
-    history = begin(GUARD, DRIVE, STATIC, guard=GuardPolicy(on_violation="stop-offender")).feed(Clear())
+    history = begin(GUARD, DRIVE, STATIC, guard=GuardPolicy(on_violation="stop-offender")).feed(
+        Clear()
+    )
     history.feed(Found(ERROR, "drive"))
     expect(history.found()[-1], "TF801", "nothing is stopped", "drive")
     assert history.killed == []
@@ -334,7 +364,9 @@ def test_a_violation_is_only_shown_where_the_policy_is_report() -> None:
 def test_missing_edges_are_named_after_5_s_and_again_only_when_there_are_others() -> None:
     history = begin(GUARD, STATIC, SLAM).wait(3).feed(Clear())
     assert history.sleep_until_due() == pytest.approx(5)
-    assert [[one.owner for one in notice.missing] for notice in history.all(Waiting)] == [["static", "slam"]]
+    assert [[one.owner for one in notice.missing] for notice in history.all(Waiting)] == [
+        ["static", "slam"]
+    ]
     assert wake_time(history.state) is None
     history.wait(60)
     assert len(history.all(Waiting)) == 1
@@ -359,7 +391,9 @@ def test_two_notices_of_missing_edges_are_5_s_apart() -> None:
 
 
 @pytest.mark.parametrize("number", [SIGINT, SIGTERM, SIGHUP])
-def test_a_signal_stops_everything_in_reverse_order_the_guard_last_and_the_exit_code_is_0(number: int) -> None:
+def test_a_signal_stops_everything_in_reverse_order_the_guard_last_and_the_exit_code_is_0(
+    number: int,
+) -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Signalled(number))
     assert history.killed == [("slam", SIGINT), ("static", SIGINT)]
     history.feed(Exited("slam", -SIGINT), Exited("static", 0))
@@ -370,7 +404,9 @@ def test_a_signal_stops_everything_in_reverse_order_the_guard_last_and_the_exit_
 
 
 def test_a_process_is_stopped_only_when_those_that_wait_for_it_are_gone() -> None:
-    history = begin(run_process("a"), run_process("b", after={"a": "started"})).feed(Signalled(SIGINT))
+    history = begin(run_process("a"), run_process("b", after={"a": "started"})).feed(
+        Signalled(SIGINT)
+    )
     assert history.killed == [("b", SIGINT)]
     assert history.feed(Exited("b", 0)).killed == [("b", SIGINT), ("a", SIGINT)]
 
@@ -455,7 +491,9 @@ def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_observed() -
 
 def test_a_process_that_was_stopped_is_not_reported_to_have_never_published() -> None:
     slam = replace(SLAM, argv=("slam",))
-    history = begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), Complete(2))
+    history = begin(GUARD, STATIC, slam).feed(
+        Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), Complete(2)
+    )
     history.feed(ProcessRequest("stop", "slam"), Exited("slam", -SIGINT), TimeUp())
     expect(history.only(), "TF811", "map → odom", "slam is stopped", "SIGINT")
 
@@ -487,5 +525,7 @@ def test_a_stubborn_process_is_killed_after_the_time_that_is_its_own() -> None:
     assert history.sleep_until_due() == pytest.approx(2.0)
     assert history.sleep_until_due() == pytest.approx(7.0)
     assert history.killed == [("slow", SIGINT), ("slow", SIGTERM), ("slow", SIGKILL)]
-    history = begin(run_process("slow", stop=replace(rule, signal="SIGTERM"))).feed(Signalled(SIGINT))
+    history = begin(run_process("slow", stop=replace(rule, signal="SIGTERM"))).feed(
+        Signalled(SIGINT)
+    )
     assert history.sleep_until_due() == pytest.approx(7.0)

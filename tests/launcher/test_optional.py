@@ -8,10 +8,19 @@ import pytest
 
 from tests.support.findings import expect
 from tests.support.machine_history import GUARD, SLAM, STATIC, History, begin, run_process
-from tfcompose.ipc import AllReady, AllStarted, Clear, Ended, Live, OwnerReady, ProcessRequest, Waiting
 from tfcompose.launcher.answers import status
 from tfcompose.launcher.events import Exited, Signalled, StartFailed, TimeUp
-from tfcompose.plan import PlanProcess, Ready, RestartPolicy
+from tfcompose.model.messages import (
+    AllReady,
+    AllStarted,
+    Clear,
+    Ended,
+    Live,
+    OwnerReady,
+    ProcessRequest,
+    Waiting,
+)
+from tfcompose.model.plan import PlanProcess, Ready, RestartPolicy
 
 LIVE = (Live("static", ("laser",)), OwnerReady("static"))
 
@@ -22,7 +31,9 @@ def optional(name: str = "camera", **more: Any) -> PlanProcess:
 
 def failed(*others: PlanProcess) -> History:
     """Return a history in which the optional camera has failed, and the tree is live."""
-    return begin(GUARD, STATIC, optional(), *others).feed(Clear(), *LIVE, Exited("camera", 3, ("no device",)))
+    return begin(GUARD, STATIC, optional(), *others).feed(
+        Clear(), *LIVE, Exited("camera", 3, ("no device",))
+    )
 
 
 @pytest.mark.parametrize("restart", ["no", "on-failure"])
@@ -32,7 +43,14 @@ def test_an_optional_process_that_fails_is_named_with_its_last_lines_and_the_res
     history = begin(STATIC, replace(optional(), restart=restart, max_restarts=0)).feed(
         Exited("camera", 3, ("no device",))
     )
-    expect(history.only(), "TF808", "camera", "exit code 3", "camera: no device", "tfcompose start camera")
+    expect(
+        history.only(),
+        "TF808",
+        "camera",
+        "exit code 3",
+        "camera: no device",
+        "tfcompose start camera",
+    )
     assert history.only().severity == "warning"
     assert (history.state.stop, history.killed, history.exit_code) == (None, [], None)
     assert history.state.given_up == ("camera",)
@@ -64,7 +82,10 @@ def test_ready_does_not_wait_for_it_nor_for_its_edges_and_says_what_is_left_out(
     assert ready.without == ("camera",)
     assert [row.process for row in ready.rows] == ["guard", "static"]
     assert history.all(Waiting) == []
-    assert (history.state.complete, [one.child for one in history.state.missing]) == (False, ["camera"])
+    assert (history.state.complete, [one.child for one in history.state.missing]) == (
+        False,
+        ["camera"],
+    )
 
 
 def test_what_else_is_missing_is_still_waited_for() -> None:
@@ -73,22 +94,32 @@ def test_what_else_is_missing_is_still_waited_for() -> None:
     assert [one.owner for one in history.all(Waiting)[0].missing] == ["static"]
 
 
-def test_one_that_waits_for_it_fails_with_the_reason_and_ends_everything_unless_it_is_optional_too() -> None:
+def test_one_that_waits_for_it_fails_with_the_reason_and_ends_everything_unless_it_is_optional_too() -> (
+    None
+):
     gate = Ready("log", "up")
     camera = replace(optional(), ready=gate)
-    history = begin(STATIC, camera, run_process("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
+    history = begin(STATIC, camera, run_process("nav", after={"camera": "ready"})).feed(
+        Exited("camera", 1)
+    )
     expect(history.found()[1], "TF808", "nav", "camera to be ready", "failed")
     assert history.feed(Exited("static", 0)).exit_code == 1
-    history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
+    history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(
+        Exited("camera", 1)
+    )
     expect(history.found()[1], "TF808", "nav", "camera to be ready", "failed")
     assert (history.state.stop, history.state.given_up) == (None, ("camera", "nav"))
 
 
-@pytest.mark.parametrize(("what", "code", "started"), [("started", 1, 2), ("done", 1, 1), ("done", 0, 2)])
+@pytest.mark.parametrize(
+    ("what", "code", "started"), [("started", 1, 2), ("done", 1, 1), ("done", 0, 2)]
+)
 def test_started_was_fulfilled_by_one_that_ran_and_done_is_not_by_one_that_failed(
     what: str, code: int, started: int
 ) -> None:
-    history = begin(optional(), optional("nav", after={"camera": what})).feed(Exited("camera", code))
+    history = begin(optional(), optional("nav", after={"camera": what})).feed(
+        Exited("camera", code)
+    )
     assert history.started == ["camera", "nav"][:started]
 
 
@@ -102,7 +133,9 @@ def test_one_that_never_ran_does_not_count_as_started() -> None:
 
 def test_it_is_started_again_on_request_and_what_waited_for_it_follows() -> None:
     camera = replace(optional(), ready=Ready("time", number=1.0))
-    history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
+    history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(
+        Exited("camera", 1)
+    )
     history.feed(ProcessRequest("start", "camera"))
     assert history.state.given_up == ("nav",)
     history.wait(1)
@@ -110,7 +143,9 @@ def test_it_is_started_again_on_request_and_what_waited_for_it_follows() -> None
     assert not [one for one in history.state.tracked.values() if one.failed]
 
 
-def test_after_a_signal_the_exit_code_is_0_and_after_a_time_1_with_the_failure_at_the_end() -> None:
+def test_after_a_signal_the_exit_code_is_0_and_after_a_time_1_with_the_failure_at_the_end() -> (
+    None
+):
     history = failed().feed(Signalled(SIGINT), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 0
     history = failed().feed(TimeUp(), Exited("static", 0), Exited("guard", 0))
@@ -125,7 +160,11 @@ def test_when_all_have_ended_the_exit_code_is_1_and_the_first_that_failed_is_nam
 
 
 def test_an_optional_process_does_not_hold_back_that_all_is_started() -> None:
-    history = begin(STATIC, replace(optional(), ready=Ready("log", "up")), optional("nav", after={"camera": "ready"}))
+    history = begin(
+        STATIC,
+        replace(optional(), ready=Ready("log", "up")),
+        optional("nav", after={"camera": "ready"}),
+    )
     assert [one.waiting for one in history.all(AllStarted)] == [("nav",)]
 
 

@@ -9,7 +9,9 @@ import pytest
 from tfcompose.launcher.output import KEPT, NonBlockingOutput
 
 
-def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_learns_how_much_is_left_out() -> None:
+def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_learns_how_much_is_left_out() -> (
+    None
+):
     reader, writer = os.pipe()
     stream = NonBlockingOutput(writer)
     for number in range(20_000):
@@ -34,7 +36,9 @@ def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_
     assert lines[-1] == "and on"
 
 
-def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_blocking_one() -> None:
+def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_blocking_one() -> (
+    None
+):
     master, slave = pty.openpty()
     stream = NonBlockingOutput(slave)
     for _ in range(5000):  # a write that waits, waits for ever

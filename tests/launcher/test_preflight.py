@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from tests.support.findings import expect
-from tfcompose.findings import Finding
+from tfcompose.foundation.findings import Finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.preflight import commands_of
-from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.plan.fleet import SHARE_COMMAND
-from tfcompose.ros.environment import child_environment
+from tfcompose.model.plan import Plan, PlanProcess, RosSettings
+from tfcompose.model.plan.fleet import SHARE_COMMAND
+from tfcompose.tf.ros.environment import child_environment
 
 
 @pytest.fixture
@@ -28,7 +28,10 @@ def prefix(tmp_path: Path) -> Path:
 
 
 def inspect(
-    tmp_path: Path, *processes: PlanProcess, env: Mapping[str, str] | None = None, ros: RosSettings | None = None
+    tmp_path: Path,
+    *processes: PlanProcess,
+    env: Mapping[str, str] | None = None,
+    ros: RosSettings | None = None,
 ) -> tuple[dict[str, Command], list[Finding]]:
     plan = Plan("rover", "", None, ros or RosSettings(), (), processes)
     base = {"PATH": os.environ["PATH"]} | dict(env or {})
@@ -39,7 +42,9 @@ def lidar(word: str) -> PlanProcess:
     return PlanProcess("lidar", "run", argv=(word, "-x"))
 
 
-def test_a_ros_executable_is_found_below_the_prefixes_in_their_order(tmp_path: Path, prefix: Path) -> None:
+def test_a_ros_executable_is_found_below_the_prefixes_in_their_order(
+    tmp_path: Path, prefix: Path
+) -> None:
     path = f"{tmp_path}/other:{prefix}"
     commands, found = inspect(
         tmp_path, lidar("${executable:sllidar_ros2/sllidar_node}"), env={"AMENT_PREFIX_PATH": path}
@@ -61,10 +66,20 @@ UNSTARTABLE: dict[str, tuple[PlanProcess, bool, str, list[str]]] = {
         lidar("${executable:sllidar_ros2/slidar_node}"),
         True,
         "TF810",
-        ["sllidar_ros2/slidar_node of lidar", "sllidar_node?", "PREFIX/lib/sllidar_ros2/slidar_node", "PATH"],
+        [
+            "sllidar_ros2/slidar_node of lidar",
+            "sllidar_node?",
+            "PREFIX/lib/sllidar_ros2/slidar_node",
+            "PATH",
+        ],
     ),
     "not installed": (lidar("${executable:nope/no_such_node}"), True, "TF810", ["package nope"]),
-    "nothing sourced": (lidar("${executable:nope/no_node}"), False, "TF810", ["setup file", "AMENT_PREFIX_PATH"]),
+    "nothing sourced": (
+        lidar("${executable:nope/no_node}"),
+        False,
+        "TF810",
+        ["setup file", "AMENT_PREFIX_PATH"],
+    ),
     "not executable": (
         lidar("PREFIX/lib/sllidar_ros2/notes.txt"),
         True,
@@ -73,25 +88,61 @@ UNSTARTABLE: dict[str, tuple[PlanProcess, bool, str, list[str]]] = {
     ),
     "relative": (lidar("bin/lidar"), True, "TF810", ["${file(bin/lidar)}"]),
     "no command": (PlanProcess("lidar", "run"), True, "TF902", ["lidar"]),
-    "waits for nobody": (replace(WAITING, after={"nobody": "started"}), True, "TF902", ["lidar", "nobody"]),
-    "waits in vain": (replace(WAITING, after={"static": "done"}), True, "TF902", ["lidar", "static"]),
+    "waits for nobody": (
+        replace(WAITING, after={"nobody": "started"}),
+        True,
+        "TF902",
+        ["lidar", "nobody"],
+    ),
+    "waits in vain": (
+        replace(WAITING, after={"static": "done"}),
+        True,
+        "TF902",
+        ["lidar", "static"],
+    ),
     "waits for itself": (replace(WAITING, after={"lidar": "ready"}), True, "TF812", ["lidar"]),
 }
 
 
 @pytest.mark.parametrize("case", UNSTARTABLE)
-def test_what_cannot_be_started_is_one_finding_with_its_names(tmp_path: Path, prefix: Path, case: str) -> None:
+def test_what_cannot_be_started_is_one_finding_with_its_names(
+    tmp_path: Path, prefix: Path, case: str
+) -> None:
     process, sourced, code, names = UNSTARTABLE[case]
-    process = replace(process, argv=tuple(word.replace("PREFIX", str(prefix)) for word in process.argv))
-    _, (found,) = inspect(tmp_path, process, STATIC, env={"AMENT_PREFIX_PATH": str(prefix)} if sourced else None)
-    expect(found, code, *(name.replace("PREFIX", str(prefix)) if "/" in name else name for name in names))
+    process = replace(
+        process, argv=tuple(word.replace("PREFIX", str(prefix)) for word in process.argv)
+    )
+    _, (found,) = inspect(
+        tmp_path, process, STATIC, env={"AMENT_PREFIX_PATH": str(prefix)} if sourced else None
+    )
+    expect(
+        found,
+        code,
+        *(name.replace("PREFIX", str(prefix)) if "/" in name else name for name in names),
+    )
 
 
-def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once(tmp_path: Path) -> None:
-    words = {"laser": "${executable:sllidar_ros2/sllidar_node}", "slam": "${executable:slam_toolbox/slam}", "a": "no_a"}
-    _, (found,) = inspect(tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items()))
+def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once(
+    tmp_path: Path,
+) -> None:
+    words = {
+        "laser": "${executable:sllidar_ros2/sllidar_node}",
+        "slam": "${executable:slam_toolbox/slam}",
+        "a": "no_a",
+    }
+    _, (found,) = inspect(
+        tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items())
+    )
     missing = "sllidar_ros2/sllidar_node of laser, slam_toolbox/slam of slam, no_a of a"
-    expect(found, "TF810", "3 executables", missing, "AMENT_PREFIX_PATH", "folders of PATH", "setup file")
+    expect(
+        found,
+        "TF810",
+        "3 executables",
+        missing,
+        "AMENT_PREFIX_PATH",
+        "folders of PATH",
+        "setup file",
+    )
     assert len(found.notes) == 2
 
 
@@ -102,7 +153,9 @@ def test_a_relative_program_is_found_in_the_processs_folder(tmp_path: Path, pref
 
 
 @pytest.mark.parametrize("cwd", ["maps", "${build_dir}/../maps"])
-def test_a_folder_that_is_not_there_is_found_before_anything_is_started(tmp_path: Path, cwd: str) -> None:
+def test_a_folder_that_is_not_there_is_found_before_anything_is_started(
+    tmp_path: Path, cwd: str
+) -> None:
     process = PlanProcess("lidar", "run", argv=("true",), cwd=cwd)
     _, (found,) = inspect(tmp_path, process)
     folder = os.path.normpath(tmp_path / cwd.replace("${build_dir}/", ""))
@@ -114,16 +167,20 @@ def test_a_folder_that_is_not_there_is_found_before_anything_is_started(tmp_path
 def test_sharing_with_a_fleet_needs_zenoh_before_anything_is_started(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    share = PlanProcess("fleet_share", "run", argv=(*SHARE_COMMAND, "r1", "fleet.yaml"), required=False)
+    share = PlanProcess(
+        "fleet_share", "run", argv=(*SHARE_COMMAND, "r1", "fleet.yaml"), required=False
+    )
     own = replace(share, name="own", argv=("sh", "-c", "tfcompose fleet share"))
-    monkeypatch.setattr("tfcompose.plan.fleet.find_spec", lambda _: None)
+    monkeypatch.setattr("tfcompose.model.plan.fleet.find_spec", lambda _: None)
     commands, (found,) = inspect(tmp_path, share, own)
     expect(found, "TF920", "fleet_share", "tfcompose[fleet]")
     assert set(commands) == {"own"}
 
 
 def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:
-    process = PlanProcess("lidar", "run", argv=("true", "${params_file}"), params_file="${plan}.yaml")
+    process = PlanProcess(
+        "lidar", "run", argv=("true", "${params_file}"), params_file="${plan}.yaml"
+    )
     commands, _ = inspect(tmp_path, process)
     assert commands["lidar"].argv[1] == f"{tmp_path}/${{plan}}.yaml"
 

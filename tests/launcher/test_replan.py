@@ -3,22 +3,40 @@
 from dataclasses import replace
 from pathlib import Path
 
-from tfcompose.geometry import Pose
+from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.answers import Change, change
-from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.model.plan import (
+    EdgeKind,
+    GuardPolicy,
+    Plan,
+    PlanEdge,
+    PlanProcess,
+    RosSettings,
+    SourceLine,
+)
 
 
 def edge(child: str, owner: str = "static", x: float = 0.0, line: int = 1) -> PlanEdge:
-    kind = "static" if owner == "static" else "dynamic"
-    return PlanEdge("base", child, kind, owner, f"/{owner}", Pose((x, 0, 0)), None, ("r.yaml", line))  # type: ignore[arg-type]
+    kind: EdgeKind = "static" if owner == "static" else "dynamic"
+    pose, source = Pose((x, 0, 0)), SourceLine("r.yaml", line)
+    return PlanEdge("base", child, kind, owner, f"/{owner}", pose, None, source)
 
 
 STATIC, GUARD = PlanProcess("static", "static"), PlanProcess("guard", "guard")
 SLAM = PlanProcess("slam", "run", argv=("slam",), params_file="params/slam.yaml")
-PLAN = Plan("rover", "", "base", RosSettings(), (edge("laser"), edge("odom", "slam")), (STATIC, SLAM, GUARD))
+PLAN = Plan(
+    "rover",
+    "",
+    "base",
+    RosSettings(),
+    (edge("laser"), edge("odom", "slam")),
+    (STATIC, SLAM, GUARD),
+)
 
 
-def changed(tmp_path: Path, plan: Plan, params: str = "a: 1", description: str = "<robot/>") -> Change:
+def changed(
+    tmp_path: Path, plan: Plan, params: str = "a: 1", description: str = "<robot/>"
+) -> Change:
     for name, slam, robot in (("old", "a: 1", "<robot/>"), ("new", params, description)):
         (tmp_path / name / "params").mkdir(parents=True)
         (tmp_path / name / "params" / "slam.yaml").write_text(slam)
@@ -27,7 +45,9 @@ def changed(tmp_path: Path, plan: Plan, params: str = "a: 1", description: str =
 
 
 def test_a_line_that_moved_in_the_file_changes_nothing(tmp_path: Path) -> None:
-    moved = replace(PLAN, edges=(edge("laser", line=9), edge("odom", "slam", line=3)), spec_digest="other")
+    moved = replace(
+        PLAN, edges=(edge("laser", line=9), edge("odom", "slam", line=3)), spec_digest="other"
+    )
     assert changed(tmp_path, moved) == Change(frozenset(), ())
 
 
@@ -41,26 +61,38 @@ def test_a_parameter_concerns_its_process_only(tmp_path: Path) -> None:
 
 
 def test_the_description_concerns_whoever_sends_it(tmp_path: Path) -> None:
-    assert changed(tmp_path, PLAN, description="<robot name='r'/>") == Change(frozenset({"static"}), ())
+    assert changed(tmp_path, PLAN, description="<robot name='r'/>") == Change(
+        frozenset({"static"}), ()
+    )
 
 
 def test_a_policy_concerns_the_guard_and_a_setting_of_ros_everybody(tmp_path: Path) -> None:
     policy = replace(PLAN, guard=GuardPolicy(unknown_edges="error"))
     assert changed(tmp_path / "a", policy).changed == {"guard"}
-    assert changed(tmp_path / "b", replace(PLAN, ros=RosSettings("r"))).changed == {"static", "slam", "guard"}
+    assert changed(tmp_path / "b", replace(PLAN, ros=RosSettings("r"))).changed == {
+        "static",
+        "slam",
+        "guard",
+    }
 
 
-def test_a_fence_is_put_up_when_a_process_starts_so_strict_concerns_everybody(tmp_path: Path) -> None:
+def test_a_fence_is_put_up_when_a_process_starts_so_strict_concerns_everybody(
+    tmp_path: Path,
+) -> None:
     strict = replace(PLAN, guard=GuardPolicy(mode="strict"))
     assert changed(tmp_path, strict).changed == {"static", "slam", "guard"}
 
 
-def test_another_fence_concerns_everybody_and_one_that_nobody_puts_up_only_the_guard(tmp_path: Path) -> None:
+def test_another_fence_concerns_everybody_and_one_that_nobody_puts_up_only_the_guard(
+    tmp_path: Path,
+) -> None:
     for mode, concerned in (("strict", {"static", "slam", "guard"}), ("watch", {"guard"})):
         old = replace(PLAN, guard=GuardPolicy(mode=mode))  # type: ignore[arg-type]
         new = replace(PLAN, guard=GuardPolicy(mode=mode, fence="remap"))  # type: ignore[arg-type]
         assert change(old, tmp_path, new, tmp_path).changed == concerned
 
 
-def test_a_fixed_frame_that_vanished_is_held_by_listeners_and_a_moving_one_is_not(tmp_path: Path) -> None:
+def test_a_fixed_frame_that_vanished_is_held_by_listeners_and_a_moving_one_is_not(
+    tmp_path: Path,
+) -> None:
     assert changed(tmp_path, replace(PLAN, edges=())).held == ("base → laser",)

@@ -8,7 +8,10 @@ import pytest
 
 from tests.support.findings import expect
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
-from tfcompose.ipc import (
+from tfcompose.launcher.answers import status
+from tfcompose.launcher.events import Exited, LogMatched, NewPlan, Signalled
+from tfcompose.launcher.stopping import refusal
+from tfcompose.model.messages import (
     Absent,
     Alive,
     AllReady,
@@ -30,13 +33,12 @@ from tfcompose.ipc import (
     Silent,
     Verb,
 )
-from tfcompose.launcher.answers import status
-from tfcompose.launcher.events import Exited, LogMatched, NewPlan, Signalled
-from tfcompose.launcher.stopping import refusal
-from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
+from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
 
 
-def gated(name: str = "lidar", *, kind: Any = "topic", text: str = "/scan", **more: Any) -> PlanProcess:
+def gated(
+    name: str = "lidar", *, kind: Any = "topic", text: str = "/scan", **more: Any
+) -> PlanProcess:
     ready = Ready(kind, text, more.pop("number", 0.0), more.pop("timeout_s", None))
     return PlanProcess(name, "run", ready=ready, nodes=(f"/{name}",), **more)
 
@@ -55,7 +57,9 @@ AFTER = run_process("b", after={"lidar": "ready"})
         ("lifecycle", Gate("lidar", nodes={"/lidar": "active"})),
     ],
 )
-def test_the_guard_checks_a_gate_and_what_waits_is_started_when_it_opens(kind: str, gate: Gate) -> None:
+def test_the_guard_checks_a_gate_and_what_waits_is_started_when_it_opens(
+    kind: str, gate: Gate
+) -> None:
     text = "active" if kind == "lifecycle" else "/scan"
     history = begin(GUARD, gated(kind=kind, text=text), AFTER).feed(Clear())
     assert history.orders == [gate]
@@ -65,8 +69,12 @@ def test_the_guard_checks_a_gate_and_what_waits_is_started_when_it_opens(kind: s
     assert history.all(ProcessReady) == [ProcessReady("lidar", "/scan", 2.0)]
 
 
-def test_a_gate_that_stays_shut_is_reported_once_with_what_was_there_instead_and_may_still_open() -> None:
-    history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(Clear(), GateShut("lidar", "topics /tf, /scan_raw"))
+def test_a_gate_that_stays_shut_is_reported_once_with_what_was_there_instead_and_may_still_open() -> (
+    None
+):
+    history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(
+        Clear(), GateShut("lidar", "topics /tf, /scan_raw")
+    )
     assert history.sleep_until_due() == pytest.approx(3)
     (found,) = history.late
     expect(found, "TF817", "lidar", " 3 s", "/scan", "topics /tf, /scan_raw")
@@ -86,7 +94,10 @@ def test_a_line_a_time_and_an_exit_code_open_their_gates() -> None:
     line, time = gated("line", kind="log", text="up"), gated("time", kind="time", number=2.0)
     code = gated("code", kind="exit", number=3.0)
     history = begin(
-        line, time, code, *(run_process(f"after_{n}", after={n: "ready"}) for n in ("line", "time", "code"))
+        line,
+        time,
+        code,
+        *(run_process(f"after_{n}", after={n: "ready"}) for n in ("line", "time", "code")),
     )
     assert history.started == ["line", "time", "code"]
     assert history.sleep_until_due() == pytest.approx(2)
@@ -177,7 +188,9 @@ def test_a_required_process_that_ends_ends_everything_even_when_it_is_done() -> 
         (StopRule("SIGKILL"), [SIGKILL], []),
     ],
 )
-def test_the_signals_and_times_are_the_plans(rule: StopRule, signals: list[int], times: list[float]) -> None:
+def test_the_signals_and_times_are_the_plans(
+    rule: StopRule, signals: list[int], times: list[float]
+) -> None:
     history = begin(replace(run_process("a"), stop=rule)).feed(Signalled(SIGINT))
     assert [history.sleep_until_due() for _ in times] == pytest.approx(times)
     assert [number for _, number in history.wait(60).killed] == signals
@@ -243,7 +256,9 @@ def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: Verb, w
 
 
 def test_a_guard_that_is_restarted_learns_who_is_absent_and_which_gates_are_shut() -> None:
-    history = begin(GUARD, STATIC, SLAM, gated()).feed(Clear(), ProcessRequest("stop", "slam"), Exited("slam", 0))
+    history = begin(GUARD, STATIC, SLAM, gated()).feed(
+        Clear(), ProcessRequest("stop", "slam"), Exited("slam", 0)
+    )
     history.orders.clear()
     history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
     assert history.started[-1] == "guard"
@@ -251,7 +266,9 @@ def test_a_guard_that_is_restarted_learns_who_is_absent_and_which_gates_are_shut
     assert history.found() == []
 
 
-def test_a_guard_that_dies_is_reported_and_restarted_with_its_reports_and_live_edges_stay_live() -> None:
+def test_a_guard_that_dies_is_reported_and_restarted_with_its_reports_and_live_edges_stay_live() -> (
+    None
+):
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
     history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
     history.notices.clear()
@@ -270,11 +287,18 @@ def test_a_guard_that_dies_is_reported_and_restarted_with_its_reports_and_live_e
     assert history.state.tracked["guard"].restarts == 1
 
 
-@pytest.mark.parametrize(("mode", "did"), [("watch", "watched nothing"), ("strict", "passed nothing on")])
-def test_a_guard_that_hangs_is_reported_and_ended_and_its_end_is_that_of_one_that_dies(mode: str, did: str) -> None:
+@pytest.mark.parametrize(
+    ("mode", "did"), [("watch", "watched nothing"), ("strict", "passed nothing on")]
+)
+def test_a_guard_that_hangs_is_reported_and_ended_and_its_end_is_that_of_one_that_dies(
+    mode: str, did: str
+) -> None:
     history = begin(GUARD, STATIC, guard=GuardPolicy(mode)).feed(Clear(), Alive())  # type: ignore[arg-type]
     history.wait(9).feed(Alive())
-    assert (history.sleep_until_due(), history.killed) == (10.0, []), "the launcher may have been kept from running"
+    assert (history.sleep_until_due(), history.killed) == (
+        10.0,
+        [],
+    ), "the launcher may have been kept from running"
     assert (history.sleep_until_due(), history.killed) == (5.0, [("guard", SIGKILL)])
     expect(history.only(), "TF808", "guard hangs", " 15 s", did)
     assert history.only().severity == "warning"
@@ -297,20 +321,28 @@ def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_agai
         answer = status(history.state, history.now)
         return answer.complete, answer.silent, answer.processes[1].live
 
-    history = begin(GUARD, STATIC).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
+    history = begin(GUARD, STATIC).feed(
+        Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1)
+    )
     assert counted() == (True, (), 1)
     history.feed(Silent(("laser",), over=False))
     assert counted() == (False, ("base_link → laser",), 0)
     history.feed(Silent(("laser",), over=True))
     assert counted() == (True, (), 1)
-    history.feed(Remember({"a": 1}), Silent(("laser",), over=False), Exited("guard", -SIGKILL)).wait(1)
+    history.feed(
+        Remember({"a": 1}), Silent(("laser",), over=False), Exited("guard", -SIGKILL)
+    ).wait(1)
     assert counted() == (True, (), 1), "the next guard says itself what is silent"
 
 
 def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
     history = begin(GUARD, STATIC)
-    history.state = replace(history.state, plan=replace(history.state.plan, guard=GuardPolicy("strict")))
-    expect(history.feed(Clear(), Exited("guard", 1)).only(), "TF808", "guard", "exit code 1", "/tf")
+    history.state = replace(
+        history.state, plan=replace(history.state.plan, guard=GuardPolicy("strict"))
+    )
+    expect(
+        history.feed(Clear(), Exited("guard", 1)).only(), "TF808", "guard", "exit code 1", "/tf"
+    )
 
 
 def test_an_owner_that_ended_while_nobody_watched_must_be_observed_anew() -> None:
@@ -340,7 +372,11 @@ def test_a_guard_that_is_requested_anew_or_follows_another_plan_begins_without_m
     assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])
     history.feed(Clear(), Remember({"a": 1}), Exited("guard", 1))
     history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"})))
-    assert (history.state.memory, history.state.live, history.started[-1]) == ({}, frozenset(), "guard")
+    assert (history.state.memory, history.state.live, history.started[-1]) == (
+        {},
+        frozenset(),
+        "guard",
+    )
 
 
 # Other plans.
@@ -362,10 +398,17 @@ def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is
 
 def test_a_tree_stays_complete_where_another_plan_changes_nothing_of_it() -> None:
     a = run_process("a")
-    history = begin(GUARD, STATIC, a).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
-    history.feed(NewPlan(plan_of(GUARD, STATIC, replace(a, argv=("other",))), frozenset({"a"})), Exited("a", 0))
+    history = begin(GUARD, STATIC, a).feed(
+        Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1)
+    )
+    history.feed(
+        NewPlan(plan_of(GUARD, STATIC, replace(a, argv=("other",))), frozenset({"a"})),
+        Exited("a", 0),
+    )
     assert status(history.state, history.now).complete
-    history.feed(NewPlan(plan_of(GUARD, replace(STATIC, argv=("other",)), a), frozenset({"static"})))
+    history.feed(
+        NewPlan(plan_of(GUARD, replace(STATIC, argv=("other",)), a), frozenset({"static"}))
+    )
     assert not status(history.state, history.now).complete, "its owner is restarted"
     history.feed(Exited("static", 0), Live("static", ("laser",)), OwnerReady("static"))
     history.feed(NewPlan(plan_of(GUARD, STATIC, SLAM), frozenset()))

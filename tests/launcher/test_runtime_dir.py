@@ -15,7 +15,7 @@ from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.launcher import runtime_dir
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of, runtime_dirs
-from tfcompose.plan import Plan, RosSettings
+from tfcompose.model.plan import Plan, RosSettings
 
 ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())
 HOLD = """
@@ -33,16 +33,27 @@ sys.stdin.read()
 def env(tmp_path: Path) -> dict[str, str]:
     folder = tmp_path / "runtime"
     folder.mkdir(mode=0o700)
-    return {"XDG_RUNTIME_DIR": str(folder), "ROS_LOG_DIR": str(tmp_path / "log"), "ROS_DOMAIN_ID": "3"}
+    return {
+        "XDG_RUNTIME_DIR": str(folder),
+        "ROS_LOG_DIR": str(tmp_path / "log"),
+        "ROS_DOMAIN_ID": "3",
+    }
 
 
-def test_a_robot_is_its_name_in_its_domain_which_is_the_plans_or_else_the_environments(env: dict[str, str]) -> None:
+def test_a_robot_is_its_name_in_its_domain_which_is_the_plans_or_else_the_environments(
+    env: dict[str, str],
+) -> None:
     place = runtime_dir_of(ROVER, env)
     assert (place.name, place.folder.parent.stat().st_mode & 0o777) == ("rover@7", 0o700)
     assert place.logs == runtime_dir_of(ROVER, env).logs
     assert str(place.logs) == f"{env['ROS_LOG_DIR']}/tfcompose/rover@7"
     assert runtime_dir_of(Plan("rover", "", None, RosSettings(), (), ()), env).name == "rover@3"
-    assert runtime_dir_of(Plan("rover", "", None, RosSettings(), (), ()), env | {"ROS_DOMAIN_ID": ""}).name == "rover@0"
+    assert (
+        runtime_dir_of(
+            Plan("rover", "", None, RosSettings(), (), ()), env | {"ROS_DOMAIN_ID": ""}
+        ).name
+        == "rover@0"
+    )
 
 
 @pytest.mark.parametrize("given", ["", "relative", "/nowhere", "shared"])
@@ -53,7 +64,9 @@ def test_without_a_safe_runtime_folder_one_of_the_users_own_is_made(
     (tmp_path / "shared").chmod(0o777)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(runtime_dir, "USERS", tmp_path / "nobody")
-    place = runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / given) if given == "shared" else given})
+    place = runtime_dir_of(
+        ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / given) if given == "shared" else given}
+    )
     assert place.folder.parent == tmp_path / f"tfcompose-{os.getuid()}"
     assert place.folder.parent.stat().st_mode & 0o777 == 0o700
 
@@ -107,11 +120,15 @@ def test_of_two_only_one_gets_the_lock_the_other_learns_who_has_it_and_a_killed_
     lock.close()
 
 
-def test_who_only_observes_is_in_nobodys_way_and_is_taken_for_nobodys_run(env: dict[str, str]) -> None:
+def test_who_only_observes_is_in_nobodys_way_and_is_taken_for_nobodys_run(
+    env: dict[str, str],
+) -> None:
     place = runtime_dir_of(ROVER, env)
     Lock(place).close()
     with (place.folder / "lock").open() as looker:
-        fcntl.flock(looker, fcntl.LOCK_SH)  # as holder does for a moment; this one is kept from going on
+        fcntl.flock(
+            looker, fcntl.LOCK_SH
+        )  # as holder does for a moment; this one is kept from going on
         assert place.holder() is None, "of two who look, each took the other for a run"
         threading.Timer(0.2, fcntl.flock, (looker, fcntl.LOCK_UN)).start()
         lock = Lock(place)
@@ -125,7 +142,8 @@ def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str]) 
     with processes.start(["/bin/sleep", "60"], close_fds=False) as child:
         lock.close()
         try:
-            # The kernel gives the parent its turn a moment before it closes what the child must not have.
+            # The kernel gives the parent its turn a moment before it closes what the child must
+            # not have.
             assert until(lambda: place.holder() is None)
         finally:
             child.kill()

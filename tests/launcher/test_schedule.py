@@ -14,26 +14,29 @@ import pytest
 from tests.support import processes
 from tests.support.findings import expect
 from tfcompose.cli.compiling import library
-from tfcompose.compile import compile_robot
-from tfcompose.emit.plan import plan_of
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.launcher.child import spawn
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.schedule import refused_schedule
-from tfcompose.plan import Plan, PlanProcess, RosSettings, Schedule
-from tfcompose.ros.environment import child_environment
+from tfcompose.model.plan import Plan, PlanProcess, RosSettings, Schedule
+from tfcompose.tf.ros.environment import child_environment
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.child import Command
-    from tfcompose.plan import SchedulingPolicy
+    from tfcompose.model.plan import SchedulingPolicy
 
-ASKS = "import json, os; print(json.dumps([sorted(os.sched_getaffinity(0)), os.sched_getscheduler(0), os.nice(0)]))"
+ASKS = (
+    "import json, os; print(json.dumps([sorted(os.sched_getaffinity(0)), os.sched_getscheduler(0),"
+    " os.nice(0)]))"
+)
 ASKS_AS_NOBODY = """
 import json, os
 from tfcompose.launcher.schedule import refused_schedule
-from tfcompose.plan import PlanProcess, Schedule
+from tfcompose.model.plan import PlanProcess, Schedule
 if not os.getuid():
     os.setuid(65534)
 before = os.sched_getscheduler(0)
@@ -57,7 +60,9 @@ def answer(folder: Path, process: PlanProcess) -> list[object]:
     return list(json.loads(output))
 
 
-def test_a_process_runs_on_its_processors_with_its_policy_and_below_its_prefix(tmp_path: Path) -> None:
+def test_a_process_runs_on_its_processors_with_its_policy_and_below_its_prefix(
+    tmp_path: Path,
+) -> None:
     before = os.sched_getaffinity(0), os.sched_getscheduler(0)
     last = max(before[0])
     process = replace(PROCESS, schedule=Schedule((last,), "batch"), prefix=("nice", "-n", "5"))
@@ -79,7 +84,9 @@ def test_what_the_kernel_refuses_is_a_finding_and_nothing_is_started(tmp_path: P
 
 
 @pytest.mark.parametrize("policy", ["batch", "idle"])
-def test_what_asks_the_kernel_keeps_its_own_schedule_without_a_right_to_it(policy: SchedulingPolicy) -> None:
+def test_what_asks_the_kernel_keeps_its_own_schedule_without_a_right_to_it(
+    policy: SchedulingPolicy,
+) -> None:
     """A process without privileges cannot leave the policy idle, once it has it."""
     done = processes.run([sys.executable, "-c", ASKS_AS_NOBODY.format(policy=policy)], check=True)
     assert json.loads(done.stdout) == [None, 0]
@@ -94,7 +101,10 @@ ROBOT = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nprocesses:\n  p: {run: 
 
 
 def test_the_keys_reach_the_plan() -> None:
-    text = ROBOT % "restart: always, restart_delay: 2 s, prefix: gdb -ex 'run fast' --args, schedule: {priority: 80}"
+    text = (
+        ROBOT % "restart: always, restart_delay: 2 s, prefix: gdb -ex 'run fast' --args, schedule:"
+        " {priority: 80}"
+    )
     robot = compile_robot(text, "r.yaml", library()).robot
     assert robot is not None
     process = plan_of(robot).process("p")

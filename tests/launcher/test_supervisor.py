@@ -14,7 +14,10 @@ import pytest
 from tests.support.findings import expect
 from tests.support.launcher import SLEEPER, Launcher, guard, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
-from tfcompose.ipc import (
+from tfcompose.launcher.child import READ_SIZE
+from tfcompose.launcher.state import Times
+from tfcompose.launcher.supervisor import supervise
+from tfcompose.model.messages import (
     GUARD_EVENTS,
     Clear,
     Complete,
@@ -28,10 +31,7 @@ from tfcompose.ipc import (
     Remember,
     Stopping,
 )
-from tfcompose.launcher.child import READ_SIZE
-from tfcompose.launcher.state import Times
-from tfcompose.launcher.supervisor import supervise
-from tfcompose.plan import Plan, PlanProcess, Ready, RosSettings
+from tfcompose.model.plan import Plan, PlanProcess, Ready, RosSettings
 
 #: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
 PARENT = """
@@ -60,11 +60,17 @@ def run(tmp_path: Path, *processes: PlanProcess, **more: Any) -> tuple[int, list
 
 
 def logged(notices: list[Notice], process: str) -> list[str]:
-    return [notice.text for notice in notices if isinstance(notice, LogLine) and notice.process == process]
+    return [
+        notice.text
+        for notice in notices
+        if isinstance(notice, LogLine) and notice.process == process
+    ]
 
 
 @pytest.mark.parametrize("number", [SIGINT, SIGTERM, SIGHUP])
-def test_a_signal_ends_everything_with_0_and_no_process_is_left(launch: Callable[..., Launcher], number: int) -> None:
+def test_a_signal_ends_everything_with_0_and_no_process_is_left(
+    launch: Callable[..., Launcher], number: int
+) -> None:
     launcher = launch(guard(Clear()), program("a", PARENT), program("b", PARENT))
     assert until(lambda: len(launcher.pids()) == 4)
     below = launcher.below()
@@ -77,11 +83,15 @@ def test_a_signal_ends_everything_with_0_and_no_process_is_left(launch: Callable
 
 
 @pytest.mark.parametrize("holder", ["runs", "told", "dead"])
-def test_sigkill_of_the_launcher_takes_its_children_along(launch: Callable[..., Launcher], holder: str) -> None:
+def test_sigkill_of_the_launcher_takes_its_children_along(
+    launch: Callable[..., Launcher], holder: str
+) -> None:
     launcher = launch(program("a", PARENT), program("b", DEAF))
     assert until(lambda: len(launcher.pids()) == 3)
     below, children = launcher.below(), launcher.below()
-    (shell,) = [pid for pid in launcher.below(recursive=False) if psutil.Process(pid).name() == "sh"]
+    (shell,) = [
+        pid for pid in launcher.below(recursive=False) if psutil.Process(pid).name() == "sh"
+    ]
     if "told" in holder:
         os.kill(shell, SIGTERM)
     if "dead" in holder:
@@ -108,8 +118,15 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed(tmp_path: Path) -> No
         if isinstance(notice, LogLine):
             os.kill(os.getpid(), SIGINT)
 
-    assert supervise(plan_of(program("a", DEAF)), tmp_path / "plan.json", report=report, times=times) == 0
-    details = [notice.detail for notice in notices if isinstance(notice, ProcessState) and notice.state == "stopping"]
+    assert (
+        supervise(plan_of(program("a", DEAF)), tmp_path / "plan.json", report=report, times=times)
+        == 0
+    )
+    details = [
+        notice.detail
+        for notice in notices
+        if isinstance(notice, ProcessState) and notice.state == "stopping"
+    ]
     assert [detail.split()[-1] for detail in details] == ["SIGINT", "SIGTERM", "SIGKILL"]
     assert gone(int(logged(notices, "a")[0].split()[1]))
 
@@ -117,20 +134,26 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed(tmp_path: Path) -> No
 def test_what_a_process_leaves_in_its_group_ends_with_it(tmp_path: Path) -> None:
     code, notices = run(tmp_path, program("a", PARENT.replace("time.sleep(180)\n", "")))
     assert code == 0
-    assert until(lambda: gone(int(logged(notices, "a")[0].split()[2])))  # init may still have to bury it
+    assert until(
+        lambda: gone(int(logged(notices, "a")[0].split()[2]))
+    )  # init may still have to bury it
 
 
 def test_a_process_that_left_its_group_is_not_waited_for(tmp_path: Path) -> None:
     code = PARENT.replace("stdout=subprocess.PIPE)", "start_new_session=True)")
     code = code.replace("child.stdout.readline()\n", "").replace("time.sleep(180)\n", "")
-    code = code.replace("print('deaf', flush=True); ", "")  # nobody may read it any more, and that would end it
+    code = code.replace(
+        "print('deaf', flush=True); ", ""
+    )  # nobody may read it any more, and that would end it
     _, notices = run(tmp_path, program("a", code))
     (output,) = [line for line in logged(notices, "a") if line.startswith("pids")]
     assert not gone(int(output.split()[2]))
     os.kill(int(output.split()[2]), SIGKILL)
 
 
-def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(tmp_path: Path) -> None:
+def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(
+    tmp_path: Path,
+) -> None:
     failing = "import sys; [print(i) for i in range(20)]; sys.exit('no lidar at /dev/ttyUSB0')"
     code, notices = run(tmp_path, program("lidar", failing), program("b", SLEEPER))
     (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
@@ -142,12 +165,19 @@ def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(tm
 
 def test_a_process_that_fails_is_started_again(tmp_path: Path) -> None:
     flag = tmp_path / "flag"
-    code = "import os, sys; os.path.exists(sys.argv[1]) or sys.exit(bool(open(sys.argv[1], 'w'))); print('again')"
+    code = (
+        "import os, sys; os.path.exists(sys.argv[1]) or sys.exit(bool(open(sys.argv[1], 'w')));"
+        " print('again')"
+    )
     times = Times(backoff_s=0.05)
-    assert logged(run(tmp_path, program("a", code, str(flag), restart="on-failure"), times=times)[1], "a") == ["again"]
+    assert logged(
+        run(tmp_path, program("a", code, str(flag), restart="on-failure"), times=times)[1], "a"
+    ) == ["again"]
 
 
-def test_a_process_that_floods_neither_fills_the_memory_nor_keeps_the_others_from_being_heard(tmp_path: Path) -> None:
+def test_a_process_that_floods_neither_fills_the_memory_nor_keeps_the_others_from_being_heard(
+    tmp_path: Path,
+) -> None:
     flood = "import os\nwhile True: os.write(1, b'flood\\n' * 1000)"
     endless = "import os\nwhile True: os.write(2, b'x' * 6000)"
     observed = {"a": 0, "b": 0, "c": 0}
@@ -165,13 +195,19 @@ def test_a_process_that_floods_neither_fills_the_memory_nor_keeps_the_others_fro
             handled = observed["a"]
 
     tracemalloc.start()
-    plan = plan_of(program("a", flood), program("b", endless), program("c", "print('heard', flush=True); " + SLEEPER))
+    plan = plan_of(
+        program("a", flood),
+        program("b", endless),
+        program("c", "print('heard', flush=True); " + SLEEPER),
+    )
     assert supervise(plan, tmp_path / "plan.json", report=report, duration_s=60) == 0
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 100 * READ_SIZE
     assert (requested > 10_000, observed["b"] > 10, observed["c"]) == (True, True, 1)
-    assert handled - requested < 3 * READ_SIZE / len("flood\n"), "the flood was read on before a signal was heeded"
+    assert handled - requested < 3 * READ_SIZE / len("flood\n"), (
+        "the flood was read on before a signal was heeded"
+    )
     assert longest == 64 * 1024
 
 
@@ -179,17 +215,25 @@ def test_what_cannot_be_executed_is_named_and_everything_ends_with_1(tmp_path: P
     broken = tmp_path / "broken"
     broken.write_bytes(b"\x7fnothing")
     broken.chmod(0o755)
-    code, notices = run(tmp_path, program("b", SLEEPER), PlanProcess("a", "run", argv=(str(broken),)))
+    code, notices = run(
+        tmp_path, program("b", SLEEPER), PlanProcess("a", "run", argv=(str(broken),))
+    )
     (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert code == 1
     expect(found, "TF808", "a ", "Exec format error", str(broken))
-    assert [notice.state for notice in notices if isinstance(notice, ProcessState) and notice.process == "b"][
-        -1
-    ] == "stopped"
+    assert [
+        notice.state
+        for notice in notices
+        if isinstance(notice, ProcessState) and notice.process == "b"
+    ][-1] == "stopped"
 
 
-def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(tmp_path: Path) -> None:
-    absent = PlanProcess("absent", "run", argv=("${executable:no_package/no_program}",), required=False)
+def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(
+    tmp_path: Path,
+) -> None:
+    absent = PlanProcess(
+        "absent", "run", argv=("${executable:no_package/no_program}",), required=False
+    )
     failing = program("failing", "raise SystemExit(3)", required=False)
     lasting = program("lasting", "import time; time.sleep(0.3); print('to the end')")
     code, notices = run(tmp_path, absent, failing, lasting)
@@ -211,26 +255,46 @@ def test_missing_executables_are_all_reported_before_anything_is_started(tmp_pat
     missing = [PlanProcess(name, "run", argv=(f"no_such_{name}",)) for name in "ab"]
     code, notices = run(tmp_path, program("c", SLEEPER), *missing)
     assert code == 1
-    assert [notice.found.code for notice in notices[:-1] if isinstance(notice, FindingShown)] == ["TF810"]
+    assert [notice.found.code for notice in notices[:-1] if isinstance(notice, FindingShown)] == [
+        "TF810"
+    ]
     assert notices[1:] == [Ended(1)]
 
 
 def test_placeholders_environment_and_folder_are_those_of_the_plan(tmp_path: Path) -> None:
     (tmp_path / "maps").mkdir()
-    code = "import os, sys; print(*sys.argv[1:], os.getcwd(), os.environ['ROS_DOMAIN_ID'], os.environ['MINE'])"
+    code = (
+        "import os, sys; print(*sys.argv[1:], os.getcwd(), os.environ['ROS_DOMAIN_ID'],"
+        " os.environ['MINE'])"
+    )
     words = ("${plan}", "${build_dir}/x", "${params_file}", "${other}")
-    process = program("a", code, *words, cwd="maps", params_file="params/a.yaml", env={"MINE": "1"})
+    process = program(
+        "a", code, *words, cwd="maps", params_file="params/a.yaml", env={"MINE": "1"}
+    )
     plan = Plan("rover", "", None, RosSettings(domain_id=7), (), (process,))
     notices: list[Notice] = []
     supervise(plan, tmp_path / "plan.json", report=notices.append)
-    expected = [tmp_path / "plan.json", tmp_path / "x", tmp_path / "params/a.yaml", "${other}", tmp_path / "maps", 7, 1]
+    expected = [
+        tmp_path / "plan.json",
+        tmp_path / "x",
+        tmp_path / "params/a.yaml",
+        "${other}",
+        tmp_path / "maps",
+        7,
+        1,
+    ]
     assert logged(notices, "a") == [" ".join(map(str, expected))]
 
 
-def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_path: Path) -> None:
+def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(
+    tmp_path: Path,
+) -> None:
     observed = Live("a", ("laser",))
     events = guard(Clear(), "rubbish\n", observed, OwnerReady("a"), Complete(1))
-    a, b = program("a", SLEEPER, owns=(("base_link", "laser"),)), program("b", SLEEPER, after={"a": "ready"})
+    a, b = (
+        program("a", SLEEPER, owns=(("base_link", "laser"),)),
+        program("b", SLEEPER, after={"a": "ready"}),
+    )
     notices: list[Notice] = []
 
     def report(notice: Notice) -> None:
@@ -240,19 +304,31 @@ def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_
 
     def running_b() -> Notice | None:
         return next(
-            (one for one in notices if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "running")),
+            (
+                one
+                for one in notices
+                if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "running")
+            ),
             None,
         )
 
     assert supervise(plan_of(events, b, a), tmp_path / "plan.json", report=report) == 0
-    started = [notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "starting"]
+    started = [
+        notice.process
+        for notice in notices
+        if isinstance(notice, ProcessState) and notice.state == "starting"
+    ]
     assert started == ["guard", "a", "b"]
     assert logged(notices, "guard")[:1] == ["not an event: rubbish"]
 
 
-def test_a_pattern_that_takes_for_ever_is_given_up_and_the_launcher_goes_on(tmp_path: Path) -> None:
+def test_a_pattern_that_takes_for_ever_is_given_up_and_the_launcher_goes_on(
+    tmp_path: Path,
+) -> None:
     """``re`` would need years for this line, and hears no signal meanwhile."""
-    slow = program("slow", f"print('a' * 40 + 'b', flush=True); {SLEEPER}", ready=Ready("log", "(a|aa)+$"))
+    slow = program(
+        "slow", f"print('a' * 40 + 'b', flush=True); {SLEEPER}", ready=Ready("log", "(a|aa)+$")
+    )
     notices: list[Notice] = []
 
     def report(notice: Notice) -> None:
@@ -269,11 +345,15 @@ def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: P
     code, notices = run(tmp_path, guard(end="raise SystemExit('no rclpy')"), program("a", SLEEPER))
     assert code == 1
     assert [
-        notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "starting"
+        notice.process
+        for notice in notices
+        if isinstance(notice, ProcessState) and notice.state == "starting"
     ] == ["guard"]
 
 
-def test_a_guard_that_dies_is_followed_by_one_that_is_given_its_memory_and_leaves_no_descriptor(tmp_path: Path) -> None:
+def test_a_guard_that_dies_is_followed_by_one_that_is_given_its_memory_and_leaves_no_descriptor(
+    tmp_path: Path,
+) -> None:
     code = """
 import os, time
 if "TFCOMPOSE_MEMORY_FD" in os.environ:
@@ -330,7 +410,9 @@ def test_an_error_in_the_launcher_itself_leaves_no_process(tmp_path: Path) -> No
     assert len(pids) == 2
 
 
-def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_many_runs(tmp_path: Path) -> None:
+def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_many_runs(
+    tmp_path: Path,
+) -> None:
     broken = tmp_path / "broken"
     broken.write_bytes(b"\x7fnothing")
     broken.chmod(0o755)
@@ -348,7 +430,9 @@ def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_many_runs
     for i in range(3 * len(plans)):
         run(tmp_path, *plans[i % len(plans)], duration_s=0.01, times=Times(clear_s=0.01))
     assert len(list(Path("/proc/self/fd").iterdir())) == before
-    assert [signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)] == handlers
+    assert [
+        signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)
+    ] == handlers
     signal.signal(SIGTERM, before_all)
     assert signal.set_wakeup_fd(-1) == -1
     assert psutil.Process().children() == []

@@ -20,9 +20,9 @@ import pytest
 from tests.support import processes
 from tests.support.domains import reserved_domain
 from tests.support.waiting import TIMEOUT_S, complete_lines, until
-from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.tf_codec import decode
-from tfcompose.signals import Stop
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import TFSubscription, open_node, wait
+from tfcompose.tf.ros.tf_codec import decode
 
 if TYPE_CHECKING:
     import subprocess
@@ -31,11 +31,12 @@ if TYPE_CHECKING:
 
 #: The ways in which a guard can watch.
 GUARDS = {"watch": "mode: watch", "strict": "mode: strict", "remap": "mode: strict, fence: remap"}
-#: A node that sends edges at 20 Hz, or what is given as ``hex:`` and the bytes of a message in hexadecimal.
+#: A node that sends edges at 20 Hz, or what is given as ``hex:`` and the bytes of a message in
+#: hexadecimal.
 NODE = """
 import os, signal, sys, time
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher, open_node
 words, _, ros = "\\n".join(sys.argv[1:]).partition("\\n--ros-args\\n")
 name, namespace, x, *edges = words.split("\\n")
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
@@ -54,8 +55,8 @@ with open_node(name, namespace, args=ros.split("\\n") if ros else []) as node:
 """
 _FLOOD = """
 import signal, sys, time
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Template
+from tfcompose.tf.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 template = Template([(f"f00000000_{{i:05}}", f"f00000000_{{i + 1:05}}") for i in range({count})])
 with open_node("flood", "/") as node:
@@ -101,12 +102,19 @@ class Child:
 class Robot:
     """A running robot with an owner /slam of map → odom, drive of odom → base_link, and further children."""
 
-    def __init__(self, folder: Path, guard: str, children: Mapping[str, Child], env: Mapping[str, str]) -> None:
+    def __init__(
+        self, folder: Path, guard: str, children: Mapping[str, Child], env: Mapping[str, str]
+    ) -> None:
         (folder / "node.py").write_text(NODE, encoding="utf-8")
         self.folder, self.env, self.output = folder, dict(env), folder / "output.txt"
         self.guard = guard
         lines = [
-            *("tfcompose: 1", "robot: liars", "ros: {discovery: localhost}", "links: {base_link: {}}"),
+            *(
+                "tfcompose: 1",
+                "robot: liars",
+                "ros: {discovery: localhost}",
+                "links: {base_link: {}}",
+            ),
             f"guard: {{{GUARDS[guard]}}}",
             *(
                 "frames:",
@@ -143,7 +151,11 @@ class Robot:
         """Wait for a line with all these words behind so many lines, and return it."""
 
         def found() -> list[str]:
-            return [line for line in complete_lines(self.output)[after:] if all(word in line for word in words)]
+            return [
+                line
+                for line in complete_lines(self.output)[after:]
+                if all(word in line for word in words)
+            ]
 
         until(lambda: found() or self.popen.poll() is not None)
         assert found(), (words, self.text)
@@ -159,7 +171,9 @@ class Robot:
         """Start a program beside the robot."""
         out = (self.folder / "rogue.txt").open("wb")
         with out:
-            return processes.start(command, cwd=self.folder, env=self.env | env, stdout=out, stderr=out)
+            return processes.start(
+                command, cwd=self.folder, env=self.env | env, stdout=out, stderr=out
+            )
 
     @staticmethod
     def stop(started: subprocess.Popen[str]) -> None:
@@ -192,7 +206,12 @@ def running(folder: Path, guard: str, children: Mapping[str, Child]) -> Iterator
             patch.setenv(name, str(folder / name))
         patch.setenv("ROS_DOMAIN_ID", str(domain))
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        robot = Robot(folder, guard, children, os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))})
+        robot = Robot(
+            folder,
+            guard,
+            children,
+            os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
         try:
             yield robot
         finally:

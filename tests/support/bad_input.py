@@ -12,8 +12,15 @@ def nested_aliases() -> str:
 
 
 def small_bomb() -> str:
-    lines = ["tfcompose: 1", "robot: r", "x-a0: &a0 {a: 1, b: 1, c: 1, d: 1, e: 1, f: 1, g: 1, h: 1, i: 1}"]
-    lines += [f"x-a{n + 1}: &a{n + 1} {{{', '.join(f'{k}: *a{n}' for k in 'abcdefghi')}}}" for n in range(30)]
+    lines = [
+        "tfcompose: 1",
+        "robot: r",
+        "x-a0: &a0 {a: 1, b: 1, c: 1, d: 1, e: 1, f: 1, g: 1, h: 1, i: 1}",
+    ]
+    lines += [
+        f"x-a{n + 1}: &a{n + 1} {{{', '.join(f'{k}: *a{n}' for k in 'abcdefghi')}}}"
+        for n in range(30)
+    ]
     return "\n".join([*lines, "links: *a30", ""])
 
 
@@ -31,9 +38,24 @@ BAD: dict[str, tuple[bytes, str, tuple[int, int], int]] = {  # text, code, place
     "aliases, small": (small_bomb().encode(), "TF008", (8, 7), 1),
     "depth": (b"tfcompose: 1\nrobot: " + b"[" * 100_000, "TF008", (2, 47), 1),
     "an anchor that is not there": (b"tfcompose: 1\nrobot: *r\n", "TF002", (2, 8), 1),
-    "a name with quotes": (GOOD.encode() + b"frames: {'\"q\"': {parent: base_link}}\n", "TF501", (4, 10), 1),
-    "a name with &": (GOOD.encode() + b"frames: {a&b: {parent: base_link}}\n", "TF501", (4, 10), 1),
-    "NaN": (GOOD.encode() + b"frames: {a: {parent: base_link, xyz: [.nan, 0, 0]}}\n", "TF007", (4, 39), 1),
+    "a name with quotes": (
+        GOOD.encode() + b"frames: {'\"q\"': {parent: base_link}}\n",
+        "TF501",
+        (4, 10),
+        1,
+    ),
+    "a name with &": (
+        GOOD.encode() + b"frames: {a&b: {parent: base_link}}\n",
+        "TF501",
+        (4, 10),
+        1,
+    ),
+    "NaN": (
+        GOOD.encode() + b"frames: {a: {parent: base_link, xyz: [.nan, 0, 0]}}\n",
+        "TF007",
+        (4, 39),
+        1,
+    ),
     "a preset that is not there": (
         GOOD.encode() + b"sensors: {a: {parent: base_link, preset: generic/lidar}}\n",
         "TF601",
@@ -41,7 +63,8 @@ BAD: dict[str, tuple[bytes, str, tuple[int, int], int]] = {  # text, code, place
         1,
     ),
     "a process named as a path": (
-        GOOD.encode() + b"processes: {../../x: {run: {package: a, executable: b}, params: {c: 1}}}\n",
+        GOOD.encode()
+        + b"processes: {../../x: {run: {package: a, executable: b}, params: {c: 1}}}\n",
         "TF501",
         (4, 13),
         1,

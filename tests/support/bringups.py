@@ -11,11 +11,11 @@ from tests.support.importing import PRESETS
 from tfcompose.cli import main
 from tfcompose.cli.compiling import disk
 from tfcompose.cli.reading import read_text
-from tfcompose.compile import Compiled, compile_robot
-from tfcompose.findings import Span
-from tfcompose.language import Given, GivenArg
-from tfcompose.load import load
-from tfcompose.model import AsInFile, Robot
+from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.foundation.findings import Span
+from tfcompose.model.robot import AsInFile, Robot
+from tfcompose.spec.language import Given, GivenArg
+from tfcompose.spec.load import load
 
 #: What a build writes of the parameters of a process.
 _PARAMETER_FILE = re.compile(r"/[^ ]*/params/\w+\.yaml")
@@ -33,7 +33,9 @@ def import_of(source: Path, *words: str, code: int | None = 0) -> tuple[str, dic
 def compiled(text: str, folder: Path, **args: str) -> Compiled:
     """Compile a robot file with the values of its arguments."""
     given = Given({name: GivenArg(value, Span("test")) for name, value in args.items()})
-    return compile_robot(text, str(folder / "imported.yaml"), PRESETS, read=read_text, disk=disk(), given=given)
+    return compile_robot(
+        text, str(folder / "imported.yaml"), PRESETS, read=read_text, disk=disk(), given=given
+    )
 
 
 def exported(robot: Path, out: Path) -> Path:
@@ -53,7 +55,11 @@ def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
     """Return parameters by their full names."""
     several: dict[str, Any] = {}
     for key, value in params.items():
-        several |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _as_read(value)}
+        several |= (
+            flat(value, f"{above}{key}.")
+            if isinstance(value, dict)
+            else {f"{above}{key}": _as_read(value)}
+        )
     return several
 
 
@@ -67,7 +73,9 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
         params = flat(process.ros_nodes[0].params) if process.ros_nodes else {}
         if process.component:
             (container,) = (
-                one for one in robot.processes if process.component and one.name == process.component.container
+                one
+                for one in robot.processes
+                if process.component and one.name == process.component.container
             )
             several[process.name] = {
                 "program": f"{process.component.package}/{process.component.plugin}",
@@ -79,19 +87,35 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
             }
         if process.kind != "run":
             continue
-        program = f"{process.package}/{process.executable}" if process.package else process.launch or process.argv[0]
+        program = (
+            f"{process.package}/{process.executable}"
+            if process.package
+            else process.launch or process.argv[0]
+        )
         own = process.package or process.launch
         same = sum(one["program"] == program for one in several.values())
         several[f"{program} {same}" if process.launch else process.name] = {
             "program": program,
             "words": [
-                _PARAMETER_FILE.sub("${params_file}", word) for word in (process.argv if own else process.argv[1:])
+                _PARAMETER_FILE.sub("${params_file}", word)
+                for word in (process.argv if own else process.argv[1:])
             ],
-            "namespace": process.ros_nodes[0].name.rpartition("/")[0].strip("/") if process.package else "",
+            "namespace": (
+                process.ros_nodes[0].name.rpartition("/")[0].strip("/") if process.package else ""
+            ),
             "remap": process.remap,
             "env": process.env,
-            "output": (process.output, process.emulate_tty, process.stop.timeout_s, process.stop.kill_timeout_s),
-            "params": {} if process.launch else {key: repr(value) for key, value in sorted(params.items())},
+            "output": (
+                process.output,
+                process.emulate_tty,
+                process.stop.timeout_s,
+                process.stop.kill_timeout_s,
+            ),
+            "params": (
+                {}
+                if process.launch
+                else {key: repr(value) for key, value in sorted(params.items())}
+            ),
         }
     return several
 

@@ -18,11 +18,19 @@ def tfcompose(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]
     return done
 
 
-def tfcompose_in(folder: Path, *words: object, **environment: str) -> subprocess.CompletedProcess[str]:
+def tfcompose_in(
+    folder: Path, *words: object, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Run a command in this folder, with these variables too; return how it ended, and what it printed."""
-    output, errors = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    output, errors = (
+        io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2)
+    )
     texts = [str(word) for word in words]
-    for remembered in (reading._lines, compiling._is_pointer, compiling.moments):  # of files by names that are relative
+    for remembered in (
+        reading._lines,
+        compiling._is_pointer,
+        compiling.moments,
+    ):  # of files by names that are relative
         remembered.cache_clear()
     streams = contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors)
     with inside(folder), mock.patch.dict(os.environ, environment), streams[0], streams[1]:

@@ -1,7 +1,7 @@
 """An interface package ``composition_interfaces``, made by the rosidl generators of PyPI, for a container of the tests.
 
-PyPI has no such package, and rclpy needs compiled type support: a C compiler makes it, of the fields that the services
-of rclcpp_components have. One library holds all of it.
+PyPI has no such package, and rclpy needs compiled type support: a C compiler makes it, of the
+fields that the services of rclcpp_components have. One library holds all of it.
 """
 
 import fcntl
@@ -87,7 +87,9 @@ def _generate(folder: Path) -> None:
             f"struct {service}_{part} {{ {fields} }}; "
             for part, fields in (("Request", request), ("Response", response))
         )
-        includes = '#include "rcl_interfaces/msg/Parameter.idl"\n' if "rcl_interfaces" in request else ""
+        includes = (
+            '#include "rcl_interfaces/msg/Parameter.idl"\n' if "rcl_interfaces" in request else ""
+        )
         file.write_text(f"{includes}module {NAME} {{ module srv {{ {parts} }}; }};\n")
         sources.append(f"srv/{service}.idl")
     share = f"{sys.prefix}/share"
@@ -106,7 +108,11 @@ def _compile(folder: Path) -> None:
     for source in [*sorted(package.rglob("*.c")), *sorted(package.rglob("*.cpp"))]:
         objects.append(f"{source}.o")
         compiler = "gcc" if source.suffix == ".c" else "g++"
-        subprocess.run([compiler, "-c", *flags, str(source), "-o", objects[-1]], check=True, capture_output=True)
+        subprocess.run(
+            [compiler, "-c", *flags, str(source), "-o", objects[-1]],
+            check=True,
+            capture_output=True,
+        )
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
     library = package / f"{NAME}_s__rosidl_typesupport_c{suffix}"
     at = f"{sys.prefix}/lib"

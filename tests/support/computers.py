@@ -1,7 +1,8 @@
 """Computers for tests of deploy: namespaces with a network, a process table and an sshd of their own.
 
-Each has an address in a network that only these computers are in, a home, a runtime directory and shared memory. One
-more, the office, is where commands run. systemd does not run in them: a stand-in for systemctl starts units.
+Each has an address in a network that only these computers are in, a home, a runtime directory and
+shared memory. One more, the office, is where commands run. systemd does not run in them: a
+stand-in for systemctl starts units.
 """
 
 from __future__ import annotations
@@ -29,13 +30,15 @@ if TYPE_CHECKING:
 
 PROGRAMS = Path(__file__).with_name("host_programs")
 SSHD = shutil.which("sshd", path="/usr/sbin:/sbin:/usr/bin")
-#: A time that is two seconds ahead, for the Python of a computer; a namespace cannot have another wall clock.
+#: A time that is two seconds ahead, for the Python of a computer; a namespace cannot have another
+#: wall clock.
 SHIFTED = "import time\n_time = time.time\ntime.time = lambda: _time() + 2\n"
 #: What a computer has of its own; nothing of it outlives the process, nor that who started it.
 _NAMESPACES = (
     "unshare", "--net", "--pid", "--mount", "--uts", "--ipc", "--fork", "--kill-child", "--mount-proc",
 )  # fmt: skip
-#: Makes the namespaces, and says so on standard output; then becomes sshd, or whatever it is given.
+#: Makes the namespaces, and says so on standard output; then becomes sshd, or whatever it is
+#: given.
 _INIT = """
 set -e
 mount --make-rprivate /
@@ -55,10 +58,16 @@ def missing() -> str:
     """Return what this machine lacks to have such computers; empty if it lacks nothing."""
     if SSHD is None:
         return "no sshd"
-    lacking = [name for name in ("ip", "nsenter", "setpriv", "ssh-keygen", "unshare") if shutil.which(name) is None]
+    lacking = [
+        name
+        for name in ("ip", "nsenter", "setpriv", "ssh-keygen", "unshare")
+        if shutil.which(name) is None
+    ]
     if lacking:
         return f"no {lacking[0]}"
-    tried = processes.run(["unshare", "--net", "ip", "link", "add", "name", "br0", "type", "bridge"])
+    tried = processes.run(
+        ["unshare", "--net", "ip", "link", "add", "name", "br0", "type", "bridge"]
+    )
     return "" if tried.returncode == 0 else "no right to make network namespaces"
 
 
@@ -88,14 +97,18 @@ class Computer:
     def inside(self) -> int:
         """Return the process number, here, of its first process."""
         assert self.process is not None
-        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        children = (
+            Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        )
         return int(children[0]) if children else 0
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Run a program on it, as its user."""
         env = shlex.join(f"{name}={value}" for name, value in self.environment().items())
         script = f"exec env -i {env} {shlex.join(words)}"
-        return processes.run(["nsenter", "-t", str(self.inside()), "-a", "sh", "-c", script], check=False)
+        return processes.run(
+            ["nsenter", "-t", str(self.inside()), "-a", "sh", "-c", script], check=False
+        )
 
     def environment(self) -> dict[str, str]:
         """Return the environment of its user."""
@@ -132,7 +145,10 @@ class Computers:
         key = self.home / ".ssh/id_ed25519"
         for file in (key, self.folder / "host_key"):
             processes.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", file], check=True)
-        bridge = "ip link add br0 type bridge mcast_snooping 0; ip addr add 10.77.0.1/24 dev br0; ip link set br0 up"
+        bridge = (
+            "ip link add br0 type bridge mcast_snooping 0; ip addr add 10.77.0.1/24 dev br0; ip"
+            " link set br0 up"
+        )
         self.office = self._started("office", bridge, ["sleep", "infinity"])
         try:
             for number, name in enumerate(self.names):
@@ -164,19 +180,29 @@ class Computers:
         one = self.computers[name]
         one.home.mkdir(parents=True, exist_ok=True)
         config = one.folder / "sshd_config"
-        environment = " ".join(f'"{variable}={value}"' for variable, value in one.environment().items())
-        config.write_text(
-            f"ListenAddress {one.address}\nPort {self.port}\nHostKey {self.folder / 'host_key'}\nPidFile none\n"
-            f"AuthorizedKeysFile {self.home / '.ssh/id_ed25519.pub'}\nStrictModes no\nUsePAM no\n"
-            f"PasswordAuthentication no\nSetEnv {environment}\n"
+        environment = " ".join(
+            f'"{variable}={value}"' for variable, value in one.environment().items()
         )
-        until_linked = "while ! ip addr add {0}/24 dev eth0 2>/dev/null; do sleep 0.02; done; ip link set eth0 up"
+        config.write_text(
+            f"ListenAddress {one.address}\nPort {self.port}\nHostKey"
+            f" {self.folder / 'host_key'}\nPidFile none\nAuthorizedKeysFile"
+            f" {self.home / '.ssh/id_ed25519.pub'}\nStrictModes no\nUsePAM"
+            f" no\nPasswordAuthentication no\nSetEnv {environment}\n"
+        )
+        until_linked = (
+            "while ! ip addr add {0}/24 dev eth0 2>/dev/null; do sleep 0.02; done; ip link set"
+            " eth0 up"
+        )
         run = f"mkdir -m 700 /run/{name}"
         assert SSHD
         words = [SSHD, "-D", "-e", "-f", str(config)]
-        one.process = self._started(name, f"{run}; echo linked; {until_linked.format(one.address)}", words, one)
+        one.process = self._started(
+            name, f"{run}; echo linked; {until_linked.format(one.address)}", words, one
+        )
         answers = ["timeout", "1", "bash", "-c", f"</dev/tcp/{one.address}/{self.port}"]
-        assert until(lambda: self.office_run(*answers).returncode == 0), (self.folder / f"{name}.log").read_text()
+        assert until(lambda: self.office_run(*answers).returncode == 0), (
+            self.folder / f"{name}.log"
+        ).read_text()
         one.run("systemctl", "--user", "boot")
 
     def _started(
@@ -194,22 +220,42 @@ class Computers:
         line = process.stdout.readline()
         if computer is not None:
             computer.process = process
-            hardware = f"02:00:00:00:00:{computer.address.rpartition('.')[2]:0>2}"  # the same after each boot
-            link = ["ip", "link", "add", f"to-{name}", "type", "veth", "peer", "name", "eth0", "address", hardware]
+            hardware = (  # the same after each boot
+                f"02:00:00:00:00:{computer.address.rpartition('.')[2]:0>2}"
+            )
+            link = [
+                "ip",
+                "link",
+                "add",
+                f"to-{name}",
+                "type",
+                "veth",
+                "peer",
+                "name",
+                "eth0",
+                "address",
+                hardware,
+            ]
             self.office_run(*link, "netns", str(computer.inside()))
             self.office_run("ip", "link", "set", f"to-{name}", "master", "br0", "up")
             line = process.stdout.readline()
         assert line == "ready\n", (self.folder / f"{name}.log").read_text()
         return process
 
-    def office_run(self, *words: str, timeout_s: float = 2 * TIMEOUT_S) -> subprocess.CompletedProcess[str]:
+    def office_run(
+        self, *words: str, timeout_s: float = 2 * TIMEOUT_S
+    ) -> subprocess.CompletedProcess[str]:
         """Run a program in the office."""
-        return processes.run(self.in_office(*words), env=self.environment(), check=False, timeout_s=timeout_s)
+        return processes.run(
+            self.in_office(*words), env=self.environment(), check=False, timeout_s=timeout_s
+        )
 
     def in_office(self, *words: str) -> list[str]:
         """Return the command that runs a program in the office's network."""
         assert self.office is not None
-        children = Path(f"/proc/{self.office.pid}/task/{self.office.pid}/children").read_text().split()
+        children = (
+            Path(f"/proc/{self.office.pid}/task/{self.office.pid}/children").read_text().split()
+        )
         return ["nsenter", "-t", children[0], "--net", *words]
 
     def environment(self) -> dict[str, str]:

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tests.support.plans import compiled_plan
-from tfcompose.deploy.connection import LostError, RefusedError
-from tfcompose.deploy.release import Release
-from tfcompose.deploy.rollout import Rollout, Share, target_of
-from tfcompose.deploy.unit import Unit
-from tfcompose.plan.file import write_plan
+from tfcompose.model.plan.file import write_plan
+from tfcompose.tools.deploy.connection import LostError, RefusedError
+from tfcompose.tools.deploy.release import Release
+from tfcompose.tools.deploy.rollout import Rollout, Share, target_of
+from tfcompose.tools.deploy.unit import Unit
 
 if TYPE_CHECKING:
-    from tfcompose.deploy.connection import Host
+    from tfcompose.tools.deploy.connection import Host
 
 ROBOT = """
 tfcompose: 1
@@ -74,7 +74,9 @@ class StandInHost:
         return self.offset_s
 
 
-def rollout_to(*hosts: StandInHost, text: str = ROBOT, probes: dict[str, dict[str, Any]] | None = None) -> Rollout:
+def rollout_to(
+    *hosts: StandInHost, text: str = ROBOT, probes: dict[str, dict[str, Any]] | None = None
+) -> Rollout:
     """Return a deployment of the robot to these hosts."""
     plan = compiled_plan(text)
     target = target_of(plan, [], {}, timeout_s=0.01)

@@ -8,13 +8,24 @@ from typing import Any
 
 from tests.support import processes
 
-#: So long it is looked, again and again: where much else runs, publishers are found late, and late in truth.
+#: So long it is looked, again and again: where much else runs, publishers are found late, and late
+#: in truth.
 OBSERVE_S = (3.0, 3.0, 3.0, 6.0, 12.0, 12.0, 12.0)
 
 
 def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
     """Run it, and return the exit code and the findings."""
-    command = [sys.executable, "-m", "tfcompose", "doctor", "--for", str(seconds), "--format", "json", *words]
+    command = [
+        sys.executable,
+        "-m",
+        "tfcompose",
+        "doctor",
+        "--for",
+        str(seconds),
+        "--format",
+        "json",
+        *words,
+    ]
     done = processes.run(command)
     assert "Traceback" not in done.stderr, done.stderr
     return done.returncode, json.loads(done.stdout)
@@ -43,10 +54,14 @@ def at_last(claim: Callable[[float], None]) -> None:
     return claim(OBSERVE_S[-1])
 
 
-def finds(found: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], others: set[str]) -> bool:
+def finds(
+    found: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], others: set[str]
+) -> bool:
     """Return whether these codes were found, each with all its names, and no others but ``others``."""
     codes = {one["code"] for one in found}
-    named = (name in messages_of(found, code) for code, names in expected.items() for name in names)
+    named = (
+        name in messages_of(found, code) for code, names in expected.items() for name in names
+    )
     return codes >= expected.keys() and codes <= {*expected, *others} and all(named)
 
 
@@ -55,5 +70,6 @@ def messages_of(found: list[dict[str, Any]], code: str) -> str:
     assert code in {one["code"] for one in found}, found
     parts = [one for one in found if one["code"] == code]
     return "\n".join(
-        "\n".join([one["message"], *(note["message"] for note in one["notes"]), one["help"]]) for one in parts
+        "\n".join([one["message"], *(note["message"] for note in one["notes"]), one["help"]])
+        for one in parts
     )

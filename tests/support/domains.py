@@ -42,7 +42,9 @@ def reserved_domain() -> Iterator[int]:
     for _ in domains:
         number = domains[next(_WINDOW) % len(domains)]
         try:
-            descriptor = _opened(Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock")
+            descriptor = _opened(
+                Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock"
+            )
         except PermissionError:  # of a user who lets nobody read it
             continue
         try:

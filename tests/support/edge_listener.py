@@ -5,9 +5,9 @@ from itertools import pairwise
 
 from typing_extensions import Self
 
-from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.tf_codec import decode
-from tfcompose.signals import Stop
+from tfcompose.foundation.signals import Stop
+from tfcompose.tf.ros.node import TFSubscription, open_node, wait
+from tfcompose.tf.ros.tf_codec import decode
 
 
 class EdgeListener:
@@ -29,7 +29,12 @@ class EdgeListener:
 
     def longest_gap_s(self) -> float:
         """Return the longest time between two messages; infinite where nothing was heard."""
-        return max((after - before for before, after in pairwise(self._sent_ns)), default=float("inf")) / 1e9
+        return (
+            max(
+                (after - before for before, after in pairwise(self._sent_ns)), default=float("inf")
+            )
+            / 1e9
+        )
 
     def _hear(self) -> None:
         with open_node("witness", "") as node:

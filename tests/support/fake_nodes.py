@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from tfcompose.ros.node import TFPublisher, open_node
-from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.tf.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.typesupport import tf_message_type
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
@@ -49,7 +49,9 @@ class FakeNodes:
         publisher = self.keep(node.create_publisher(tf_message_type(), topic, profile))
         self.every(10, lambda now: publisher.publish(message(now, edges)))
 
-    def typed(self, node: Any, kind: Any, topic: str, make: Callable[[int], Any], hz: float = 20.0) -> None:
+    def typed(
+        self, node: Any, kind: Any, topic: str, make: Callable[[int], Any], hz: float = 20.0
+    ) -> None:
         publisher = self.keep(node.create_publisher(kind, topic, 10))
         self.every(hz, lambda now: publisher.publish(make(now)))
 
@@ -74,12 +76,21 @@ class FakeNodes:
 
 def message(stamp_ns: int, edges: tuple[str, ...], x: float = 0.0, quat: Any = IDENTITY) -> bytes:
     pairs = [edge.split() for edge in edges]
-    return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), quat) for parent, child in pairs])
+    return encode(
+        [Transform(stamp_ns, parent, child, (x, 0.0, 0.0), quat) for parent, child in pairs]
+    )
 
 
 @contextmanager
 def sending(  # noqa: PLR0913 (all but three are named)
-    name: str, parent: str, child: str, *, rate: float, late_s: float = 0.0, topic: str = "/tf", bad: bytes = b""
+    name: str,
+    parent: str,
+    child: str,
+    *,
+    rate: float,
+    late_s: float = 0.0,
+    topic: str = "/tf",
+    bad: bytes = b"",
 ) -> Iterator[Callable[[], float]]:
     """Send an edge from a node of this name, stamped ``late_s`` ago, and from time to time the ``bad`` message.
 
@@ -94,7 +105,9 @@ def sending(  # noqa: PLR0913 (all but three are named)
             due += 1 / rate
             sent += 1
             stamp_ns = time.time_ns() - int(late_s * 1e9)
-            publisher.publish(encode([Transform(stamp_ns, parent, child, (1.0, 0.0, 0.0), IDENTITY)]))
+            publisher.publish(
+                encode([Transform(stamp_ns, parent, child, (1.0, 0.0, 0.0), IDENTITY)])
+            )
             if bad:
                 publisher.publish(bad)
 

@@ -1,6 +1,6 @@
 """What a finding names. How it says so stands in tests/golden/wording."""
 
-from tfcompose.findings import Finding
+from tfcompose.foundation.findings import Finding
 
 
 def words(found: Finding) -> set[str]:

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from tests.support.zenoh_peers import free_port, session
-from tfcompose.fleet.share import Sender
-from tfcompose.language.validate import validate_fleet
-from tfcompose.load import load
-from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.spec.language.validate import validate_fleet
+from tfcompose.spec.load import load
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tools.fleet.share import Sender
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.language.fleet import FleetSpec
+    from tfcompose.spec.language.fleet import FleetSpec
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
@@ -150,7 +150,9 @@ class Link:
                 far = socket.create_connection((self._to[0], int(self._to[1])))
                 self._open += [near, far]
                 for source, sink in ((near, far), (far, near)):
-                    threading.Thread(target=self._pass_on, args=(source, sink), daemon=True).start()
+                    threading.Thread(
+                        target=self._pass_on, args=(source, sink), daemon=True
+                    ).start()
 
     def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
         with suppress(OSError):

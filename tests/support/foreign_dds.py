@@ -1,6 +1,7 @@
 """A publisher of TF of another vendor's DDS, and no ROS node: ``python -m tests.support.foreign_dds X EDGE…``.
 
-It sends the edges, each ``parent child``, at 20 Hz, with X as x. TOPIC and PARTITION are taken from the environment.
+It sends the edges, each ``parent child``, at 20 Hz, with X as x. TOPIC and PARTITION are taken
+from the environment.
 """
 
 import os
@@ -102,7 +103,9 @@ def main(x: float, *edges: str) -> None:
         stamp = Time(*divmod(time.time_ns(), 1_000_000_000))
         pose = Transform(Vector3(x, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
         pairs = [edge.split() for edge in edges]
-        transforms: Any = [TransformStamped(Header(stamp, one), other, pose) for one, other in pairs]
+        transforms: Any = [
+            TransformStamped(Header(stamp, one), other, pose) for one, other in pairs
+        ]
         writer.write(TFMessage(transforms))
         time.sleep(0.05)
     del writer, publisher, topic, participant, domain  # it takes its leave

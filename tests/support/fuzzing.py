@@ -1,7 +1,7 @@
 """Mutated inputs for whatever reads what others wrote; each is read, or refused as it should be, in bounded time.
 
-``python -m tests.support.fuzzing COUNT SEED`` tries so many inputs of each kind, and keeps those that end otherwise in
-``tests/fuzz/corpus``, where the tests try them from then on.
+``python -m tests.support.fuzzing COUNT SEED`` tries so many inputs of each kind, and keeps those
+that end otherwise in ``tests/fuzz/corpus``, where the tests try them from then on.
 """
 
 import hashlib
@@ -21,20 +21,20 @@ from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.dry_run import _lines as plan_lines
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import printable
-from tfcompose.compile import compile_robot
-from tfcompose.emit import emit
-from tfcompose.export.kubernetes import Cluster, files_of, kubernetes
-from tfcompose.export.launch import launch
-from tfcompose.export.supervisors import Machine, compose, systemd
-from tfcompose.findings import Finding, RejectedError
-from tfcompose.ipc import GUARD_EVENTS, GUARD_ORDERS, REQUESTS, read_notice
-from tfcompose.load.params import load_params
-from tfcompose.plan.file import read_plan
-from tfcompose.render.formats import render_github, render_json, render_sarif
-from tfcompose.render.text import render_text
-from tfcompose.ros.tf_codec import Decoder, decode
-from tfcompose.urdf.lint import lint_urdf
-from tfcompose.urdf.packages import Packages
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.emit import emit
+from tfcompose.compiler.render.formats import render_github, render_json, render_sarif
+from tfcompose.compiler.render.text import render_text
+from tfcompose.compiler.urdf.lint import lint_urdf
+from tfcompose.compiler.urdf.packages import Packages
+from tfcompose.foundation.findings import Finding, RejectedError
+from tfcompose.model.messages import GUARD_EVENTS, GUARD_ORDERS, REQUESTS, read_notice
+from tfcompose.model.plan.file import read_plan
+from tfcompose.spec.load.params import load_params
+from tfcompose.tf.ros.tf_codec import Decoder, decode
+from tfcompose.tools.exporters.kubernetes import Cluster, files_of, kubernetes
+from tfcompose.tools.exporters.launch import launch
+from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus"
 #: Processor time that an input may take, in seconds.
@@ -131,8 +131,8 @@ def calibration(data: bytes, folder: Path) -> None:
     """A calibration file, and the robot that it is about."""
     (folder / "kit.calib").write_bytes(data)
     (folder / "calibrated.yaml").write_text(
-        "tfcompose: 1\nrobot: r\ncalibrations: [kit.calib]\nlinks: {base_link: {}}\n"
-        "frames: {tool0: {parent: base_link}, eye: {parent: tool0, calibration: {file: kit.calib}}}\n",
+        "tfcompose: 1\nrobot: r\ncalibrations: [kit.calib]\nlinks: {base_link: {}}\nframes:"
+        " {tool0: {parent: base_link}, eye: {parent: tool0, calibration: {file: kit.calib}}}\n",
         "utf-8",
     )
     _compiled(folder / "calibrated.yaml")
@@ -166,7 +166,8 @@ def plan(data: bytes, folder: Path) -> None:
     """A built plan: reviewed and exported, if it is one."""
     try:
         one = read_plan(
-            data.decode("utf-8", "surrogatepass" if len(data) % 2 else "replace"), str(folder / "plan.json")
+            data.decode("utf-8", "surrogatepass" if len(data) % 2 else "replace"),
+            str(folder / "plan.json"),
         )
     except RejectedError as error:
         _shown(list(error.findings))
@@ -288,7 +289,9 @@ def main(count: int, seed: int) -> int:
                     sys.stderr.write(f"{_kept(kind, data)}\n{fault}\n")
             failures += len(found)
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-            sys.stdout.write(f"{kind.name}: {tried} inputs, {len(found)} faults; peak memory {peak} MB\n")
+            sys.stdout.write(
+                f"{kind.name}: {tried} inputs, {len(found)} faults; peak memory {peak} MB\n"
+            )
             sys.stdout.flush()
     return failures
 

@@ -18,7 +18,9 @@ def compare(folder: Path, texts: Mapping[str, str]) -> None:
     difference: list[str] = []
     for name, text in texts.items():
         golden = (folder / f"{name}.txt").read_text("utf-8").splitlines(keepends=True)
-        difference += difflib.unified_diff(golden, text.splitlines(keepends=True), f"golden {name}", "now", n=0)
+        difference += difflib.unified_diff(
+            golden, text.splitlines(keepends=True), f"golden {name}", "now", n=0
+        )
     if difference:
         pytest.fail(f"{len(difference)} lines of difference\n{''.join(difference)}", pytrace=False)
 

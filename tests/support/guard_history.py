@@ -6,17 +6,25 @@ import json
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.geometry import Pose
+from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
-from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken, Unfenced
-from tfcompose.live.publishers import Message, OtherRun
-from tfcompose.live.publishers import Publisher as TFPublisher
-from tfcompose.plan import GuardPolicy, Plan, PlanClaim, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.plan.codec import decode, encode
+from tfcompose.model.messages import Clear, Found, GuardEvent, Recovered, Taken, Unfenced
+from tfcompose.model.plan import (
+    GuardPolicy,
+    Plan,
+    PlanClaim,
+    PlanEdge,
+    PlanProcess,
+    RosSettings,
+    SourceLine,
+)
+from tfcompose.model.plan.codec import decode, encode
+from tfcompose.tf.live.publishers import Message, OtherRun
+from tfcompose.tf.live.publishers import Publisher as TFPublisher
 
 if TYPE_CHECKING:
-    from tfcompose.findings import Finding
-    from tfcompose.plan import Clock, EdgeKind
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.plan import Clock, EdgeKind
 
 
 TICK_S = 0.1
@@ -25,9 +33,13 @@ TICK_S = 0.1
 SETTLE_S = 1.0
 
 
-def edge(names: str, owner: str, kind: EdgeKind = "dynamic", rate: float | None = None) -> PlanEdge:
+def edge(
+    names: str, owner: str, kind: EdgeKind = "dynamic", rate: float | None = None
+) -> PlanEdge:
     parent, child = names.split()
-    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, SourceLine("rover.yaml", 7))
+    return PlanEdge(
+        parent, child, kind, owner, f"/{owner}", Pose(), rate, SourceLine("rover.yaml", 7)
+    )
 
 
 EDGES = (
@@ -91,7 +103,16 @@ class History:
 
     def __post_init__(self) -> None:
         settings = RosSettings(clock=self.clock)
-        plan = Plan("rover", "0", "base", settings, self.edges, self.processes, self.guard, claims=self.claims)
+        plan = Plan(
+            "rover",
+            "0",
+            "base",
+            settings,
+            self.edges,
+            self.processes,
+            self.guard,
+            claims=self.claims,
+        )
         self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns(), says_who=self.says_who)
         self.ticked = self.now
 
@@ -109,8 +130,8 @@ class History:
     ) -> Publisher:
         """Let a publisher come; one that is hidden is not in the graph yet.
 
-        ``process`` is the plan's process that it is seen to be of, empty: one that is not of this run; None: its
-        process cannot be seen.
+        ``process`` is the plan's process that it is seen to be of, empty: one that is not of this
+        run; None: its process cannot be seen.
         """
         self.made += 1
         ours = None if process is None else bool(process)
@@ -136,7 +157,11 @@ class History:
         publisher.sent += 1
         pairs = tuple((names.split()[0], names.split()[1]) for names in edges.split(", "))
         kind = publisher.static if static is None else static
-        gid = (publisher.gid if self.says_who else publisher.gid[:8] + bytes(8)) if self.gids else None
+        gid = (
+            (publisher.gid if self.says_who else publisher.gid[:8] + bytes(8))
+            if self.gids
+            else None
+        )
         sent_ns = self.wall_ns() - round(ago * 1e9)
         stamps = () if stamp_s is None else (round(stamp_s * 1e9),) * len(pairs)
         message = Message(pairs, kind, gid, sent_ns, publisher.sent, stamps, self.wall_ns())
@@ -191,7 +216,9 @@ class History:
         return self
 
     def found(self) -> list[Finding]:
-        return [event.found for event in self.events if isinstance(event, (Found, Taken, Unfenced))]
+        return [
+            event.found for event in self.events if isinstance(event, (Found, Taken, Unfenced))
+        ]
 
     def reports(self) -> list[str]:
         return [f"{one.code} {one.message}" for one in self.found()]

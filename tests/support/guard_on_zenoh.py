@@ -1,7 +1,8 @@
 """A guard that reads TF from Zenoh, as that of a robot with rmw_zenoh does, where rclpy has no such middleware.
 
-Its node stays on the middleware that is there, and finds nobody; messages come by eclipse-zenoh, with the ids of their
-attachments, and who publishes is asked of liveliness tokens, as always on Zenoh.
+Its node stays on the middleware that is there, and finds nobody; messages come by eclipse-zenoh,
+with the ids of their attachments, and who publishes is asked of liveliness tokens, as always on
+Zenoh.
 """
 
 import os
@@ -14,9 +15,9 @@ import sys
 if "tfcompose.guard" in sys.orig_argv:
     import atexit
     import os
-    import tfcompose.ros.graph as graph
-    import tfcompose.ros.node as node
-    from tfcompose.ros.zenoh_graph import ZenohTF, domain_of, open_session
+    import tfcompose.tf.ros.graph as graph
+    import tfcompose.tf.ros.node as node
+    from tfcompose.tf.ros.zenoh_graph import ZenohTF, domain_of, open_session
     graph.get_rmw_implementation_identifier = node.middleware = lambda: "rmw_zenoh_cpp"
     graph._ask = lambda node: False
     session, open_here = open_session(os.environ), []
@@ -35,7 +36,7 @@ if "tfcompose.guard" in sys.orig_argv:
                 gid, source_ns, sequence = one.attachment.gid, one.attachment.source_ns, one.attachment.sequence
             return node.Received(one.data, gid, source_ns, one.received_ns, sequence, gid)
     node.TFSubscription = ZenohSubscription
-    import tfcompose.live.topics as topics
+    import tfcompose.tf.live.topics as topics
     def close(self):
         for one in open_here:
             one.close()

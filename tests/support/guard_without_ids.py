@@ -9,11 +9,11 @@ _SITE = """
 import sys
 if "tfcompose.guard" in sys.orig_argv:
     import dataclasses
-    import tfcompose.ros.graph as graph
+    import tfcompose.tf.ros.graph as graph
     gid_of = graph.gid_of
     graph.ids_say_who = lambda node: False
     graph.gid_of = lambda publisher: gid_of(publisher)[::-1]
-    import tfcompose.ros.node as node
+    import tfcompose.tf.ros.node as node
     received = node.Subscription._received
     def turned(self):
         one = received(self)

@@ -1,6 +1,7 @@
 """The package as a drawing: its parts, and which imports which, read from the syntax trees.
 
-``python -m tests.support.house --write`` puts the drawing into CONTRIBUTING.md; without ``--write`` it is printed.
+``python -m tests.support.house --write`` puts the drawing into CONTRIBUTING.md; without
+``--write`` it is printed.
 """
 
 from __future__ import annotations
@@ -15,13 +16,17 @@ PACKAGE = ROOT / "tfcompose"
 GUIDE = ROOT / "CONTRIBUTING.md"
 #: The drawing stands between these lines of the guide.
 BEGIN, END = "```mermaid\n", "```\n"
-#: Every part may import these; the drawing has one box for all of them, and no arrow to it.
-GROUND = ("catalogue", "findings", "geometry", "numbers", "text", "tree", "units")
 
 
 def part_of(file: Path) -> str:
-    """Return the part that a file of the package belongs to: its folder, or its name directly below the package."""
+    """Return the wing that a file of the package belongs to, or its name directly below the package."""
     return file.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+def room_of(file: Path) -> str:
+    """Return the file's dotted name below the package: ``spec.load.nodes``; a package's own is that of its folder."""
+    parts = file.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def imports_of(file: Path, *, for_types: bool = True) -> set[str]:
@@ -30,7 +35,9 @@ def imports_of(file: Path, *, for_types: bool = True) -> set[str]:
     tree = ast.parse(file.read_text("utf-8"))
     if not for_types:
         tree.body = [
-            node for node in tree.body if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
+            node
+            for node in tree.body
+            if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
         ]
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -38,14 +45,18 @@ def imports_of(file: Path, *, for_types: bool = True) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.add(node.module)
             if node.module == "tfcompose":
-                names |= {f"tfcompose.{alias.name}" for alias in node.names if alias.name != "__version__"}
+                names |= {
+                    f"tfcompose.{alias.name}"
+                    for alias in node.names
+                    if alias.name != "__version__"
+                }
         elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
             names |= {str(word.value) for word in node.args[:1] if isinstance(word, ast.Constant)}
     return names
 
 
 def imports() -> dict[str, set[str]]:
-    """Return, for each part of the package, the other parts that it imports."""
+    """Return, for each wing, the other wings that it imports."""
     found: dict[str, set[str]] = {}
     for file in sorted(PACKAGE.rglob("*.py")):
         part = part_of(file)
@@ -72,17 +83,16 @@ def reduced(graph: dict[str, set[str]]) -> dict[str, set[str]]:
     """Return the graph without the imports that follow from others: what is left says the same order."""
     below = {part: reachable(graph, part) for part in graph}
     return {
-        part: {one for one in others if not any(one in below[via] for via in others)} for part, others in graph.items()
+        part: {one for one in others if not any(one in below[via] for via in others)}
+        for part, others in graph.items()
     }
 
 
 def mermaid() -> str:
     """Return the drawing, as lines of Mermaid: an arrow leads from a part to what it imports."""
-    graph = {part: others - set(GROUND) for part, others in imports().items() if part not in GROUND}
     lines = ["flowchart TD"]
-    for part, others in sorted(reduced(graph).items()):
-        lines += [f"  {part} --> {other}" for other in sorted(others)] or [f"  {part}"]
-    lines += [f'  ground["{" · ".join(GROUND)}"]']
+    for wing, others in sorted(reduced(imports()).items()):
+        lines += [f"  {wing} --> {other}" for other in sorted(others)] or [f"  {wing}"]
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -96,7 +106,9 @@ def with_drawing(text: str) -> str:
 def main(words: list[str]) -> None:
     """Print the drawing, or write it into the guide."""
     parser = argparse.ArgumentParser(prog="python -m tests.support.house", description=__doc__)
-    parser.add_argument("--write", action="store_true", help="put the drawing into CONTRIBUTING.md")
+    parser.add_argument(
+        "--write", action="store_true", help="put the drawing into CONTRIBUTING.md"
+    )
     if parser.parse_args(words).write:
         GUIDE.write_text(with_drawing(GUIDE.read_text("utf-8")), encoding="utf-8")
     else:

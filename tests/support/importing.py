@@ -7,9 +7,9 @@ from typing import Any
 from tfcompose.cli import main
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.reading import read_text
-from tfcompose.compile import compile_robot
-from tfcompose.emit import emit
-from tfcompose.files import Target
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.emit import emit
+from tfcompose.model.files import Target
 
 PRESETS = library()
 

@@ -13,9 +13,9 @@ import psutil
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, complete_lines
-from tfcompose.ipc import GUARD_EVENTS
-from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
-from tfcompose.plan.file import write_plan
+from tfcompose.model.messages import GUARD_EVENTS
+from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
+from tfcompose.model.plan.file import write_plan
 
 PYTHON = ("${python}", "-I", "-S", "-c")
 SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(180)"
@@ -25,7 +25,7 @@ LISTEN = "import signal; signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid
 LAUNCHER = """
 import signal, sys
 from pathlib import Path
-from tfcompose.plan.file import read_plan
+from tfcompose.model.plan.file import read_plan
 from tfcompose.launcher.supervisor import supervise
 file = Path(sys.argv[1])
 plan = read_plan(file.read_text(), str(file))
@@ -39,8 +39,13 @@ def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
 
 def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
     """Return a guard that says these events, or lines, and then sleeps."""
-    lines = "".join(event if isinstance(event, str) else GUARD_EVENTS.line(event) for event in events)
-    say = f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines.encode()!r}); {end}"
+    lines = "".join(
+        event if isinstance(event, str) else GUARD_EVENTS.line(event) for event in events
+    )
+    say = (
+        f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']),"
+        f" {lines.encode()!r}); {end}"
+    )
     return program("guard", say, kind="guard")
 
 
@@ -61,7 +66,9 @@ class Launcher:
         return [int(word) for words in lines for word in words.rstrip("')").split()]
 
     def below(self, *, recursive: bool = True) -> list[int]:
-        return [child.pid for child in psutil.Process(self.popen.pid).children(recursive=recursive)]
+        return [
+            child.pid for child in psutil.Process(self.popen.pid).children(recursive=recursive)
+        ]
 
     def kill(self) -> None:
         """End it with all that it has started."""
@@ -77,5 +84,7 @@ def launched(folder: Path, *planned: PlanProcess) -> Launcher:
     file, output = folder / "plan.json", folder / "output.txt"
     file.write_text(write_plan(plan_of(*planned)))
     with output.open("wb") as out:
-        popen = processes.start([sys.executable, "-c", LAUNCHER, str(file)], stdout=out, stderr=out)
+        popen = processes.start(
+            [sys.executable, "-c", LAUNCHER, str(file)], stdout=out, stderr=out
+        )
     return Launcher(popen, output)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tfcompose.geometry import Pose
-from tfcompose.ipc import FindingShown, Loaded, Notice, NotLoaded, ProcessState, Unloaded
+from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.events import (
     Action,
     Begin,
@@ -24,14 +23,22 @@ from tfcompose.launcher.events import (
 )
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import State, initial
-from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.messages import (
+    FindingShown,
+    Loaded,
+    Notice,
+    NotLoaded,
+    ProcessState,
+    Unloaded,
+)
+from tfcompose.model.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.findings import Finding
-    from tfcompose.ipc import GuardOrder
-    from tfcompose.plan import RestartPolicy, StartCondition
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.messages import GuardOrder
+    from tfcompose.model.plan import RestartPolicy, StartCondition
 
 N = TypeVar("N", bound=Notice)
 
@@ -41,7 +48,9 @@ SLAM = PlanProcess("slam", "run", owns=(("map", "odom"),))
 
 
 def edge(parent: str, child: str, owner: str) -> PlanEdge:
-    return PlanEdge(parent, child, "static", owner, f"/{owner}", Pose(), None, SourceLine("robot.yaml", 1))
+    return PlanEdge(
+        parent, child, "static", owner, f"/{owner}", Pose(), None, SourceLine("robot.yaml", 1)
+    )
 
 
 def plan_of(*processes: PlanProcess, guard: GuardPolicy | None = None) -> Plan:
@@ -50,7 +59,10 @@ def plan_of(*processes: PlanProcess, guard: GuardPolicy | None = None) -> Plan:
 
 
 def run_process(
-    name: str, restart: RestartPolicy = "no", after: Mapping[str, StartCondition] | None = None, **more: Any
+    name: str,
+    restart: RestartPolicy = "no",
+    after: Mapping[str, StartCondition] | None = None,
+    **more: Any,
 ) -> PlanProcess:
     return PlanProcess(name, "run", restart=restart, after=dict(after or {}), **more)
 

@@ -1,7 +1,8 @@
 """Seeded mutations of YAML texts: what people get wrong, one to four times in a file.
 
-The place of each key and value comes from PyYAML's own nodes, so that most results are YAML again. The same name gives
-the same text on every Python: only ``random()`` of a generator seeded with a text is used.
+The place of each key and value comes from PyYAML's own nodes, so that most results are YAML again.
+The same name gives the same text on every Python: only ``random()`` of a generator seeded with a
+text is used.
 """
 
 import random
@@ -15,7 +16,8 @@ import yaml
 
 T = TypeVar("T")
 
-#: Values in the place of another: other types, other dimensions, no numbers, no expressions, nested wrongly.
+#: Values in the place of another: other types, other dimensions, no numbers, no expressions,
+#: nested wrongly.
 VALUES = (
     "null", "true", "maybe", "3", "-1", "0", "1e400", ".nan", "''", "{}", "[]", "{a: 1}", "[1, 2]", "[[1], 2]",
     "3 kg", "10 degrees", "5 cmm", "2 Hz", "-4 cm", "1e308 km", "30 °", "'3,5 m'", "12:30", "2020-01-01", "0x1F", "012",
@@ -23,7 +25,8 @@ VALUES = (
     "9999999999999999999999", "~/x", "'a b'", "ü", "[{}, null]", "{xyz: [1, 2, 3], rpy: zero}",
 )  # fmt: skip
 
-#: Entries that a mapping may have no use for: unknown keys, keys of other places, and second choices.
+#: Entries that a mapping may have no use for: unknown keys, keys of other places, and second
+#: choices.
 ENTRIES = (
     "xzy: [0, 0, 0]", "nmae: x", "extra: 1", "rpy: [0, 0, 0]", "look: up", "look: {down: 1, up: 1}",
     "quat_xyzw: [0, 0, 0, 2]", "axis_angle: {axis: [0, 0, 0], angle: 1}", "matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]",
@@ -69,7 +72,9 @@ def mutated(text: str, seed: str) -> str:
     if not spots:
         return _other_word(text, chooser)
     after = len(text) + 1
-    for spot in sorted((chooser.one(spots) for _ in range(faults)), key=lambda spot: spot.entry, reverse=True):
+    for spot in sorted(
+        (chooser.one(spots) for _ in range(faults)), key=lambda spot: spot.entry, reverse=True
+    ):
         if spot.entry[1] < after:  # else it holds what has been changed
             text = chooser.one(KINDS)(text, spot, chooser)
             after = spot.entry[0]
@@ -80,7 +85,9 @@ def _other_word(text: str, chooser: Chooser) -> str:
     """Change a word of a text that is no tree: rows of numbers, a launch file."""
     words = re.split(r"(\s+)", text)
     at = 2 * chooser.below((len(words) + 1) // 2)
-    words[at] = chooser.one((chooser.one(VALUES), _slip(words[at], chooser), "", f"{words[at]} {words[at]}"))
+    words[at] = chooser.one(
+        (chooser.one(VALUES), _slip(words[at], chooser), "", f"{words[at]} {words[at]}")
+    )
     return "".join(words)
 
 
@@ -102,7 +109,11 @@ def _below(root: Any, text: str) -> Iterator[Spot]:
             continue
         observed.add(id(node))
         if isinstance(node, yaml.MappingNode):
-            pairs = [(key, value) for key, value in node.value if key.start_mark.index <= value.start_mark.index]
+            pairs = [
+                (key, value)
+                for key, value in node.value
+                if key.start_mark.index <= value.start_mark.index
+            ]
             for key, value in pairs:
                 begin, end = key.start_mark.index, _end(text, value)
                 yield _spot(node, (begin, key.end_mark.index), value, (begin, end), text)
@@ -113,7 +124,9 @@ def _below(root: Any, text: str) -> Iterator[Spot]:
             stack += reversed(node.value)
 
 
-def _spot(parent: Any, key: tuple[int, int] | None, value: Any, entry: tuple[int, int], text: str) -> Spot:
+def _spot(
+    parent: Any, key: tuple[int, int] | None, value: Any, entry: tuple[int, int], text: str
+) -> Spot:
     span = (value.start_mark.index, _end(text, value))
     return Spot(key, span, isinstance(value, yaml.ScalarNode), bool(parent.flow_style), entry)
 
@@ -128,7 +141,9 @@ def _end(text: str, node: Any) -> int:
 
 def _inside(node: Any) -> list[Any]:
     if isinstance(node, yaml.MappingNode):
-        return [value for key, value in node.value if key.start_mark.index <= value.start_mark.index]
+        return [
+            value for key, value in node.value if key.start_mark.index <= value.start_mark.index
+        ]
     return list(node.value)
 
 
@@ -146,7 +161,11 @@ def _delete(text: str, spot: Spot, _: Chooser) -> str:
         return text[:begin] + "null" + text[end:]
     line = text.rfind("\n", 0, begin) + 1
     stop = text.find("\n", end)
-    return text[:line] + (text[stop + 1 :] if stop >= 0 else "") if not text[line:begin].strip() else text
+    return (
+        text[:line] + (text[stop + 1 :] if stop >= 0 else "")
+        if not text[line:begin].strip()
+        else text
+    )
 
 
 def _duplicate(text: str, spot: Spot, _: Chooser) -> str:
@@ -176,11 +195,19 @@ def _slip(word: str, chooser: Chooser) -> str:
 
 def _rename(text: str, spot: Spot, chooser: Chooser) -> str:
     span = spot.key or spot.value
-    return _with(text, span, _slip(text[slice(*span)], chooser)) if spot.key or spot.is_scalar else text
+    return (
+        _with(text, span, _slip(text[slice(*span)], chooser))
+        if spot.key or spot.is_scalar
+        else text
+    )
 
 
 def _misspell(text: str, spot: Spot, chooser: Chooser) -> str:
-    return _with(text, spot.value, _slip(text[slice(*spot.value)], chooser)) if spot.is_scalar else text
+    return (
+        _with(text, spot.value, _slip(text[slice(*spot.value)], chooser))
+        if spot.is_scalar
+        else text
+    )
 
 
 def _other_value(text: str, spot: Spot, chooser: Chooser) -> str:
@@ -195,7 +222,11 @@ def _nested(text: str, spot: Spot, chooser: Chooser) -> str:
     value = text[slice(*spot.value)]
     if not spot.is_flow and not spot.is_scalar and not value.startswith(("{", "[")):
         return _with(text, spot.value, f"[{value.split(':')[0]}]")
-    return _with(text, spot.value, chooser.one(("[{}]", "{{value: {}}}", "[{}, {}]", "'{}'")).replace("{}", value))
+    return _with(
+        text,
+        spot.value,
+        chooser.one(("[{}]", "{{value: {}}}", "[{}, {}]", "'{}'")).replace("{}", value),
+    )
 
 
 def _entry(text: str, spot: Spot, chooser: Chooser) -> str:
@@ -219,8 +250,26 @@ def _swapped(text: str, spot: Spot, chooser: Chooser) -> str:
 def _unit(text: str, spot: Spot, chooser: Chooser) -> str:
     value = text[slice(*spot.value)].strip("'\"")
     number = value.split(" ", maxsplit=1)[0]
-    unit = chooser.one(("cm", "deg", "kg", "s", "Hz", "metre", "degrees", "rad/s", "Nm", "mm mm", "CM", "m/s", "%"))
-    return _with(text, spot.value, f"{number} {unit}") if number[:1] in set("-.0123456789") else text
+    unit = chooser.one(
+        (
+            "cm",
+            "deg",
+            "kg",
+            "s",
+            "Hz",
+            "metre",
+            "degrees",
+            "rad/s",
+            "Nm",
+            "mm mm",
+            "CM",
+            "m/s",
+            "%",
+        )
+    )
+    return (
+        _with(text, spot.value, f"{number} {unit}") if number[:1] in set("-.0123456789") else text
+    )
 
 
 KINDS: tuple[Callable[[str, Spot, Chooser], str], ...] = (

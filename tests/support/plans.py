@@ -1,10 +1,10 @@
 """A robot's text as its plan and files, for tests of what is made of plans."""
 
 from tfcompose.cli.compiling import library
-from tfcompose.compile import compile_robot
-from tfcompose.emit import emit
-from tfcompose.plan import Plan
-from tfcompose.plan.file import read_plan
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.emit import emit
+from tfcompose.model.plan import Plan
+from tfcompose.model.plan.file import read_plan
 
 
 def built(text: str, *profiles: str) -> dict[str, str]:

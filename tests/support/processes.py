@@ -12,7 +12,8 @@ from typing import Any
 
 from tests.support.waiting import TIMEOUT_S, until
 
-#: What a script that puts the tests into the background, or nohup, has them ignore; a child would inherit that.
+#: What a script that puts the tests into the background, or nohup, has them ignore; a child would
+#: inherit that.
 _IGNORABLE = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _started: list[subprocess.Popen[str]] = []
 
@@ -20,8 +21,8 @@ _started: list[subprocess.Popen[str]] = []
 def start(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[str]:
     """Start a process as ``subprocess.Popen`` does, in a session of its own and with the default action of each signal.
 
-    Its pipes are text, and it reads nothing unless it is given something. It is killed at the end of the test, with
-    its group, if it still runs then.
+    Its pipes are text, and it reads nothing unless it is given something. It is killed at the end
+    of the test, with its group, if it still runs then.
     """
     options.setdefault("stdin", subprocess.DEVNULL)
     with default_signal_actions():
@@ -40,7 +41,8 @@ def run(
 ) -> subprocess.CompletedProcess[str]:
     """Run a process to its end and return its exit code and what it printed.
 
-    It is given the text of ``stdin``, if there is one, and killed with its group if the time is over before.
+    It is given the text of ``stdin``, if there is one, and killed with its group if the time is
+    over before.
 
     Raises:
         subprocess.TimeoutExpired: if it does not end in time.
@@ -83,7 +85,11 @@ class Started:
 
     def __post_init__(self) -> None:
         pairs = ((self.process.stdout, self.lines), (self.process.stderr, self.errors))
-        self._readers = [threading.Thread(target=lines.extend, args=(stream,)) for stream, lines in pairs if stream]
+        self._readers = [
+            threading.Thread(target=lines.extend, args=(stream,))
+            for stream, lines in pairs
+            if stream
+        ]
         for reader in self._readers:
             reader.start()
 
@@ -135,7 +141,9 @@ def default_signal_actions() -> Iterator[None]:
     before = {number: signal.getsignal(number) for number in _IGNORABLE}
     ignored = [number for number, handler in before.items() if handler == signal.SIG_IGN]
     for number in ignored:
-        signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+        signal.signal(
+            number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+        )
     try:
         yield
     finally:

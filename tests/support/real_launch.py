@@ -1,6 +1,7 @@
 """What ROS's launch would start: each process is recorded in its place, and none is started.
 
-``python real_launch.py OUT FILE [NAME:=VALUE …]`` writes the commands, with the parameters of their files, as JSON.
+``python real_launch.py OUT FILE [NAME:=VALUE …]`` writes the commands, with the parameters of
+their files, as JSON.
 """
 
 import json
@@ -26,7 +27,9 @@ def record(action: Any, context: Any) -> None:
     """Stand in the place of the action's execution."""
     action.prepare(context)
     words = list(action.process_description.final_cmd)
-    files = [Path(file).read_text("utf-8") for word, file in pairwise(words) if word == "--params-file"]
+    files = [
+        Path(file).read_text("utf-8") for word, file in pairwise(words) if word == "--params-file"
+    ]
     STARTED.append({"words": words, "params": [yaml.unsafe_load(text) for text in files]})
 
 

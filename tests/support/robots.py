@@ -12,7 +12,9 @@ processes:
   drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
 """
 #: The same with a drive that somebody else starts.
-EXTERNAL = ROVER.replace("{simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}", "{external: true, node: diff_drive}")
+EXTERNAL = ROVER.replace(
+    "{simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}", "{external: true, node: diff_drive}"
+)
 #: A robot whose arm's driver runs on another host.
 ON_TWO_HOSTS = """
 tfcompose: 1
@@ -26,7 +28,8 @@ processes:
   drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
   arm_drive: {simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: jetson, after: {drive: ready}}
 """
-#: A robot with names in every place where a xacro macro prefixes them, and texts that xacro would evaluate.
+#: A robot with names in every place where a xacro macro prefixes them, and texts that xacro would
+#: evaluate.
 EVERYTHING = """tfcompose: 1
 robot: class
 links:

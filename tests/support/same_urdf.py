@@ -68,7 +68,9 @@ def _equal(a: Any, b: Any) -> bool:
 
 
 def _numbers(element: Any, key: str, default: str) -> list[float]:
-    return [float(word) for word in (default if element is None else element.get(key, default)).split()]
+    return [
+        float(word) for word in (default if element is None else element.get(key, default)).split()
+    ]
 
 
 def _pose(element: Any) -> Any:
@@ -113,13 +115,22 @@ def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
                 for key, value in form.attrib.items()
             }
             output["scale"] = output.get("scale", [1.0, 1.0, 1.0])
-            shapes.append({"form": form.tag, "pose": _pose(one), "colour": _colour(one, tag, colours), **output})
+            shapes.append(
+                {
+                    "form": form.tag,
+                    "pose": _pose(one),
+                    "colour": _colour(one, tag, colours),
+                    **output,
+                }
+            )
     return shapes
 
 
 def _sizes(form: Any) -> list[float]:
     """Return the lengths of a shape; one without any is no body."""
-    return [float(word) for key in ("size", "radius", "length") for word in form.get(key, "").split()]
+    return [
+        float(word) for key in ("size", "radius", "length") for word in form.get(key, "").split()
+    ]
 
 
 def _colour(shape: Any, tag: str, colours: dict[str, Any]) -> Any:
@@ -130,13 +141,22 @@ def _colour(shape: Any, tag: str, colours: dict[str, Any]) -> Any:
     if output is None:
         return None
     colour, texture = output.find("color"), output.find("texture")
-    rgba = None if colour is None else [min(max(part, 0), 1) for part in _numbers(colour, "rgba", "0.5 0.5 0.5 1")]
+    rgba = (
+        None
+        if colour is None
+        else [min(max(part, 0), 1) for part in _numbers(colour, "rgba", "0.5 0.5 0.5 1")]
+    )
     return [rgba, None if texture is None else texture.get("filename") or None]
 
 
 def _joint(joint: Any) -> dict[str, Any]:
     kind = joint.get("type")
-    output = {"parent": joint.find("parent").get("link"), "type": kind, "pose": _pose(joint), "name": joint.get("name")}
+    output = {
+        "parent": joint.find("parent").get("link"),
+        "type": kind,
+        "pose": _pose(joint),
+        "name": joint.get("name"),
+    }
     if kind in {"fixed", "floating"}:
         return output
     axis = np.array(_numbers(joint.find("axis"), "xyz", "1 0 0"))
@@ -145,16 +165,24 @@ def _joint(joint: Any) -> dict[str, Any]:
         element = joint.find(tag)
         if element is not None or tag == "limit":
             given = {} if element is None else element.attrib
-            output[tag] = {key: float(given[key]) if key in given else usual for key, usual in values.items()}
+            output[tag] = {
+                key: float(given[key]) if key in given else usual for key, usual in values.items()
+            }
     mimic = joint.find("mimic")
     if mimic is not None:
-        output["mimic"] = [mimic.get("joint"), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))]
+        output["mimic"] = [
+            mimic.get("joint"),
+            float(mimic.get("multiplier", "1")),
+            float(mimic.get("offset", "0")),
+        ]
     return output
 
 
 def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # noqa: FBT001 (here only)
     """Return what may stand in a joint, each with what it is where nothing is said."""
-    end = 0.0 if kind in {"revolute", "prismatic"} else None  # of these URDF takes 0 for what is not said
+    end = (
+        0.0 if kind in {"revolute", "prismatic"} else None
+    )  # of these URDF takes 0 for what is not said
     ends: dict[str, float | None] = {"lower": end, "upper": end, "effort": 0.0, "velocity": 0.0}
     has_limit = limited or end is not None  # URDF requires one of these
     return {
@@ -177,7 +205,9 @@ def _blocks(root: Any) -> list[Any]:
     blocks = []
     for one in root:
         idle = one.tag == "gazebo" and one.get("reference", next(iter(there))) not in there
-        idle |= one.tag == "transmission" and any(inner.get("name") not in joints for inner in one.findall("joint"))
+        idle |= one.tag == "transmission" and any(
+            inner.get("name") not in joints for inner in one.findall("joint")
+        )
         if isinstance(one.tag, str) and one.tag not in {"link", "joint", "material"} and not idle:
             blocks.append(_tree(one))
     return sorted(blocks)

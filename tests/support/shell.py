@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 #: Runs a program with this terminal as its own, as a window has it.
-_OWNER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
+_OWNER = (
+    "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1],"
+    " sys.argv[1:])"
+)
 PROMPT = "shell$ "
 #: How each shell is started without files of the user's, with that prompt.
 COMMANDS = {
@@ -42,7 +45,11 @@ class Shell:
         self._master, slave = pty.openpty()
         self.text = ""
         self.resize(80, 24)
-        env = os.environ | {"TERM": "xterm-256color", "PS1": PROMPT, "CI": "", "NO_COLOR": ""} | environment
+        env = (
+            os.environ
+            | {"TERM": "xterm-256color", "PS1": PROMPT, "CI": "", "NO_COLOR": ""}
+            | environment
+        )
         command = [sys.executable, "-c", _OWNER, *COMMANDS[shell]]
         self.process: subprocess.Popen[str] = processes.start(
             command, stdin=slave, stdout=slave, stderr=slave, cwd=folder, env=env

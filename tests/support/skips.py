@@ -6,21 +6,36 @@ from _pytest.reports import BaseReport
 
 #: The beginning of a test's id, and why nothing is lost.
 ACCEPTED = {
-    "tests/tf2/test_tf2_oracle.py": "tf2_py comes with a distribution only; tf2_answers.jsonl holds its answers",
+    "tests/tf/tf2/test_tf2_oracle.py": (
+        "tf2_py comes with a distribution only; tf2_answers.jsonl holds its answers"
+    ),
     "tests/launcher/test_launch_file_ros.py": "ros2 launch comes with a distribution only",
-    "tests/export/test_exports_ros.py::test_ros2_launch_starts_the_tree": "ros2 launch comes with a distribution only",
-    "tests/launcher/test_components_ros.py": "the services are built with a C compiler; stock containers come with a "
-    "distribution only",
-    "tests/importing/test_real_launch.py": "launch comes with a distribution only; test_launch.py claims the same of "
-    "the stand-in",
-    "tests/importing/test_round_trip.py::test_every_robot_that_is_listed": "pybullet_data is not on every Python",
-    "tests/adversary/test_rogues_ros.py::test_a_program_of_another_dds": "cyclonedds is not on every Python",
-    "tests/view/test_browser_live_ros.py": "as below",
-    "tests/deploy/test_deploy_ros.py": "sshd is no Python package: .ci/run installs Debian's, or says that it cannot; "
-    "and a container may not be allowed to make networks",
-    "tests/view/test_browser.py": "Chromium is no Python package: .ci/run installs Debian's, or says that it cannot",
-    "tests/cli/test_completion.py::test_a_shell_on_a_terminal": "zsh and fish are no Python packages: .ci/run installs "
-    "Debian's, or says that it cannot",
+    "tests/tools/exporters/test_exports_ros.py::test_ros2_launch_starts_the_tree": (
+        "ros2 launch comes with a distribution only"
+    ),
+    "tests/launcher/test_components_ros.py": (
+        "the services are built with a C compiler; stock containers come with a distribution only"
+    ),
+    "tests/tools/importers/test_real_launch.py": (
+        "launch comes with a distribution only; test_launch.py claims the same of the stand-in"
+    ),
+    "tests/tools/importers/test_round_trip.py::test_every_robot_that_is_listed": (
+        "pybullet_data is not on every Python"
+    ),
+    "tests/guard/adversary/test_rogues_ros.py::test_a_program_of_another_dds": (
+        "cyclonedds is not on every Python"
+    ),
+    "tests/tools/view/test_browser_live_ros.py": "as below",
+    "tests/tools/deploy/test_deploy_ros.py": (
+        "sshd is no Python package: .ci/run installs Debian's, or says that it cannot; "
+        "and a container may not be allowed to make networks"
+    ),
+    "tests/tools/view/test_browser.py": (
+        "Chromium is no Python package: .ci/run installs Debian's, or says that it cannot"
+    ),
+    "tests/cli/test_completion.py::test_a_shell_on_a_terminal": (
+        "zsh and fish are no Python packages: .ci/run installs Debian's, or says that it cannot"
+    ),
     "tests/cli/test_bad_input.py::test_what_cannot_be_read": "root may read everything",
 }
 
@@ -28,7 +43,8 @@ ACCEPTED = {
 def unexpected(skipped: Iterable[BaseReport]) -> list[str]:
     """Return the ids of the tests that were skipped and may not be, with the reasons that they give."""
     return [
-        f"{report.nodeid}: {report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr}"
+        f"{report.nodeid}:"
+        f" {report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr}"
         for report in skipped
         if not report.nodeid.startswith(tuple(ACCEPTED))
     ]

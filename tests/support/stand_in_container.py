@@ -1,8 +1,8 @@
 """A container of components with the services of rclcpp_components: ``python -m tests.support.stand_in_container``.
 
-It loads the plugins below, each a node of its own, one after the other as stock containers do. Every request goes to
-the file that CONTAINER_LOG names, as a line of JSON. While the file BROKEN beside it exists, no load succeeds; a plugin
-``demo::Slow`` takes a while.
+It loads the plugins below, each a node of its own, one after the other as stock containers do.
+Every request goes to the file that CONTAINER_LOG names, as a line of JSON. While the file BROKEN
+beside it exists, no load succeeds; a plugin ``demo::Slow`` takes a while.
 """
 
 import json
@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from tests.support.fake_nodes import message
-from tfcompose.ros.node import TFPublisher
+from tfcompose.tf.ros.node import TFPublisher
 
 LOG = Path(os.environ["CONTAINER_LOG"])
 PLUGINS = ("demo::Empty", "demo::Static", "demo::Moving", "demo::Slow")
@@ -78,7 +78,9 @@ class Container:
         return response
 
     def list(self, _request: Any, response: Any) -> Any:
-        response.full_node_names = [node.get_fully_qualified_name() for node in self.loaded.values()]
+        response.full_node_names = [
+            node.get_fully_qualified_name() for node in self.loaded.values()
+        ]
         response.unique_ids = list(self.loaded)
         return response
 

@@ -9,8 +9,8 @@ from typing import Any
 def for_each(cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Make one test of all cases; its failure names each case that does not hold, with what is wrong in it.
 
-    The test's first parameter is given the case; where cases are tuples, as many parameters are given their members.
-    Further parameters are fixtures, which all cases share.
+    The test's first parameter is given the case; where cases are tuples, as many parameters are
+    given their members. Further parameters are fixtures, which all cases share.
     """
     table = [case if isinstance(case, tuple) else (case,) for case in cases]
     assert table, "a table without cases claims nothing"
@@ -26,7 +26,9 @@ def for_each(cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[.
                 try:
                     test(**dict(zip(of_a_case, case, strict=True)), **fixtures)
                 except Exception as error:  # noqa: BLE001 (whatever is wrong with a case, the others are tried)
-                    failures.append(f"{', '.join(map(str, case))}: {type(error).__name__}: {error}")
+                    failures.append(
+                        f"{', '.join(map(str, case))}: {type(error).__name__}: {error}"
+                    )
             assert not failures, f"{len(failures)} of {len(table)} cases:\n" + "\n".join(failures)
 
         fixtures = [each for name, each in signature.parameters.items() if name not in of_a_case]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.foundation.findings import RejectedError, Span, finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from tfcompose.compile import Compiled
-    from tfcompose.model import Robot
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.model.robot import Robot
 
 
 def reader(texts: Mapping[str, str]) -> Callable[[str], str]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.geometry import Pose
-from tfcompose.live.edges import TreeObserver
-from tfcompose.live.publishers import Publisher
-from tfcompose.live.state import TreeState
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.tf.live.edges import TreeObserver
+from tfcompose.tf.live.publishers import Publisher
+from tfcompose.tf.live.state import TreeState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +29,9 @@ class TreeHistory:
 
     def knows(self, *gids: bytes) -> TreeHistory:
         """Let the graph show these publishers, and no others."""
-        self.observer.take_graph([Publisher(gid, SENDERS[gid], static=gid in b"st") for gid in gids])
+        self.observer.take_graph(
+            [Publisher(gid, SENDERS[gid], static=gid in b"st") for gid in gids]
+        )
         return self
 
     def fixed(self, edge: str, gid: bytes = b"s", x: float = 0.0) -> TreeHistory:
@@ -52,14 +54,18 @@ class TreeHistory:
             self.takes(row(names, stamp(now)), gid, now)
         return self
 
-    def takes(self, transform: Any, gid: bytes = b"d", at_ns: int = END_NS, *, static: bool = False) -> TreeHistory:
+    def takes(
+        self, transform: Any, gid: bytes = b"d", at_ns: int = END_NS, *, static: bool = False
+    ) -> TreeHistory:
         """Let one transform arrive."""
         self.observer.take([transform], static=static, gid=gid, received_ns=at_ns)
         return self
 
     def observed(self, **more: Any) -> TreeState:
         publishers = more.pop("publishers", tuple(self.observer.publishers.known.values()))
-        return TreeState(SECONDS, edges=tuple(self.observer.edges(END_NS)), publishers=publishers, **more)
+        return TreeState(
+            SECONDS, edges=tuple(self.observer.edges(END_NS)), publishers=publishers, **more
+        )
 
 
 def row(edge: str, stamp_ns: int, x: float = 0.0, w: float = 1.0) -> Any:
@@ -88,7 +94,33 @@ def sound_plan(*edges: PlanEdge, **more: Any) -> Plan:
         PlanProcess("static", "static", nodes=("/static",)),
     )
     planned = (
-        PlanEdge("odom", "base_link", "dynamic", "drive", "/drive", Pose(), 50.0, SourceLine("rover.yaml", 7)),
-        PlanEdge("base_link", "laser", "static", "static", "/static", Pose(), None, SourceLine("rover.yaml", 9)),
+        PlanEdge(
+            "odom",
+            "base_link",
+            "dynamic",
+            "drive",
+            "/drive",
+            Pose(),
+            50.0,
+            SourceLine("rover.yaml", 7),
+        ),
+        PlanEdge(
+            "base_link",
+            "laser",
+            "static",
+            "static",
+            "/static",
+            Pose(),
+            None,
+            SourceLine("rover.yaml", 9),
+        ),
     )
-    return Plan("rover", "0", "base_link", more.pop("ros", RosSettings()), edges or planned, processes, **more)
+    return Plan(
+        "rover",
+        "0",
+        "base_link",
+        more.pop("ros", RosSettings()),
+        edges or planned,
+        processes,
+        **more,
+    )

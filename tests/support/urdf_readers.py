@@ -1,7 +1,8 @@
 """Four programs that read URDF, each behind the same two questions: where is every link, and how heavy are bodies?
 
-Poses are 4×4 matrices of a link in the robot's base. A body is what cannot move in itself: mass in kg, centre of mass
-in m and tensor in kg m² about it, in the axes of the link that it is asked for by.
+Poses are 4×4 matrices of a link in the robot's base. A body is what cannot move in itself: mass in
+kg, centre of mass in m and tensor in kg m² about it, in the axes of the link that it is asked for
+by.
 """
 
 from __future__ import annotations
@@ -84,7 +85,9 @@ class Yourdfpy:
         for name, link in self.read.link_map.items():
             if link.inertial:
                 own = Body(link.inertial.mass, np.zeros(3), link.inertial.inertia)
-                found[name] = own if link.inertial.origin is None else own.moved(link.inertial.origin)
+                found[name] = (
+                    own if link.inertial.origin is None else own.moved(link.inertial.origin)
+                )
         return found
 
 
@@ -95,18 +98,29 @@ class Pinocchio:
         self.base = base
         self.model = pinocchio.buildModelFromXML(urdf)
         self.data = self.model.createData()
-        self.moving = {name for name, joint in zip(self.model.names, self.model.joints, strict=True) if joint.nv == 1}
+        self.moving = {
+            name
+            for name, joint in zip(self.model.names, self.model.joints, strict=True)
+            if joint.nv == 1
+        }
         self.moving.discard("universe")
-        self.links = [frame for frame in self.model.frames if frame.type == pinocchio.FrameType.BODY]
+        self.links = [
+            frame for frame in self.model.frames if frame.type == pinocchio.FrameType.BODY
+        ]
 
     def poses(self, positions: Mapping[str, float]) -> dict[str, Matrix]:
         q = pinocchio.neutral(self.model)
         for name in self.moving:
             joint = self.model.joints[self.model.getJointId(name)]
             value = positions.get(name, 0.0)
-            q[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+            q[joint.idx_q : joint.idx_q + joint.nq] = (
+                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+            )
         pinocchio.framesForwardKinematics(self.model, self.data, q)
-        placed = {frame.name: self.data.oMf[self.model.getFrameId(frame.name)].homogeneous for frame in self.links}
+        placed = {
+            frame.name: self.data.oMf[self.model.getFrameId(frame.name)].homogeneous
+            for frame in self.links
+        }
         to_base = np.linalg.inv(placed[self.base])
         return {name: to_base @ pose for name, pose in placed.items()}
 
@@ -114,8 +128,14 @@ class Pinocchio:
         found = {}
         for frame in self.links:
             inertia = self.model.inertias[frame.parentJoint]
-            if np.allclose(frame.placement.homogeneous, np.eye(4)) and frame.parentJoint not in found:
-                found[frame.parentJoint] = (frame.name, Body(inertia.mass, inertia.lever, inertia.inertia))
+            if (
+                np.allclose(frame.placement.homogeneous, np.eye(4))
+                and frame.parentJoint not in found
+            ):
+                found[frame.parentJoint] = (
+                    frame.name,
+                    Body(inertia.mass, inertia.lever, inertia.inertia),
+                )
         return {name: body for name, body in found.values() if body.mass}
 
 
@@ -124,7 +144,9 @@ class MuJoCo:
 
     def __init__(self, urdf: str, base: str, more: str = "") -> None:
         self.base = base
-        settings = f'<mujoco><compiler fusestatic="false" discardvisual="false" {more}/></mujoco></robot>'
+        settings = (
+            f'<mujoco><compiler fusestatic="false" discardvisual="false" {more}/></mujoco></robot>'
+        )
         self.model = mujoco.MjModel.from_xml_string(urdf.replace("</robot>", settings))
         self.data = mujoco.MjData(self.model)
         kinds = {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}
@@ -150,7 +172,9 @@ class MuJoCo:
             turned = np.zeros(9)
             mujoco.mju_quat2Mat(turned, body.iquat)
             rows = turned.reshape(3, 3)
-            found[body.name] = Body(body.mass[0], np.array(body.ipos), rows @ np.diag(body.inertia) @ rows.T)
+            found[body.name] = Body(
+                body.mass[0], np.array(body.ipos), rows @ np.diag(body.inertia) @ rows.T
+            )
         return {name: body for name, body in found.items() if body.mass}
 
 
@@ -164,7 +188,10 @@ class Drake:
         self.plant.WeldFrames(self.plant.world_frame(), self.plant.GetFrameByName(base))
         self.plant.Finalize()
         self.context = self.plant.CreateDefaultContext()
-        joints = [self.plant.get_joint(JointIndex(int(i))) for i in self.plant.GetJointIndices(self.instance)]
+        joints = [
+            self.plant.get_joint(JointIndex(int(i)))
+            for i in self.plant.GetJointIndices(self.instance)
+        ]
         moving = (joint for joint in joints if joint.type_name() in {"revolute", "prismatic"})
         self.joints: dict[str, Any] = {joint.name(): joint for joint in moving}
         self.moving = set(self.joints)
@@ -177,7 +204,9 @@ class Drake:
             else:
                 joint.set_translation(self.context, value)
         links = [self.plant.get_body(i) for i in self.plant.GetBodyIndices(self.instance)]
-        return {b.name(): self.plant.EvalBodyPoseInWorld(self.context, b).GetAsMatrix4() for b in links}
+        return {
+            b.name(): self.plant.EvalBodyPoseInWorld(self.context, b).GetAsMatrix4() for b in links
+        }
 
     def bodies(self) -> dict[str, Body]:
         found = {}

@@ -25,7 +25,8 @@ def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool
 def in_one_of_a_few(attempt: Callable[[int], bool], tries: int = 4) -> bool:
     """Return whether one of a few attempts holds; each is given its number.
 
-    A machine that is busy with other things may spoil one now and then; what is wrong is wrong each time.
+    A machine that is busy with other things may spoil one now and then; what is wrong is wrong
+    each time.
     """
     return any(attempt(number) for number in range(tries))
 

@@ -30,7 +30,9 @@ def free_port() -> int:
         return port
 
 
-def config(mode: str, *, connect: list[str] | None = None, listen: list[str] | None = None) -> zenoh.Config:
+def config(
+    mode: str, *, connect: list[str] | None = None, listen: list[str] | None = None
+) -> zenoh.Config:
     """Return the configuration of a session on loopback, with timestamps, as rmw_zenoh's sessions have them."""
     made: zenoh.Config = zenoh.Config()
     settings = {"mode": mode, "timestamping/enabled": True, "scouting/multicast/enabled": False}
@@ -41,7 +43,9 @@ def config(mode: str, *, connect: list[str] | None = None, listen: list[str] | N
 
 
 @contextmanager
-def session(mode: str, *, connect: list[str] | None = None, listen: list[str] | None = None) -> Iterator[zenoh.Session]:
+def session(
+    mode: str, *, connect: list[str] | None = None, listen: list[str] | None = None
+) -> Iterator[zenoh.Session]:
     """Give a session on loopback, and close it."""
     opened: Any = zenoh.open(config(mode, connect=connect, listen=listen))
     try:
@@ -54,7 +58,9 @@ class RosPeer:
     """A ROS node on rmw_zenoh with publishers of TF, in a session of its own, a peer of the router's others."""
 
     def __init__(self, stack: ExitStack, router: str, node: str, domain: int = 0) -> None:
-        self.session = stack.enter_context(session("peer", connect=[router], listen=["tcp/127.0.0.1:0"]))
+        self.session = stack.enter_context(
+            session("peer", connect=[router], listen=["tcp/127.0.0.1:0"])
+        )
         self.namespace, _, self.name = node.rpartition("/")
         self.domain = domain
         self._publishers: dict[str, tuple[Any, bytes, Any]] = {}
@@ -63,17 +69,28 @@ class RosPeer:
     def advertise(self, topic: str, *, latched: bool = False) -> None:
         """Make a publisher of the topic, and declare its token."""
         entity = len(self._publishers) + 1
-        mangled = [name.replace("/", "%") for name in ("/", self.namespace or "/", self.name, topic)]
+        mangled = [
+            name.replace("/", "%") for name in ("/", self.namespace or "/", self.name, topic)
+        ]
         token = "/".join(
             [
-                *("@ros2_lv", str(self.domain), str(self.session.info.zid()), "0", str(entity), "MP"),
+                *(
+                    "@ros2_lv",
+                    str(self.domain),
+                    str(self.session.info.zid()),
+                    "0",
+                    str(entity),
+                    "MP",
+                ),
                 *(*mangled, TYPE, HASH, ":1:,1:,:,:,," if latched else "::,100:,:,:,,"),
             ]
         )
         key = f"{self.domain}/{topic.strip('/')}/{TYPE}/{HASH}"
         cache = ext.CacheConfig(max_samples=1) if latched else None
         publisher: Any = (
-            ext.declare_advanced_publisher(self.session, key, cache=cache, publisher_detection=True)
+            ext.declare_advanced_publisher(
+                self.session, key, cache=cache, publisher_detection=True
+            )
             if latched
             else self.session.declare_publisher(key)
         )

@@ -1,7 +1,8 @@
 """The command line: the only part that reads files, writes files, prints and exits.
 
-``parser`` finds the command, ``commands`` has one module for each; what several commands share is here. A command
-imports what is heavy in its ``run``. Any part may be imported here, and nothing imports ``cli``.
+``parser`` finds the command, ``commands`` has one module for each; what several commands share is
+here. A command imports what is heavy in its ``run``. Must not import ``tools``, ``rclpy``,
+``yaml``: tools bring their own commands.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from __future__ import annotations
 def main(argv: list[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     try:
-        from tfcompose.cli import parser  # here, so that Ctrl-C while it loads ends without a traceback
+        from tfcompose.cli import (
+            parser,  # here, so that Ctrl-C while it loads ends without a traceback
+        )
     except KeyboardInterrupt:
         return 130  # as a shell has it for a program ended by Ctrl-C
     return parser.main(argv)

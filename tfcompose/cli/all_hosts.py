@@ -11,20 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, printable
-from tfcompose.plan.hosts import hosts_of
+from tfcompose.model.plan.hosts import hosts_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.deploy.connection import Host
-    from tfcompose.plan import Plan
+    from tfcompose.model.plan import Plan
+    from tfcompose.tools.deploy.connection import Host
 
 
-def run_on_all_hosts(arguments: Namespace, command: str, *words: str, processes: Sequence[str] = ()) -> int:
+def run_on_all_hosts(
+    arguments: Namespace, command: str, *words: str, processes: Sequence[str] = ()
+) -> int:
     """Run the command with these words on every host, and print what it prints there; return the worst exit code.
 
-    With ``processes`` it is about these, and goes only to hosts that run any of them. Lines have their host before
-    them. Objects of ``--format json`` have it as a key; ``ps`` gives one list.
+    With ``processes`` it is about these, and goes only to hosts that run any of them. Lines have
+    their host before them. Objects of ``--format json`` have it as a key; ``ps`` gives one list.
 
     Raises:
         SystemExit: after saying why there are no hosts.
@@ -35,7 +37,9 @@ def run_on_all_hosts(arguments: Namespace, command: str, *words: str, processes:
         fail("--all-hosts takes the robot of --file: leave out --robot", UNREADABLE)
     plan = _plan(arguments.file or DEFAULT_FILE)
     printer = _Printer(command, is_json=getattr(arguments, "format", "text") == "json")
-    shares = {name: _of_host(plan, name, processes) for name in plan.hosts if name in hosts_of(plan)}
+    shares = {
+        name: _of_host(plan, name, processes) for name in plan.hosts if name in hosts_of(plan)
+    }
     commands = {
         name: [command, "--robot", f"{plan.robot}.{name}", *words, *(["--", *own] if own else [])]
         for name, own in shares.items()
@@ -53,8 +57,8 @@ def _of_host(plan: Plan, host: str, processes: Sequence[str]) -> list[str]:
 def _plan(file: str) -> Plan:
     from tfcompose.cli.plans import expected_plan
     from tfcompose.cli.terminal import reject
-    from tfcompose.deploy.rollout import target_of
-    from tfcompose.findings import RejectedError
+    from tfcompose.foundation.findings import RejectedError
+    from tfcompose.tools.deploy.rollout import target_of
 
     plan, _ = expected_plan(file, Namespace(profiles=[], overlays=[], settings=[], given={}))
     try:
@@ -66,13 +70,15 @@ def _plan(file: str) -> Plan:
 
 async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _Printer) -> int:
     printer.width = max(map(len, commands))
-    codes = await asyncio.gather(*(_run_on(plan, name, words, printer) for name, words in commands.items()))
+    codes = await asyncio.gather(
+        *(_run_on(plan, name, words, printer) for name, words in commands.items())
+    )
     printer.end(list(commands))
     return max(codes)
 
 
 async def _run_on(plan: Plan, name: str, words: list[str], printer: _Printer) -> int:
-    from tfcompose.deploy.connection import Host, connected, settings_of
+    from tfcompose.tools.deploy.connection import Host, connected, settings_of
 
     host = plan.hosts[name]
     there = await connected(name, host, settings_of(plan.robot, name, host), None)

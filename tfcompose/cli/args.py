@@ -10,16 +10,16 @@ from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, printable, reject
-from tfcompose.findings import RejectedError
-from tfcompose.language import Given, composed, validate, with_includes
-from tfcompose.language.args import as_given
-from tfcompose.load import load
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.spec.language import Given, composed, validate, with_includes
+from tfcompose.spec.language.args import as_given
+from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator
 
-    from tfcompose.language import ArgSpec
+    from tfcompose.spec.language import ArgSpec
 
 
 def show_args(arguments: Namespace) -> int:
@@ -53,7 +53,9 @@ def _lines(name: str, declared: ArgSpec) -> Iterator[str]:
     facts = [f"one of {', '.join(declared.alternatives)}" if declared.choices else declared.kind]
     bounds = (("at least", declared.min), ("at most", declared.max))
     facts += [f"{what} {bound}" for what, bound in bounds if bound is not None]
-    facts.append("has to be given" if declared.default is None else f"default: {as_given(declared.default)}")
+    facts.append(
+        "has to be given" if declared.default is None else f"default: {as_given(declared.default)}"
+    )
     facts += [f"or {declared.env} in the environment"] if declared.env else []
     yield f"{name}:=…  {', '.join(facts)}"
     if declared.description:

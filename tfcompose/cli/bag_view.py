@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.live import from_bag
 from tfcompose.cli.terminal import UNREADABLE, fail
 from tfcompose.cli.view_session import plan_of_session
-from tfcompose.plan.topics import parts_of
-from tfcompose.view.bag import BagTree, Recorded
-from tfcompose.view.live_panel import BagPanel
+from tfcompose.model.plan.topics import parts_of
+from tfcompose.tools.view.bag import BagTree, Recorded
+from tfcompose.tools.view.live_panel import BagPanel
 
 if TYPE_CHECKING:
     import viser
 
-    from tfcompose.geometry import Offset
-    from tfcompose.view.reload import ReloadedPanel
-    from tfcompose.view.session import Session
+    from tfcompose.foundation.geometry import Offset
+    from tfcompose.tools.view.reload import ReloadedPanel
+    from tfcompose.tools.view.session import Session
 
 #: A larger time counts from the epoch.
 _LONGEST_S = 1e8
@@ -36,7 +36,10 @@ class BagView:
         self._at_s = at_s - self._recorded.begin_ns / 1e9 if at_s > _LONGEST_S else at_s
         if not 0 <= self._at_s <= self._recorded.length_s:
             length = f"{self._recorded.length_s:.2f}"
-            fail(f"--at {at_s:g} is not in {path}: it lasts {length} s from its first transform", UNREADABLE)
+            fail(
+                f"--at {at_s:g} is not in {path}: it lasts {length} s from its first transform",
+                UNREADABLE,
+            )
 
     def show(self, server: viser.ViserServer, shown: ReloadedPanel) -> BagPanel:
         """Show the recording with the robot as it is now."""

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import FAILED, INTERRUPTED, UNREADABLE, fail
-from tfcompose.findings import Finding
-from tfcompose.plan.codec import decode, encode
-from tfcompose.signals import take_interrupt
+from tfcompose.foundation.findings import Finding
+from tfcompose.foundation.signals import take_interrupt
+from tfcompose.model.plan.codec import decode, encode
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -27,15 +27,17 @@ if TYPE_CHECKING:
 class BuildProcess:
     """Builds a robot while this process goes on; what is found is printed there, on the same terminal.
 
-    It has a process group of its own, so that a Ctrl-C comes to it once, from here: an error in the ``with`` block
-    interrupts the build and waits for its end.
+    It has a process group of its own, so that a Ctrl-C comes to it once, from here: an error in
+    the ``with`` block interrupts the build and waits for its end.
     """
 
     def __init__(self, arguments: Namespace) -> None:
         self._pipe, answer = os.pipe()
         sys.stdout.flush()
         sys.stderr.flush()
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # what Python does after a fork prints errors
+        mask = signal.pthread_sigmask(
+            signal.SIG_BLOCK, [signal.SIGINT]
+        )  # what Python does after a fork prints errors
         self._pid = os.fork()
         if self._pid == 0:
             os._exit(_build(arguments, answer, mask))
@@ -50,7 +52,10 @@ class BuildProcess:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         if self._pid:
             self._interrupt()
@@ -94,14 +99,21 @@ def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
     try:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         os.setpgid(0, 0)
-        for number in (signal.SIGTTOU, signal.SIGTTIN):  # a terminal may stop other groups that write to it, or read
+        for number in (
+            signal.SIGTTOU,
+            signal.SIGTTIN,
+        ):  # a terminal may stop other groups that write to it, or read
             signal.signal(number, signal.SIG_IGN)
         from tfcompose.cli.plans import PLAN
         from tfcompose.cli.writing import build
 
         folder, _, found = build(arguments)
         with open(answer, "wb", closefd=False) as pipe:
-            pipe.write(os.fsencode(folder / PLAN) + b"\0" + json.dumps([encode(one) for one in found]).encode())
+            pipe.write(
+                os.fsencode(folder / PLAN)
+                + b"\0"
+                + json.dumps([encode(one) for one in found]).encode()
+            )
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else UNREADABLE

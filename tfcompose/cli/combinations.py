@@ -1,6 +1,7 @@
 """Combinations of the values that a robot's arguments can have: which ones are judged, and in which ones a finding is.
 
-Up to ``MOST`` they are all judged; beyond it so many that each two values of any two arguments are together in one.
+Up to ``MOST`` they are all judged; beyond it so many that each two values of any two arguments are
+together in one.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from itertools import combinations as subsets
 from itertools import product
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Finding, Note
+from tfcompose.foundation.findings import Finding, Note
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,7 +25,9 @@ MOST = 256
 _Choice = tuple[int, str]
 
 
-def combinations(alternatives: Mapping[str, Sequence[str]], first: Combination) -> list[Combination]:
+def combinations(
+    alternatives: Mapping[str, Sequence[str]], first: Combination
+) -> list[Combination]:
     """Return the combinations that are judged, ``first`` before all others."""
     names = list(alternatives)
     if math.prod(map(len, alternatives.values())) <= MOST:
@@ -47,14 +50,18 @@ def _pairwise(values: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
         chosen: dict[int, str] = dict(next(iter(missing)))
         for index, known in enumerate(values):
             if index not in chosen:
-                chosen[index] = max(known, key=lambda value: _new_pairs((index, value), chosen, missing))
+                chosen[index] = max(
+                    known, key=lambda value: _new_pairs((index, value), chosen, missing)
+                )
         for pair in subsets(sorted(chosen.items()), 2):
             missing.pop(frozenset(pair), None)
         rows.append(tuple(chosen[index] for index in range(len(values))))
     return rows
 
 
-def _new_pairs(choice: _Choice, chosen: dict[int, str], missing: Mapping[frozenset[_Choice], None]) -> int:
+def _new_pairs(
+    choice: _Choice, chosen: dict[int, str], missing: Mapping[frozenset[_Choice], None]
+) -> int:
     return sum(frozenset((choice, other)) in missing for other in chosen.items())
 
 
@@ -70,7 +77,11 @@ def merged(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Find
                 where[key].append(index)
     every = [combination for combination, _ in judged]
     return [
-        one if len(where[key]) == len(judged) else replace(one, notes=(*one.notes, Note(_named(every, where[key]))))
+        (
+            one
+            if len(where[key]) == len(judged)
+            else replace(one, notes=(*one.notes, Note(_named(every, where[key]))))
+        )
         for key, one in firsts.items()
     ]
 
@@ -82,7 +93,9 @@ def _named(every: Sequence[Combination], where: Sequence[int]) -> str:
     best, covered = dict(first), 1
     for size in (2, 1):
         for names in subsets(first, size):
-            matching = {i for i, one in enumerate(every) if all(one[name] == first[name] for name in names)}
+            matching = {
+                i for i, one in enumerate(every) if all(one[name] == first[name] for name in names)
+            }
             if matching <= inside and len(matching) >= covered:
                 best, covered = {name: first[name] for name in names}, len(matching)
     words = " ".join(f"{name}:={value}" for name, value in best.items())

@@ -1,6 +1,7 @@
 """From the files that the command line names to a compiled robot: presets, overlays, findings printed.
 
-The compiler asks here about files on this machine: which are there, where packages are, and a mesh's volume.
+The compiler asks here about files on this machine: which are there, where packages are, and a
+mesh's volume.
 """
 
 from __future__ import annotations
@@ -16,27 +17,27 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import fail, print_findings, reject
-from tfcompose.compile import Compiled, compile_robot
-from tfcompose.findings import RejectedError, Span, did_you_mean
-from tfcompose.language import Given, GivenArg, set_value, with_includes
-from tfcompose.load import load
-from tfcompose.resolve import Library
-from tfcompose.urdf.inertia import UnmeasurableError
-from tfcompose.urdf.packages import FETCH, Disk
+from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.resolve import Library
+from tfcompose.compiler.urdf.inertia import UnmeasurableError
+from tfcompose.compiler.urdf.packages import FETCH, Disk
+from tfcompose.foundation.findings import RejectedError, Span, did_you_mean
+from tfcompose.spec.language import Given, GivenArg, set_value, with_includes
+from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Mapping
 
-    from tfcompose.geometry import Vector
-    from tfcompose.load import Source
-    from tfcompose.model import Edge, Robot
-    from tfcompose.urdf.inertia import Moments
-    from tfcompose.urdf.packages import Packages
-    from tfcompose.urdf.xacro import Expansion, Use
+    from tfcompose.compiler.urdf.inertia import Moments
+    from tfcompose.compiler.urdf.packages import Packages
+    from tfcompose.compiler.urdf.xacro import Expansion, Use
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.robot import Edge, Robot
+    from tfcompose.spec.load import Source
 
 
-PRESETS = Path(__file__).parents[1] / "presets"
+PRESETS = Path(__file__).parents[1] / "data" / "presets"
 #: A package names, under this group, the module whose folder holds its presets.
 PRESET_GROUP = "tfcompose.presets"
 
@@ -100,7 +101,9 @@ def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) ->
 
 def given_by(arguments: Namespace) -> Given:
     """Return what the command line and the environment give the robot's arguments."""
-    args = {name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()}
+    args = {
+        name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()
+    }
     return Given(args, os.environ)
 
 
@@ -141,7 +144,10 @@ def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]
     """
     for frame in (a, b):
         if frame not in robot.frames:
-            fail(f"unknown frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
+            fail(
+                f"unknown frame {frame};"
+                f" {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}"
+            )
     up, down = _ancestry(robot, a), _ancestry(robot, b)
     shared = {id(edge) for edge in up} & {id(edge) for edge in down}
     rising = [edge for edge in up if id(edge) not in shared]
@@ -165,8 +171,12 @@ _POINTER = b"version https://git-lfs.github.com/spec/"
 
 def disk() -> Disk:
     """Return this machine's files, with the packages of the workspaces that are sourced."""
-    prefixes = tuple(prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix)
-    return Disk(read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, _is_pointer)
+    prefixes = tuple(
+        prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix
+    )
+    return Disk(
+        read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, _is_pointer
+    )
 
 
 @cache
@@ -182,22 +192,27 @@ def moments(path: str, scale: Vector) -> Moments:
     """Return volume, centre and tensor of a closed mesh at a scale; what reads meshes is loaded only here.
 
     Raises:
-        UnmeasurableError: as ``tfcompose.urdf.mesh.moments``, and if trimesh is not installed.
+        UnmeasurableError: as ``tfcompose.compiler.urdf.mesh.moments``, and if trimesh is not
+        installed.
     """
     if _is_pointer(path):
         raise UnmeasurableError("TF725", "it is a Git LFS pointer, not the mesh", FETCH)
     try:
-        from tfcompose.urdf import mesh
+        from tfcompose.compiler.urdf import mesh
     except ImportError:
         advice = "pip install 'tfcompose[mesh]', or give inertia: {ixx, iyy, izz}"
-        raise UnmeasurableError("TF905", "trimesh, which computes its volume, is not installed", advice) from None
+        raise UnmeasurableError(
+            "TF905", "trimesh, which computes its volume, is not installed", advice
+        ) from None
     return mesh.moments(path, scale)
 
 
-def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None) -> Expansion:
+def _expanded(
+    file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None
+) -> Expansion:
     """Return what xacro makes of a file, or of a call of one of its macros; xacro is loaded only here."""
     if use is None or not use.macro:
         read_text(file)  # a file that cannot be read is refused as everywhere
-    from tfcompose.urdf.expand import expand
+    from tfcompose.compiler.urdf.expand import expand
 
     return expand(file, packages, arguments, use)

@@ -12,7 +12,7 @@ from tfcompose.cli.documentation import TOPICS
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
-from tfcompose.findings import RejectedError
+from tfcompose.foundation.findings import RejectedError
 
 if TYPE_CHECKING:
     from argparse import Action
@@ -25,7 +25,9 @@ YAML = (".yaml", ".yml")
 PATHS = frozenset({"FILE", "DIR", "FOLDER", "BAG", "PICTURE", "PLAN", "OLD", "NEW"})
 
 
-def candidates(commands: Mapping[str, Command], words: Sequence[str], at: int) -> tuple[list[str], bool]:
+def candidates(
+    commands: Mapping[str, Command], words: Sequence[str], at: int
+) -> tuple[list[str], bool]:
     """Return what ``words[at]`` can be, and whether it can also be a file.
 
     ``words`` begins with the program's name, and the word may be half written.
@@ -41,7 +43,7 @@ def candidates(commands: Mapping[str, Command], words: Sequence[str], at: int) -
     if before[0] not in commands:
         return [], False
     if before == ["help"]:
-        from tfcompose.language.reference import keys, paths
+        from tfcompose.spec.language.reference import keys, paths
 
         return _beginning(word, [*TOPICS, *commands, *(paths() if "." in word else keys())]), False
     actions = command_parser(before[0], commands[before[0]])._actions  # noqa: SLF001 (argparse has no other way)
@@ -49,14 +51,21 @@ def candidates(commands: Mapping[str, Command], words: Sequence[str], at: int) -
     option, equals, value = word.partition("=")
     joined = options.get(option) if equals else None
     if joined is not None and joined.nargs != 0:
-        return [f"{option}={one}" for one in _completed(value, _values(joined, before), joined)], _is_path(joined)
+        return [
+            f"{option}={one}" for one in _completed(value, _values(joined, before), joined)
+        ], _is_path(joined)
     valued = options.get(before[-1])
     if valued is not None and valued.nargs != 0:
         return _completed(word, _values(valued, before), valued), _is_path(valued)
     if word.startswith("-"):
         return _beginning(word, options), False
     positionals = [one for one in actions if not one.option_strings]
-    if positionals and positionals[0].choices and positionals[0].nargs is None and len(before) == 1:
+    if (
+        positionals
+        and positionals[0].choices
+        and positionals[0].nargs is None
+        and len(before) == 1
+    ):
         positionals = positionals[:1]  # the first word is needed
     known = [value for one in positionals for value in _values(one, before)]
     return _beginning(word, known), any(map(_is_path, positionals))
@@ -69,7 +78,11 @@ def split_line(line: str) -> list[str]:
             words = shlex.split(f"{line}{end}")
         except ValueError:
             continue
-        return [*words, ""] if not end and (not line or line[-1].isspace()) and not line.endswith("\\ ") else words
+        return (
+            [*words, ""]
+            if not end and (not line or line[-1].isspace()) and not line.endswith("\\ ")
+            else words
+        )
     return []
 
 
@@ -78,7 +91,9 @@ def _expanded(word: str) -> str:
 
 
 def _is_path(action: Action) -> bool:
-    return isinstance(action.metavar, str) and not PATHS.isdisjoint(re.findall("[A-Z]+", action.metavar))
+    return isinstance(action.metavar, str) and not PATHS.isdisjoint(
+        re.findall("[A-Z]+", action.metavar)
+    )
 
 
 def _completed(word: str, known: Iterable[str], action: Action) -> list[str]:
@@ -104,8 +119,8 @@ def _values(action: Action, before: Sequence[str]) -> list[str]:
 def _frames(before: Sequence[str]) -> list[str]:
     """Return the frames of the robot file; before it is named, nothing: files are meant."""
     from tfcompose.cli.compiling import library
-    from tfcompose.compile import compile_source
-    from tfcompose.load import load
+    from tfcompose.compiler.compile import compile_source
+    from tfcompose.spec.load import load
 
     file = next((word for word in before if word.endswith(YAML)), None)
     if file is None and before[0] == "explain":
@@ -116,11 +131,15 @@ def _frames(before: Sequence[str]) -> list[str]:
         ).robot
     except RejectedError:
         return []
-    return sorted({frame for edge in robot.edges for frame in (edge.parent, edge.child)}) if robot else []
+    return (
+        sorted({frame for edge in robot.edges for frame in (edge.parent, edge.child)})
+        if robot
+        else []
+    )
 
 
 def _codes(_: Sequence[str]) -> list[str]:
-    from tfcompose.catalogue import CATALOGUE
+    from tfcompose.foundation.catalogue import CATALOGUE
 
     return list(CATALOGUE)
 
@@ -131,9 +150,11 @@ def _codes_or_frames(before: Sequence[str]) -> list[str]:
 
 def _section(name: str, before: Sequence[str]) -> list[str]:
     """Return the names in a section of the robot file that is given, or of that of this folder."""
-    from tfcompose.load import load
+    from tfcompose.spec.load import load
 
-    file = next((word for word in before if word.endswith(YAML) and not is_plan(word)), DEFAULT_FILE)
+    file = next(
+        (word for word in before if word.endswith(YAML) and not is_plan(word)), DEFAULT_FILE
+    )
     try:
         section = load(read_text(file), file).data.get(name)
     except RejectedError:
@@ -155,7 +176,7 @@ def _given(before: Sequence[str]) -> list[str]:
 
 def _presets(_: Sequence[str]) -> list[str]:
     from tfcompose.cli.compiling import library
-    from tfcompose.resolve.presets import node_preset_names
+    from tfcompose.compiler.resolve.presets import node_preset_names
 
     names = library().names
     return [*names, *dict.fromkeys(name.partition("/")[0] for name in names), *node_preset_names()]

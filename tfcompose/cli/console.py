@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.cli.reading import line_of
 from tfcompose.cli.terminal import coloured_only, plain
-from tfcompose.ipc import (
+from tfcompose.compiler.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
+from tfcompose.foundation.text import counted, listed
+from tfcompose.model.messages import (
     AllReady,
     AllStarted,
     Ended,
@@ -26,16 +28,15 @@ from tfcompose.ipc import (
     TreeComplete,
     Waiting,
 )
-from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
-from tfcompose.text import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.ipc import Notice
-    from tfcompose.plan import Plan
+    from tfcompose.model.messages import Notice
+    from tfcompose.model.plan import Plan
 
-#: Colours that differ on dark and light terminals; a process keeps its own by its place in the plan.
+#: Colours that differ on dark and light terminals; a process keeps its own by its place in the
+#: plan.
 COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))
 #: Whose lines the launcher's own are.
 LAUNCHER = "tfcompose"
@@ -96,8 +97,9 @@ class Nowhere:
 class Console:
     """Writes notices as lines: ``name | text``, coloured on a terminal.
 
-    ``keep`` gets each line without colours, and may return a complaint to print; ``status`` stays below the lines. A
-    process's own lines are only kept, or only written, where its ``output`` says so.
+    ``keep`` gets each line without colours, and may return a complaint to print; ``status`` stays
+    below the lines. A process's own lines are only kept, or only written, where its ``output``
+    says so.
     """
 
     def __init__(
@@ -117,10 +119,15 @@ class Console:
         self._width = prefix_width([*names, LAUNCHER])
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
-        self._outputs = {process.name: process.output for process in plan.processes if process.output != "both"}
-        #: The last lines of each process, as findings quote them: what was printed is not printed again.
+        self._outputs = {
+            process.name: process.output for process in plan.processes if process.output != "both"
+        }
+        #: The last lines of each process, as findings quote them: what was printed is not printed
+        #: again.
         self._printed: dict[str, deque[str]] = {}
-        self._hosts = {process.name: f"host {process.host}" for process in plan.processes if process.host}
+        self._hosts = {
+            process.name: f"host {process.host}" for process in plan.processes if process.host
+        }
 
     def __call__(self, notice: Notice) -> None:
         """Write what a notice says, at once.
@@ -169,20 +176,30 @@ class Console:
         elif notice.state == "expected":
             nodes = ", ".join(self._nodes.get(notice.process, ()))
             host = self._hosts.get(notice.process)
-            text = f"expecting {notice.process} ({nodes}): {f'{host} starts it' if host else 'it is started elsewhere'}"
+            text = (
+                f"expecting {notice.process} ({nodes}):"
+                f" {f'{host} starts it' if host else 'it is started elsewhere'}"
+            )
         elif notice.detail:
             text += f": {notice.detail}"
         self._say(text)
 
     @_write.register
     def _(self, notice: OwnerLive) -> None:
-        edges = counted(len(notice.edges), "edge") if len(notice.edges) > NAMED_AT_MOST else ", ".join(notice.edges)
+        edges = (
+            counted(len(notice.edges), "edge")
+            if len(notice.edges) > NAMED_AT_MOST
+            else ", ".join(notice.edges)
+        )
         owner = f"{notice.owner} ({notice.node})"
         self._say(f"{self._paint('live', GREEN)}  {owner}: {edges}  {notice.seconds:.2f} s")
 
     @_write.register
     def _(self, notice: ProcessReady) -> None:
-        self._say(f"{self._paint('ready', GREEN)} {notice.process}: {notice.seen}  {notice.seconds:.2f} s")
+        self._say(
+            f"{self._paint('ready', GREEN)} {notice.process}: {notice.seen} "
+            f" {notice.seconds:.2f} s"
+        )
 
     @_write.register
     def _(self, notice: AllStarted) -> None:
@@ -195,7 +212,11 @@ class Console:
             for line in _start_table(notice):
                 self._say(line)
         if notice.without:
-            self._say(self._paint(f"without {', '.join(notice.without)}: failed, and not required", YELLOW))
+            self._say(
+                self._paint(
+                    f"without {', '.join(notice.without)}: failed, and not required", YELLOW
+                )
+            )
 
     @_write.register
     def _(self, notice: Replanned) -> None:
@@ -208,17 +229,26 @@ class Console:
     @_write.register
     def _(self, notice: TreeComplete) -> None:
         edges = counted(notice.edges, "edge")
-        self._say(self._paint(f"tree complete: {edges} live after {notice.seconds:.2f} s", GREEN, BOLD))
+        self._say(
+            self._paint(f"tree complete: {edges} live after {notice.seconds:.2f} s", GREEN, BOLD)
+        )
 
     @_write.register
     def _(self, notice: Waiting) -> None:
         for one in notice.missing:
-            self._say(self._paint(f"waiting for {one.owner} ({one.node}): {listed(one.edges, NAMED_AT_MOST)}", YELLOW))
+            self._say(
+                self._paint(
+                    f"waiting for {one.owner} ({one.node}): {listed(one.edges, NAMED_AT_MOST)}",
+                    YELLOW,
+                )
+            )
 
     @_write.register
     def _(self, notice: FindingShown) -> None:
         notes = tuple(one for one in notice.found.notes if not self._is_printed(one.message))
-        for line in render_text([replace(notice.found, notes=notes)], line_of, colour=self._colour).splitlines():
+        for line in render_text(
+            [replace(notice.found, notes=notes)], line_of, colour=self._colour
+        ).splitlines():
             self._say(line)
 
     @_write.register
@@ -238,7 +268,11 @@ class Console:
         for line in rest:
             if not self._is_printed(line):
                 self._say(f"   {line}")
-        self._say(self._paint(f"ended with exit code {notice.exit_code}{f': {first}' if first else ''}", RED))
+        self._say(
+            self._paint(
+                f"ended with exit code {notice.exit_code}{f': {first}' if first else ''}", RED
+            )
+        )
 
     def _is_printed(self, quoted: str) -> bool:
         """Return whether a line that a finding quotes is among the last ones that its process printed."""
@@ -250,11 +284,15 @@ class Console:
     def _kept(self, name: str, text: str) -> str | None:
         return self._keep(name, plain(text)) if self._keep else None
 
-    def _line(self, name: str, text: str, colour: str, *, log: bool = False, keep: bool = True) -> None:
+    def _line(
+        self, name: str, text: str, colour: str, *, log: bool = False, keep: bool = True
+    ) -> None:
         fault = self._kept(name, text) if keep else None
         clear = self._status.cleared() if self._status else ""
         shown = coloured_only(text) if self._colour else plain(text)
-        self._output.write(f"{clear}{self._paint(prefix_of(name, self._width), colour)} {shown}\n", log=log)
+        self._output.write(
+            f"{clear}{self._paint(prefix_of(name, self._width), colour)} {shown}\n", log=log
+        )
         if fault:
             self._complain(fault)
 
@@ -269,7 +307,10 @@ class Console:
 def vanished(edges: tuple[str, ...]) -> str:
     """Return what is to be said of fixed edges that vanished."""
     named = listed(edges, NAMED_AT_MOST)
-    return f"running listeners keep {named}: tf2 never forgets a fixed frame; restart RViz and other listeners"
+    return (
+        f"running listeners keep {named}: tf2 never forgets a fixed frame; restart RViz and other"
+        " listeners"
+    )
 
 
 def _start_table(notice: AllReady) -> list[str]:
@@ -288,7 +329,9 @@ class StatusLine:
     It counts what notices say. ``columns`` gives the terminal's width.
     """
 
-    def __init__(self, plan: Plan, columns: Callable[[], int], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, plan: Plan, columns: Callable[[], int], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._owned = {process.name: len(process.owns) for process in plan.processes}
         self._edges = len(plan.edges)
         self._columns = columns
@@ -336,7 +379,10 @@ class StatusLine:
         """Return the longest way to say it that fits."""
         seconds = int(self._clock() - self._begun)
         clock = f"[{seconds // 60:02d}:{seconds % 60:02d}]"
-        long, short = self._parts("processes", "edges live", " of "), self._parts("proc", "edges", "/")
+        long, short = (
+            self._parts("processes", "edges live", " of "),
+            self._parts("proc", "edges", "/"),
+        )
         for parts in (long, long[:-1], short, short[:-1]):
             text = f"{clock} {' · '.join(part for part in parts if part)}"
             if len(text) <= columns:
@@ -345,7 +391,9 @@ class StatusLine:
 
     def _parts(self, processes: str, edges: str, of: str) -> list[str]:
         """Return what is wrong, how many processes run, how many edges are live, and what is missing."""
-        wrong = [f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count]
+        wrong = [
+            f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count
+        ]
         running = sum(self._runs(name) for name in self._owned)
         shown = [f"{running}{of}{len(self._owned)} {processes}"]
         shown += [f"{sum(self._live.values())}{of}{self._edges} {edges}"] if self._edges else []
@@ -360,7 +408,13 @@ class StatusLine:
 
     def _missing(self) -> str:
         if self._stopping:
-            alive = [name for name, state in self._states.items() if state in ("running", "stopping")]
+            alive = [
+                name for name, state in self._states.items() if state in ("running", "stopping")
+            ]
             return f"stopping {listed(alive, STATUS_NAMED_AT_MOST)}" if alive else "stopping"
         waits = [name for name, owned in self._owned.items() if owned and name not in self._live]
-        return f"waiting for {listed(waits, STATUS_NAMED_AT_MOST)}" if waits and not self._ready else ""
+        return (
+            f"waiting for {listed(waits, STATUS_NAMED_AT_MOST)}"
+            if waits and not self._ready
+            else ""
+        )

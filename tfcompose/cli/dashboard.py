@@ -1,8 +1,9 @@
 """What the live view of ``up`` shows: pages of lines for a terminal of any size, and what each key does.
 
-It knows what it is given: notices and answers of the launcher, the plan, what processes use, and lines of logs. Lines
-are rich's texts, because characters of several columns count there as a terminal counts them. The tables are
-tfcompose's own, which leave out columns where rich would shorten numbers.
+It knows what it is given: notices and answers of the launcher, the plan, what processes use, and
+lines of logs. Lines are rich's texts, because characters of several columns count there as a
+terminal counts them. The tables are tfcompose's own, which leave out columns where rich would
+shorten numbers.
 """
 
 from __future__ import annotations
@@ -21,17 +22,17 @@ from tfcompose.cli.process_table import HEAD, TABLE, row, uptime
 from tfcompose.cli.reading import line_of
 from tfcompose.cli.tables import Table, shortened
 from tfcompose.cli.terminal import plain
-from tfcompose.ipc import Ended, FindingShown, RecoveredShown, Stopping
-from tfcompose.render.text import GREEN, RED, YELLOW, render_text
-from tfcompose.text import counted
+from tfcompose.compiler.render.text import GREEN, RED, YELLOW, render_text
+from tfcompose.foundation.text import counted
+from tfcompose.model.messages import Ended, FindingShown, RecoveredShown, Stopping
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from tfcompose.cli.process_table import Usage
-    from tfcompose.findings import Finding
-    from tfcompose.ipc import Notice, ProcessStatus, RobotStatus
-    from tfcompose.plan import Plan
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.messages import Notice, ProcessStatus, RobotStatus
+    from tfcompose.model.plan import Plan
 
 Page = Literal["processes", "log", "edges", "findings", "help"]
 
@@ -42,7 +43,8 @@ KEPT_LINES = 5000
 LONGEST_LINE = 4000
 KEPT_FINDINGS = 500
 KEPT_EVENTS = 100
-#: The lower part of the first page takes a third of the rows where there is enough room, and at least so many.
+#: The lower part of the first page takes a third of the rows where there is enough room, and at
+#: least so many.
 NEWS_AT_LEAST = 4
 MARK = "▸"
 
@@ -115,10 +117,11 @@ class _Scroll:
 class Dashboard:
     """The live view's state. ``name`` is the robot's with its domain; ``clock`` gives seconds since 1970.
 
-    The findings of the build and ``warnings`` were printed before the view, and are its first findings and events.
+    The findings of the build and ``warnings`` were printed before the view, and are its first
+    findings and events.
 
-    ``status`` and ``used`` are what was learned last; ``log_of`` names the process whose log is to be read for
-    ``add_log_lines``, if a log is shown.
+    ``status`` and ``used`` are what was learned last; ``log_of`` names the process whose log is to
+    be read for ``add_log_lines``, if a log is shown.
     """
 
     name: str
@@ -159,7 +162,9 @@ class Dashboard:
             text = render_text([notice.found], line_of, colour=True)
             self._reports.append(_Reported(at, tuple(map(Text.from_ansi, text.splitlines()))))
         elif isinstance(notice, RecoveredShown):
-            self._reports.append(_Reported(at, (Text.assemble(("over", "green"), f"  {plain(notice.text)}"),)))
+            self._reports.append(
+                _Reported(at, (Text.assemble(("over", "green"), f"  {plain(notice.text)}"),))
+            )
         elif isinstance(notice, Stopping):
             self.stopping = plain(notice.reason)
         elif isinstance(notice, Ended):
@@ -274,11 +279,18 @@ class Dashboard:
             ours = [process for process in self._processes() if process.kind != "external"]
             running = sum(process.state == "running" for process in ours)
             edges, live = self._live_edges()
-            head.append(f" · {running}/{len(ours)} processes", style="" if running == len(ours) else "yellow")
+            head.append(
+                f" · {running}/{len(ours)} processes",
+                style="" if running == len(ours) else "yellow",
+            )
             if edges:
-                head.append(f" · {live}/{edges} edges live", style="" if live == edges else "yellow")
+                head.append(
+                    f" · {live}/{edges} edges live", style="" if live == edges else "yellow"
+                )
         wrong = [counted(number, severity) for severity, number in self._counts.items() if number]
-        head.append(f" · {', '.join(wrong) or 'no findings'}", style="red" if self._counts["error"] else "")
+        head.append(
+            f" · {', '.join(wrong) or 'no findings'}", style="red" if self._counts["error"] else ""
+        )
         clock = Text(f"up {uptime(self.status.uptime)} " if self.status else "")
         room = columns - head.cell_len - clock.cell_len
         if room > 0:
@@ -295,27 +307,42 @@ class Dashboard:
         if failed:
             return Text(f"without {', '.join(failed)}", style="red")
         if self.status.ready and self.status.complete:
-            return Text("all well" if not sum(self._counts.values()) else "complete", style="green")
+            return Text(
+                "all well" if not sum(self._counts.values()) else "complete", style="green"
+            )
         return Text("ready, edges silent" if self.status.ready else "not ready", style="yellow")
 
     def _live_edges(self) -> tuple[int, int]:
         """Return how many edges the processes own, and how many of them are live."""
-        return sum(one.edges for one in self._processes()), sum(one.live for one in self._processes())
+        return sum(one.edges for one in self._processes()), sum(
+            one.live for one in self._processes()
+        )
 
     def _foot(self) -> Text:
         if self._confirming:
-            return Text(f" q again ends {self.name}; any other key goes on", style="reverse yellow")
+            return Text(
+                f" q again ends {self.name}; any other key goes on", style="reverse yellow"
+            )
         return Text(f" {_KEYS[self.page]}", style="dim")
 
     def _process_page(self, columns: int, rows: int) -> list[Text]:
         processes = self._processes()
-        below = max(min(NEWS_AT_LEAST, rows // 3), rows - len(processes) - 1) if processes else rows
+        below = (
+            max(min(NEWS_AT_LEAST, rows // 3), rows - len(processes) - 1) if processes else rows
+        )
         found = self._process_lines(columns, rows - below) if processes else []
         if below > 1:
             hidden = len(processes) - max(len(found) - 1, 0)
-            title = "Findings (f shows them with help)" if self._reports else "Events (0 shows all)"
+            title = (
+                "Findings (f shows them with help)" if self._reports else "Events (0 shows all)"
+            )
             title = f"{hidden} more ↑↓ · {title}" if hidden else title
-            found.append(Text(shortened(f"── {title} ".ljust(columns, "─"), columns, at_end=True), style="dim"))
+            found.append(
+                Text(
+                    shortened(f"── {title} ".ljust(columns, "─"), columns, at_end=True),
+                    style="dim",
+                )
+            )
             news = self._news()
             found += news[max(len(news) - below + 1, 0) :]
         return found
@@ -324,7 +351,8 @@ class Dashboard:
         """Return the table's head and as many processes as there is room for, the chosen one among them."""
         rows_of = [row(one, self.used) for one in self._processes()]
         head, *shown = (
-            Text.from_ansi(line) for line in TABLE.lines([HEAD, *rows_of], columns - len(_INDENT), coloured=True)
+            Text.from_ansi(line)
+            for line in TABLE.lines([HEAD, *rows_of], columns - len(_INDENT), coloured=True)
         )
         room = max(rows - 1, 1)
         first = min(max(self._chosen - room // 2, 0), max(len(shown) - room, 0))
@@ -332,7 +360,11 @@ class Dashboard:
         for number, line in enumerate(shown[first : first + room], first):
             key = str(number + 1) if number < 9 else " "  # noqa: PLR2004 (keys of one digit)
             chosen = number == self._chosen
-            found.append(Text(f" {MARK if chosen else ' '}{key} ", style="bold" if chosen else "dim").append_text(line))
+            found.append(
+                Text(
+                    f" {MARK if chosen else ' '}{key} ", style="bold" if chosen else "dim"
+                ).append_text(line)
+            )
         return found
 
     def _news(self) -> list[Text]:
@@ -344,7 +376,9 @@ class Dashboard:
     def _log_page(self, columns: int, rows: int) -> list[Text]:
         scroll = self._scroll("log")
         where = f"{scroll.back} lines back, End follows" if scroll.back else "following"
-        title = Text(f" log of {self.log_of} · {where if self._log else 'nothing yet'}", style="bold")
+        title = Text(
+            f" log of {self.log_of} · {where if self._log else 'nothing yet'}", style="bold"
+        )
         lines = self._log
         window = scroll.window(len(lines), rows - 1)
         found: list[Text] = []
@@ -357,7 +391,9 @@ class Dashboard:
         return [title, *(found[len(found) - rows + 1 :] if len(found) >= rows else found)]
 
     def _edge_page(self, columns: int, rows: int) -> list[Text]:
-        missing = set(self.status.missing) if self.status else {edge.name for edge in self.plan.edges}
+        missing = (
+            set(self.status.missing) if self.status else {edge.name for edge in self.plan.edges}
+        )
         silent = set(self.status.silent) if self.status else set()
         table = [
             (
@@ -365,7 +401,13 @@ class Dashboard:
                 edge.owner,
                 edge.kind,
                 f"{edge.rate:g} Hz" if edge.rate and edge.kind != "static" else "–",
-                "not live" if edge.name in missing else "silent" if edge.name in silent else "live",
+                (
+                    "not live"
+                    if edge.name in missing
+                    else "silent"
+                    if edge.name in silent
+                    else "live"
+                ),
             )
             for edge in self.plan.edges
         ]
@@ -376,7 +418,10 @@ class Dashboard:
             [_EDGE_HEAD, *table], columns - 1, coloured=True
         )
         head, *lines = (Text(" ").append_text(Text.from_ansi(line)) for line in shown)
-        return [Text(head.plain, style="dim"), *lines[self._scroll("edges").window(len(lines), rows - 1)]]
+        return [
+            Text(head.plain, style="dim"),
+            *lines[self._scroll("edges").window(len(lines), rows - 1)],
+        ]
 
     def _finding_page(self, columns: int, rows: int) -> list[Text]:
         if not self._reports:
@@ -391,7 +436,9 @@ class Dashboard:
 
     def _help_page(self, columns: int, rows: int) -> list[Text]:
         del columns
-        lines = [Text(f" {line}", style="bold" if line == "Keys" else "") for line in HELP.splitlines()]
+        lines = [
+            Text(f" {line}", style="bold" if line == "Keys" else "") for line in HELP.splitlines()
+        ]
         return lines[self._scroll("help").window(len(lines), rows)]
 
     def _timed(self, at: float, line: Text) -> Text:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from tfcompose.cli.command_parser import Command
 
-FOLDER = Path(__file__).parents[1] / "topics"
+FOLDER = Path(__file__).parents[1] / "data" / "topics"
 #: What a page is about, in the order of reading.
 TOPICS = {
     "language": "the robot file, key by key",
@@ -49,7 +49,7 @@ def page(word: str, commands: Mapping[str, Command]) -> str | None:
         return f"{options}\n{about}" if about else options
     if word in TOPICS:
         return topic(word)
-    from tfcompose.language.reference import key_page
+    from tfcompose.spec.language.reference import key_page
 
     return key_page(word)
 
@@ -61,7 +61,9 @@ def for_terminal(markdown: str, columns: int) -> str:
     from rich.console import Console
     from rich.markdown import Markdown
 
-    options, begin, page = markdown.partition("\n# ") if markdown.startswith("usage: ") else ("", "", markdown)
+    options, begin, page = (
+        markdown.partition("\n# ") if markdown.startswith("usage: ") else ("", "", markdown)
+    )
     stream = StringIO()
     text = _LINK.sub(r"\1", f"# {page}" if begin else page)
     Console(file=stream, width=columns).print(Markdown(text, hyperlinks=False))
@@ -82,13 +84,13 @@ def _read(word: str) -> str:
 
 
 def _keys() -> str:
-    from tfcompose.language.reference import reference
+    from tfcompose.spec.language.reference import reference
 
     return reference("robot").replace("\n# ", "\n## ").replace("# ", "## ", 1)
 
 
 def _codes() -> str:
-    from tfcompose.pages import table
+    from tfcompose.compiler.pages import table
 
     return table(None)
 
@@ -104,7 +106,11 @@ def _vendors() -> str:
     return f"| vendor | models |\n|---|---|\n{rows}"
 
 
-_GENERATED: dict[str, Callable[[], str]] = {"language": _keys, "codes": _codes, "presets": _vendors}
+_GENERATED: dict[str, Callable[[], str]] = {
+    "language": _keys,
+    "codes": _codes,
+    "presets": _vendors,
+}
 
 #: The heading of a model in the reference, to which the types of keys lead.
 _MODEL = re.compile(r"<h2>(\w+)</h2>")
@@ -132,8 +138,8 @@ def html(commands: Mapping[str, Command]) -> str:
 
     from markdown_it import MarkdownIt
 
-    from tfcompose.catalogue import CATALOGUE
-    from tfcompose.pages import page as code_page
+    from tfcompose.compiler.pages import page as code_page
+    from tfcompose.foundation.catalogue import CATALOGUE
 
     renderer = MarkdownIt("commonmark", {"html": False}).enable("table")
     topics = {f"topic-{word}": renderer.render(topic(word)) for word in TOPICS}
@@ -148,13 +154,18 @@ def html(commands: Mapping[str, Command]) -> str:
         options = escape(command_parser(name, command).format_help())
         about = renderer.render(_read(name)) if name not in TOPICS else ""
         described[f"command-{name}"] = f"<h1>tfcompose {name}</h1>\n<pre>{options}</pre>\n{about}"
-    names = "\n".join(_links(title, parts) for title, parts in (("Topics", topics), ("Commands", described)))
+    names = "\n".join(
+        _links(title, parts) for title, parts in (("Topics", topics), ("Commands", described))
+    )
     parts = topics | described
-    sections = "\n".join(f'<section id="{part}">\n{text}</section>' for part, text in parts.items())
+    sections = "\n".join(
+        f'<section id="{part}">\n{text}</section>' for part, text in parts.items()
+    )
     return (
-        f'<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n'
-        f'<meta name="viewport" content="width=device-width">\n<title>tfcompose {__version__}</title>\n'
-        f"<style>{_STYLE}</style>\n<h1>tfcompose {__version__}</h1>\n<nav>\n{names}\n</nav>\n{sections}\n</html>\n"
+        '<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n<meta name="viewport"'
+        ' content="width=device-width">\n<title>tfcompose'
+        f" {__version__}</title>\n<style>{_STYLE}</style>\n<h1>tfcompose"
+        f" {__version__}</h1>\n<nav>\n{names}\n</nav>\n{sections}\n</html>\n"
     )
 
 

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.plans import PLAN, built_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import printable
-from tfcompose.findings import RejectedError
-from tfcompose.plan import StopRule
-from tfcompose.plan.file import read_plan
-from tfcompose.plan.hosts import describe_share
-from tfcompose.plan.topics import partition_of, private_topics
-from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
-from tfcompose.text import counted
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.text import counted
+from tfcompose.model.plan import StopRule
+from tfcompose.model.plan.file import read_plan
+from tfcompose.model.plan.hosts import describe_share
+from tfcompose.model.plan.topics import partition_of, private_topics
+from tfcompose.tf.ros.environment import FASTDDS_PROFILE, child_environment
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator
 
-    from tfcompose.plan import Component, Plan, PlanProcess
+    from tfcompose.model.plan import Component, Plan, PlanProcess
 
 
 def dry_run(arguments: Namespace) -> int:
@@ -40,7 +40,7 @@ def dry_run(arguments: Namespace) -> int:
 def _compiled_files(arguments: Namespace) -> dict[str, str]:
     from tfcompose.cli.compiling import compiled_robot
     from tfcompose.cli.writing import destination
-    from tfcompose.emit import emit
+    from tfcompose.compiler.emit import emit
 
     robot = compiled_robot(arguments.file, arguments)
     _, target = destination(arguments, robot)
@@ -69,7 +69,10 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     yield f"robot {plan.robot}: {processes}, {counted(len(plan.edges), 'edge')}, domain: {domain}"
     yield from describe_share(plan)
     for name, argument in plan.args.items():
-        yield f"  arg      {name}:={str(argument).lower() if isinstance(argument, bool) else _quoted(str(argument))}"
+        yield (
+            "  arg     "
+            f" {name}:={str(argument).lower() if isinstance(argument, bool) else _quoted(str(argument))}"
+        )
     for name, value in plan.environment.items():
         yield f"  env      {name}={_quoted(value)}, when it was built"
     for process in plan.processes:
@@ -82,7 +85,10 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
     yield from _what(process)
     if plan.guard.mode == "strict" and process.kind not in ("external", "guard"):
         yield f"  fence    {_fence(plan, process)}"
-    nodes = [name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "") for name in process.nodes]
+    nodes = [
+        name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "")
+        for name in process.nodes
+    ]
     if nodes:
         yield f"  nodes    {', '.join(nodes)}"
     for name, value in _environment(plan, process).items():
@@ -124,34 +130,56 @@ def _fence(plan: Plan, process: PlanProcess) -> str:
         "partition": f"the partition {partition_of(plan)}",
         "remap": " and ".join(topics) if topics else "where it is sent: no remapping reaches it",
     }
-    way = ways.get(plan.guard.fence) or f"{ways['partition']} with Fast DDS, else to {ways['remap']}"
+    way = (
+        ways.get(plan.guard.fence) or f"{ways['partition']} with Fast DDS, else to {ways['remap']}"
+    )
     return f"its TF goes to {way}; the guard passes on what it owns"
 
 
 def _times(process: PlanProcess) -> Iterator[str]:
     if process.after:
-        yield f"  after    {', '.join(f'{name} is {what}' for name, what in process.after.items())}"
+        yield (
+            f"  after    {', '.join(f'{name} is {what}' for name, what in process.after.items())}"
+        )
     ready = process.ready
     if ready:
-        what = {"exit": f"code {ready.number:g}", "time": f"{ready.number:g} s"}.get(ready.kind, ready.text)
+        what = {"exit": f"code {ready.number:g}", "time": f"{ready.number:g} s"}.get(
+            ready.kind, ready.text
+        )
         late = f", late after {ready.timeout_s:g} s" if ready.timeout_s is not None else ""
         yield f"  ready    {ready.kind} {what}{late}".rstrip()
     if process.restart != "no":
-        delay = f", {process.restart_delay:g} s after its end" if process.restart_delay is not None else ""
-        yield f"  restart  {process.restart}, {counted(process.restart_limit, 'time')} in a row{delay}"
+        delay = (
+            f", {process.restart_delay:g} s after its end"
+            if process.restart_delay is not None
+            else ""
+        )
+        yield (
+            f"  restart  {process.restart}, {counted(process.restart_limit, 'time')} in a"
+            f" row{delay}"
+        )
     if process.required is not None:
-        yield "  required its end ends everything" if process.required else "  optional the rest goes on when it fails"
+        yield (
+            "  required its end ends everything"
+            if process.required
+            else "  optional the rest goes on when it fails"
+        )
     if process.stop != StopRule():
         patience = "" if process.stop.timeout_s is None else f", {process.stop.timeout_s:g} s"
         kills_s = process.stop.kill_timeout_s
         patience += "" if kills_s is None else f", {kills_s:g} s from SIGTERM to SIGKILL"
         yield f"  stop     {process.stop.signal}{patience}"
     if process.output != "both" or process.emulate_tty:
-        yield f"  output   {process.output}{', from a pseudo-terminal' if process.emulate_tty else ''}"
+        yield (
+            "  output  "
+            f" {process.output}{', from a pseudo-terminal' if process.emulate_tty else ''}"
+        )
     schedule = process.schedule
     if schedule:
         cpus = f"CPU {', '.join(map(str, schedule.cpus))}" if schedule.cpus else "any CPU"
-        yield f"  schedule {cpus}, {schedule.policy}" + (f" {schedule.priority}" if schedule.priority else "")
+        yield f"  schedule {cpus}, {schedule.policy}" + (
+            f" {schedule.priority}" if schedule.priority else ""
+        )
     if process.host is not None:
         yield f"  host     {process.host}"
 
@@ -168,5 +196,7 @@ def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
 def _quoted(word: str) -> str:
     plain = word.replace("${", "").replace("}", "").replace("_", "").replace("-", "")
     return (
-        word if plain and all(c.isalnum() or c in "/.:=@%+," for c in plain) else "'" + word.replace("'", "'\\''") + "'"
+        word
+        if plain and all(c.isalnum() or c in "/.:=@%+," for c in plain)
+        else "'" + word.replace("'", "'\\''") + "'"
     )

@@ -8,19 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.tables import Table
 from tfcompose.cli.terminal import printable
-from tfcompose.render.text import YELLOW
-from tfcompose.text import counted, listed
+from tfcompose.compiler.render.text import YELLOW
+from tfcompose.foundation.text import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.live.chain import Chain
-    from tfcompose.live.edges import EdgeState, TreeObserver
+    from tfcompose.tf.live.chain import Chain
+    from tfcompose.tf.live.edges import EdgeState, TreeObserver
 
 #: A stamp that is farther off is taken to be of another clock.
 _CLOCKS_AGREE_S = 1e6
 HEADS = ("edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay", "")
-#: A narrow terminal goes without kind (a row of a fixed edge has no numbers), jitter, gap, delay and age.
+#: A narrow terminal goes without kind (a row of a fixed edge has no numbers), jitter, gap, delay
+#: and age.
 TABLE = Table(
     right=frozenset(range(3, 8)),
     spare=(2, 4, 5, 7, 6),
@@ -30,7 +31,12 @@ TABLE = Table(
 
 
 def lines_of(
-    edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int, width: int | None = None, *, coloured: bool = False
+    edges: Sequence[EdgeState],
+    observer: TreeObserver,
+    now_ns: int,
+    width: int | None = None,
+    *,
+    coloured: bool = False,
 ) -> list[str]:
     """Return a line about all, and a table with a line for each edge of each publisher, fitted to the width."""
     several = _several(edges)
@@ -48,7 +54,10 @@ def _several(edges: Sequence[EdgeState]) -> set[str]:
 def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) -> str:
     seconds = max(0, now_ns - observer.begun_ns) / 1e9 if observer.begun_ns else 0.0
     names = {(state.stream.parent, state.stream.child) for state in edges}
-    parts = [counted(len(names), "edge"), f"{counted(observer.messages, 'message')} in {seconds:.1f} s"]
+    parts = [
+        counted(len(names), "edge"),
+        f"{counted(observer.messages, 'message')} in {seconds:.1f} s",
+    ]
     senders = {state.publisher for state in edges if state.publisher}
     if senders:
         parts.insert(1, counted(len(senders), "publisher"))
@@ -61,7 +70,9 @@ def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) ->
 
 def not_kept(observer: TreeObserver) -> str:
     """Return in words how many transforms came of edges that are not kept, and from whom."""
-    nodes = {node for gid in observer.beyond for node in observer.publishers.nodes(gid, static=False)}
+    nodes = {
+        node for gid in observer.beyond for node in observer.publishers.nodes(gid, static=False)
+    }
     by = f" from {printable(listed(sorted(nodes)))}" if nodes else ""
     return f"{counted(sum(observer.beyond.values()), 'transform')} of further edges{by} not kept"
 
@@ -70,7 +81,11 @@ def _row(state: EdgeState, several: set[str]) -> tuple[str, ...]:
     stream, timing = state.stream, state.timing
     remarks = []
     if stream.rejected is not None:
-        some = f"{stream.rejections} of {stream.arrivals.count} " if stream.rejections < stream.arrivals.count else ""
+        some = (
+            f"{stream.rejections} of {stream.arrivals.count} "
+            if stream.rejections < stream.arrivals.count
+            else ""
+        )
         remarks.append(f"{some}refused: {stream.rejected.text}")
     if stream.child in several and state.present is not False:
         remarks.append("not the only one")
@@ -113,7 +128,10 @@ def chain_line(chain: Chain | str, a: str, b: str) -> str:
 
 
 def objects_of(
-    edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int, chain: Chain | str | None = None
+    edges: Sequence[EdgeState],
+    observer: TreeObserver,
+    now_ns: int,
+    chain: Chain | str | None = None,
 ) -> str:
     """Return one line of JSON: what was counted, and a list of edges; times in seconds, stamps in nanoseconds."""
     data: dict[str, Any] = {

@@ -1,6 +1,7 @@
 """``tfcompose lint --fix``: the one safe answer is written into the file, and nothing else changes.
 
-Edits are tried in memory first. Only those are kept that take away their finding and bring no new one.
+Edits are tried in memory first. Only those are kept that take away their finding and bring no new
+one.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import replace_file
-from tfcompose.findings import edited
+from tfcompose.foundation.findings import edited
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from tfcompose.findings import Edit, Finding
+    from tfcompose.foundation.findings import Edit, Finding
 
     Reader = Callable[[str], str]
     Lint = Callable[[str, Reader], list[Finding]]
@@ -34,7 +35,8 @@ class ChangedError(OSError):
 class Fixer:
     """Fixes files that were named; ``lint`` returns a file's findings, through the reader that it is given.
 
-    ``fixed`` are the findings that are gone, with their places before; ``texts`` what the files then hold.
+    ``fixed`` are the findings that are gone, with their places before; ``texts`` what the files
+    then hold.
     """
 
     files: Sequence[str]
@@ -47,7 +49,11 @@ class Fixer:
         """Fix one file in memory and return the findings that remain."""
         found = self._findings([file])
         while True:
-            todo = [one for one in found if one.edits and all(self._may_edit(edit.span.file) for edit in one.edits)]
+            todo = [
+                one
+                for one in found
+                if one.edits and all(self._may_edit(edit.span.file) for edit in one.edits)
+            ]
             kept = self._sound(file, [], todo)
             if not kept:
                 return self.lint(file, self.read)
@@ -59,7 +65,8 @@ class Fixer:
         """Write the files that changed.
 
         Raises:
-            OSError: if one cannot be written, or was changed meanwhile; those before it are written.
+            OSError: if one cannot be written, or was changed meanwhile; those before it are
+            written.
         """
         for path, text in self.texts.items():
             rewrite(Path(path), self._read[path], text)
@@ -69,7 +76,9 @@ class Fixer:
         names = {_path(file): file for file in self.files}
         for path, text in self.texts.items():
             before = self._read[path].splitlines(keepends=True)
-            yield from unified_diff(before, text.splitlines(keepends=True), names[path], names[path])
+            yield from unified_diff(
+                before, text.splitlines(keepends=True), names[path], names[path]
+            )
 
     def read(self, file: str) -> str:
         """Return the file's text as it will be; a file is read once."""
@@ -112,7 +121,9 @@ class Fixer:
         by_file: dict[str, dict[Edit, None]] = {}
         for edit in (edit for one in fixed for edit in one.edits):
             by_file.setdefault(edit.span.file, {})[edit] = None
-        texts = {_path(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()}
+        texts = {
+            _path(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()
+        }
         complete = {file: text for file, text in texts.items() if text is not None}
         return complete if len(complete) == len(texts) == len(by_file) else None
 

@@ -1,7 +1,8 @@
 """What of a robot file its export for ros2 launch decides itself: which arguments stay arguments.
 
-An argument stays one where it decides no more than whether processes are started, and words, parameters, remappings and
-variables that they are given. One that decides anything else has the value that the export was given, or its default.
+An argument stays one where it decides no more than whether processes are started, and words,
+parameters, remappings and variables that they are given. One that decides anything else has the
+value that the export was given, or its default.
 """
 
 from __future__ import annotations
@@ -17,9 +18,17 @@ from tfcompose.cli.combinations import MOST
 from tfcompose.cli.compiling import disk, given_by, library, overlays_of
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import destination
-from tfcompose.compile import Compiled, compile_robot
-from tfcompose.emit import emit
-from tfcompose.export.launch_values import (
+from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.emit import emit
+from tfcompose.foundation.findings import Span
+from tfcompose.model.plan.file import read_plan
+from tfcompose.model.plan.stock import OWN_KINDS
+from tfcompose.spec.language import Given, GivenArg, composed, profiles_in, validate, with_includes
+from tfcompose.spec.language.args import as_given
+from tfcompose.spec.language.expressions import environment_in, evaluate, names_in
+from tfcompose.spec.language.values import plain
+from tfcompose.spec.load import load
+from tfcompose.tools.exporters.launch_values import (
     Argument,
     ArgumentValue,
     LaunchValues,
@@ -27,23 +36,15 @@ from tfcompose.export.launch_values import (
     VariableValue,
     condition_code,
 )
-from tfcompose.findings import Span
-from tfcompose.language import Given, GivenArg, composed, profiles_in, validate, with_includes
-from tfcompose.language.args import as_given
-from tfcompose.language.expressions import environment_in, evaluate, names_in
-from tfcompose.language.values import plain
-from tfcompose.load import load
-from tfcompose.plan.file import read_plan
-from tfcompose.plan.stock import OWN_KINDS
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Mapping
 
-    from tfcompose.files import File
-    from tfcompose.language import ArgSpec
-    from tfcompose.load import Path, Source
-    from tfcompose.plan import Plan, PlanProcess
+    from tfcompose.model.files import File
+    from tfcompose.model.plan import Plan, PlanProcess
+    from tfcompose.spec.language import ArgSpec
+    from tfcompose.spec.load import Path, Source
 
 _HOLE = re.compile(r"\$\{([^{}]*)\}")
 _ARGUMENT = re.compile(r"\s*args\.([A-Za-z_][A-Za-z0-9_]*)\s*")
@@ -56,8 +57,8 @@ _PLACES = ("env", "params", "remap")
 class _Uses:
     """Where a robot file names what it is built with.
 
-    ``texts`` are those of processes that launch can compute, by process and place, ``conditions`` those of processes;
-    ``fixed`` are arguments and variables that something else needs.
+    ``texts`` are those of processes that launch can compute, by process and place, ``conditions``
+    those of processes; ``fixed`` are arguments and variables that something else needs.
     """
 
     texts: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -65,7 +66,9 @@ class _Uses:
     fixed: set[str] = field(default_factory=set)
 
 
-def launch_values(arguments: Namespace, plan: Plan) -> tuple[LaunchValues, tuple[File, ...], list[str]]:
+def launch_values(
+    arguments: Namespace, plan: Plan
+) -> tuple[LaunchValues, tuple[File, ...], list[str]]:
     """Return what the launch file decides itself, files that it needs beside it, and what is fixed and why.
 
     ``plan`` is the built one. The robot file has no errors.
@@ -80,8 +83,14 @@ def launch_values(arguments: Namespace, plan: Plan) -> tuple[LaunchValues, tuple
     uses = _uses(source, kinds)
     there = {process.name: process for process in plan.managed}
     combined = _Combinations(arguments, plan, specs, values)
-    missing = {name: expression for name, expression in uses.conditions.items() if name not in there}
-    more = {name: found for name, expression in missing.items() if (found := combined.process(name, expression))}
+    missing = {
+        name: expression for name, expression in uses.conditions.items() if name not in there
+    }
+    more = {
+        name: found
+        for name, expression in missing.items()
+        if (found := combined.process(name, expression))
+    }
     for name, expression in uses.conditions.items():
         if name not in there and name not in more:
             uses.fixed |= set(names_in(f"${{{expression}}}"))
@@ -92,15 +101,31 @@ def launch_values(arguments: Namespace, plan: Plan) -> tuple[LaunchValues, tuple
             texts[process][place] = _text(text, kinds)
     used = {part.name for several in texts.values() for text in several.values() for part in text
             if isinstance(part, ArgumentValue)}  # fmt: skip
-    used |= {name.removeprefix("args.") for text in conditions.values() for name in names_in(f"${{{text}}}")}
-    defaults = {name: plain(spec.value(spec.default)) for name, spec in specs.items() if spec.default is not None}
-    defaults |= {name: values[name] for name in values if name in arguments.given or name not in defaults}
-    declared = tuple(_argument(name, spec, defaults[name]) for name, spec in specs.items() if name in used)
+    used |= {
+        name.removeprefix("args.")
+        for text in conditions.values()
+        for name in names_in(f"${{{text}}}")
+    }
+    defaults = {
+        name: plain(spec.value(spec.default))
+        for name, spec in specs.items()
+        if spec.default is not None
+    }
+    defaults |= {
+        name: values[name] for name in values if name in arguments.given or name not in defaults
+    }
+    declared = tuple(
+        _argument(name, spec, defaults[name]) for name, spec in specs.items() if name in used
+    )
     lines = [f"{name} is {as_given(value)}: something depends on it that a launch file does not decide"
              for name, value in values.items() if name not in used and f"args.{name}" in uses.fixed]  # fmt: skip
     added = {name: found for name, found in more.items() if name in conditions}
     files = tuple(file for _, several in added.values() for file in several)
-    return LaunchValues(declared, conditions, texts, tuple(process for process, _ in added.values())), files, lines
+    return (
+        LaunchValues(declared, conditions, texts, tuple(process for process, _ in added.values())),
+        files,
+        lines,
+    )
 
 
 def _argument(name: str, spec: ArgSpec, value: Any) -> Argument:
@@ -112,7 +137,9 @@ def _argument(name: str, spec: ArgSpec, value: Any) -> Argument:
 
 def _uses(source: Source, kinds: Mapping[str, str]) -> _Uses:
     uses = _Uses()
-    for path, text in _strings({key: value for key, value in source.data.items() if key != "profiles"}):
+    for path, text in _strings(
+        {key: value for key, value in source.data.items() if key != "profiles"}
+    ):
         place = _place(path, source.data)
         if place is None:
             uses.fixed |= set(names_in(text)) | _variables_in(text)
@@ -143,7 +170,10 @@ def _strings(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
 
 def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
     """Return the process and the place in it, or None where launch cannot compute what stands there."""
-    if len(path) < 3 or path[0] not in {"processes", "containers"}:  # noqa: PLR2004 (the section, the process, its key)
+    if len(path) < 3 or path[0] not in {  # noqa: PLR2004
+        "processes",
+        "containers",
+    }:
         return None
     process = data[path[0]][path[1]]
     name, key = str(path[1]), path[2]
@@ -162,13 +192,23 @@ def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
             case (int(step),) if isinstance(process["run"], list):
                 return name, f"args.{step}"
         return None
-    is_node = is_composition or (isinstance(process["run"], dict) and "launch" not in process["run"])
-    if key == "env" or (key in _PLACES and is_node and path[3] != "file" and "nodes" not in process):
-        return (name, f"{key}.{'.'.join(map(str, path[3:]))}") if not isinstance(path[-1], int) else None
+    is_node = is_composition or (
+        isinstance(process["run"], dict) and "launch" not in process["run"]
+    )
+    if key == "env" or (
+        key in _PLACES and is_node and path[3] != "file" and "nodes" not in process
+    ):
+        return (
+            (name, f"{key}.{'.'.join(map(str, path[3:]))}")
+            if not isinstance(path[-1], int)
+            else None
+        )
     return None
 
 
-def _settled(uses: _Uses, kinds: Mapping[str, str]) -> tuple[dict[tuple[str, str], str], dict[str, str]]:
+def _settled(
+    uses: _Uses, kinds: Mapping[str, str]
+) -> tuple[dict[tuple[str, str], str], dict[str, str]]:
     """Return the texts and conditions that launch computes: those of which nothing else needs an argument."""
     texts, conditions = dict(uses.texts), dict(uses.conditions)
     for at, text in uses.texts.items():
@@ -218,7 +258,11 @@ class _Combinations:
     """Processes that are there with other values of the arguments alone."""
 
     def __init__(
-        self, arguments: Namespace, plan: Plan, specs: Mapping[str, ArgSpec], values: Mapping[str, Any]
+        self,
+        arguments: Namespace,
+        plan: Plan,
+        specs: Mapping[str, ArgSpec],
+        values: Mapping[str, Any],
     ) -> None:
         self.arguments, self.plan, self.specs = arguments, plan, specs
         self.values = {name: as_given(value) for name, value in values.items()}
@@ -232,23 +276,33 @@ class _Combinations:
         for values in self._where(expression):
             plan, files = self._build(values) or (self.plan, ())
             found = next((process for process in plan.managed if process.name == name), None)
-            if found is not None and found.kind in {"run", "component"} and _own_edges(plan) == _own_edges(self.plan):
+            if (
+                found is not None
+                and found.kind in {"run", "component"}
+                and _own_edges(plan) == _own_edges(self.plan)
+            ):
                 needed = tuple(file for file in files if file.path == found.params_file)
                 return found, needed
         return None
 
     def _where(self, expression: str) -> Iterator[dict[str, str]]:
         """Yield values with which an expression is true, of the arguments that it names."""
-        names = [name.removeprefix("args.") for name in dict.fromkeys(names_in(f"${{{expression}}}"))]
+        names = [
+            name.removeprefix("args.") for name in dict.fromkeys(names_in(f"${{{expression}}}"))
+        ]
         names = [name for name in names if name in self.specs]
         constants = [next(filter(None, found), "") for found in _CONSTANT.findall(expression)]
-        several = [dict.fromkeys([self.values[name], *self._values(name, constants)]) for name in names]
+        several = [
+            dict.fromkeys([self.values[name], *self._values(name, constants)]) for name in names
+        ]
         for index, row in enumerate(product(*several)):
             if index >= MOST:
                 return
             given = dict(zip(names, row, strict=True))
             try:
-                known = {f"args.{name}": self.specs[name].value(word) for name, word in given.items()}
+                known = {
+                    f"args.{name}": self.specs[name].value(word) for name, word in given.items()
+                }
                 holds = evaluate(expression, lambda name, known=known: known[name])  # type: ignore[misc]
             except ValueError:
                 continue
@@ -272,7 +326,10 @@ class _Combinations:
 
     def _compiled(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
         arguments = self.arguments
-        args = {name: GivenArg(value, Span(f"{name}:={value}")) for name, value in (self.values | values).items()}
+        args = {
+            name: GivenArg(value, Span(f"{name}:={value}"))
+            for name, value in (self.values | values).items()
+        }
         compiled: Compiled = compile_robot(
             read_text(arguments.file), arguments.file, library(), arguments.profiles,
             overlays=overlays_of(arguments), read=read_text, disk=disk(), given=Given(args, os.environ),

@@ -5,22 +5,27 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, TypeVar
 
-from tfcompose.bags import BagError, missing_rosbags, observe_bag
 from tfcompose.cli.plans import expected_plan
 from tfcompose.cli.terminal import INTERRUPTED, UNREADABLE, fail, reject, warn
-from tfcompose.findings import Note, finding
-from tfcompose.plan import RosSettings
-from tfcompose.plan.topics import parts_of, topics_below
-from tfcompose.ros.environment import RosError, child_environment, reads_zenoh_alone, ros_trouble
-from tfcompose.signals import Stop
-from tfcompose.verdict.setup import elsewhere_help, settings_text
+from tfcompose.foundation.findings import Note, finding
+from tfcompose.foundation.signals import Stop
+from tfcompose.guard.verdict.setup import elsewhere_help, settings_text
+from tfcompose.model.plan import RosSettings
+from tfcompose.model.plan.topics import parts_of, topics_below
+from tfcompose.tf.bags import BagError, missing_rosbags, observe_bag
+from tfcompose.tf.ros.environment import (
+    RosError,
+    child_environment,
+    reads_zenoh_alone,
+    ros_trouble,
+)
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from tfcompose.live.edges import TreeObserver
-    from tfcompose.plan import Plan
+    from tfcompose.model.plan import Plan
+    from tfcompose.tf.live.edges import TreeObserver
 
     Topics = tuple[str, str]
 
@@ -53,7 +58,9 @@ def observed_topics(arguments: Namespace) -> tuple[Plan | None, list[Topics]]:
     return plan, list(parts_of(plan)) or [topics_below(plan.ros.namespace)]
 
 
-def read_bag(path: str, observers: Mapping[Topics, TreeObserver], *, may_be_silent: bool = False) -> None:
+def read_bag(
+    path: str, observers: Mapping[Topics, TreeObserver], *, may_be_silent: bool = False
+) -> None:
     """Put a bag into the observers of these topics (moving, fixed).
 
     Raises:
@@ -62,7 +69,10 @@ def read_bag(path: str, observers: Mapping[Topics, TreeObserver], *, may_be_sile
     from_bag(lambda: observe_bag(path, observers))
     if not may_be_silent and not any(observer.received_any for observer in observers.values()):
         message = f"no message was recorded on {names_of(observers)} in {path}"
-        help_ = "was the robot running? /tf_static is sent once: record it with durability transient_local"
+        help_ = (
+            "was the robot running? /tf_static is sent once: record it with durability"
+            " transient_local"
+        )
         reject([finding("TF811", message, None, help=help_)])
 
 
@@ -104,13 +114,19 @@ def observe(  # noqa: PLR0913 (all but two are named)
     with Stop() as stop:
         try:
             if alone:
-                from tfcompose.live.zenoh_listener import listen_on_zenoh
+                from tfcompose.tf.live.zenoh_listener import listen_on_zenoh
 
-                seconds = listen_on_zenoh(observers, stop, duration_s=duration_s, every_s=every_s, show=show)
+                seconds = listen_on_zenoh(
+                    observers, stop, duration_s=duration_s, every_s=every_s, show=show
+                )
             else:
-                from tfcompose.live.listener import listen  # rclpy reads the environment when it is loaded
+                from tfcompose.tf.live.listener import (
+                    listen,  # rclpy reads the environment when it is loaded
+                )
 
-                seconds, elsewhere = listen(name, observers, stop, duration_s=duration_s, every_s=every_s, show=show)
+                seconds, elsewhere = listen(
+                    name, observers, stop, duration_s=duration_s, every_s=every_s, show=show
+                )
         except RosError as error:
             reject([finding("TF901", str(error), None)])
         heard = any(observer.received_any for observer in observers.values())

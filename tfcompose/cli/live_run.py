@@ -1,7 +1,8 @@
 """``up`` on a terminal: the launcher runs in a process of its own, and this one shows what it reports.
 
-So what is drawn, however slowly the terminal takes it, never delays the robot; Ctrl-Z stops the view alone; and a
-fault of the view costs the view. The launcher ends with this process, whatever ends it.
+So what is drawn, however slowly the terminal takes it, never delays the robot; Ctrl-Z stops the
+view alone; and a fault of the view costs the view. The launcher ends with this process, whatever
+ends it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,12 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.console import Console
 from tfcompose.cli.runs import plan_of_run
 from tfcompose.cli.terminal import FAILED, can_redraw, coloured, warn
-from tfcompose.ipc import (
+from tfcompose.foundation.text import counted
+from tfcompose.launcher.control import connect
+from tfcompose.launcher.output import Follower, NonBlockingOutput
+from tfcompose.launcher.procfs import UsageMeter
+from tfcompose.launcher.supervisor import ENDING, Signals
+from tfcompose.model.messages import (
     REQUESTS,
     Ended,
     EventsRequest,
@@ -30,24 +36,20 @@ from tfcompose.ipc import (
     Stopping,
     read_notice,
 )
-from tfcompose.launcher.control import connect
-from tfcompose.launcher.output import Follower, NonBlockingOutput
-from tfcompose.launcher.procfs import UsageMeter
-from tfcompose.launcher.supervisor import ENDING, Signals
-from tfcompose.plan.codec import decode
-from tfcompose.text import counted
+from tfcompose.model.plan.codec import decode
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from tfcompose.cli.dashboard import Dashboard
     from tfcompose.cli.screen import Screen
-    from tfcompose.findings import Finding
-    from tfcompose.ipc import Notice, Request
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.runtime_dir import RuntimeDir
-    from tfcompose.plan import Plan
+    from tfcompose.model.messages import Notice, Request
+    from tfcompose.model.plan import Plan
 
-#: How often the launcher is asked for its state, at least and at most; what processes use is measured more rarely.
+#: How often the launcher is asked for its state, at least and at most; what processes use is
+#: measured more rarely.
 STATUS_EVERY_S, STATUS_AT_MOST_EVERY_S, USAGE_EVERY_S = 1.0, 0.2, 5.0
 #: How often the log that is shown is read.
 LOG_EVERY_S = 0.25
@@ -79,13 +81,15 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
 ) -> int:
     """Show the run until its launcher, a child of this process, has ended; return its exit code.
 
-    Signals that end a plan are passed on to it. They are blocked until here, and ``mask`` is the mask before that.
-    The findings of the build and ``warnings`` were printed before, and are behind the view while it is shown: they are
-    the first of its findings and events.
+    Signals that end a plan are passed on to it. They are blocked until here, and ``mask`` is the
+    mask before that. The findings of the build and ``warnings`` were printed before, and are
+    behind the view while it is shown: they are the first of its findings and events.
     """
     with Signals(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        from tfcompose.cli.dashboard import Dashboard  # rich takes a moment to load, and signals none
+        from tfcompose.cli.dashboard import (
+            Dashboard,  # rich takes a moment to load, and signals none
+        )
         from tfcompose.cli.screen import Screen
 
         view = _View(place, Dashboard(place.name, plan, built_with, warnings), launcher, signals)
@@ -137,7 +141,9 @@ class _Connection:
 
 
 class _View:
-    def __init__(self, place: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals) -> None:
+    def __init__(
+        self, place: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals
+    ) -> None:
         from tfcompose.cli.screen import Keys
 
         self._place = place
@@ -154,7 +160,9 @@ class _View:
         self._left_out = 0
         self._fault = ""
         now = time.monotonic()
-        self._status_at = self._usage_at = self._log_at = self._connect_at = self._requested_at = now
+        self._status_at = self._usage_at = self._log_at = self._connect_at = self._requested_at = (
+            now
+        )
         self._code: int | None = None
 
     def run(self, screen: Screen) -> int:
@@ -188,7 +196,9 @@ class _View:
         console = Console(plan, output, colour=coloured(sys.stdout))
         with contextlib.suppress(OSError):
             if self._left_out:
-                output.write(f"{counted(self._left_out, 'earlier finding')}: tfcompose logs tfcompose\n")
+                output.write(
+                    f"{counted(self._left_out, 'earlier finding')}: tfcompose logs tfcompose\n"
+                )
             for notice in self._last:
                 console(notice)
         if not any(isinstance(notice, Ended) for notice in self._last):
@@ -197,7 +207,11 @@ class _View:
     # What comes.
 
     def _connect(self) -> None:
-        if self._dashboard.ended or time.monotonic() < self._connect_at or (self._events and self._states):
+        if (
+            self._dashboard.ended
+            or time.monotonic() < self._connect_at
+            or (self._events and self._states)
+        ):
             return
         self._connect_at = time.monotonic() + STATUS_EVERY_S
         with contextlib.suppress(OSError):
@@ -267,7 +281,9 @@ class _View:
                 self._pass_on(signal.SIGINT)
             if self._dashboard.log_of != shown:
                 name = self._dashboard.log_of
-                self._follower = Follower(self._place.logs, [name], back=LOG_BYTES) if name else None
+                self._follower = (
+                    Follower(self._place.logs, [name], back=LOG_BYTES) if name else None
+                )
                 self._log_at = 0.0
         self._stale = True
 
@@ -291,7 +307,9 @@ class _View:
     def _sleep_s(self) -> float:
         due = [self._status_at, self._usage_at]
         due += [self._log_at] if self._follower else []
-        due += [] if self._dashboard.ended or (self._events and self._states) else [self._connect_at]
+        due += (
+            [] if self._dashboard.ended or (self._events and self._states) else [self._connect_at]
+        )
         longest = ESCAPE_S if self._keys.waits else STATUS_EVERY_S
         return min(max(min(due) - time.monotonic(), 0.0), longest)
 
@@ -308,7 +326,9 @@ class _View:
             self._usage_at = now + USAGE_EVERY_S
             status = self._dashboard.status
             if status and self._dashboard.page == "processes":
-                self._dashboard.used = self._meter.usage([one.pid for one in status.processes if one.pid])
+                self._dashboard.used = self._meter.usage(
+                    [one.pid for one in status.processes if one.pid]
+                )
         if now >= self._status_at:
             self._status_at = now + STATUS_EVERY_S
             self._ask(now)

@@ -10,19 +10,19 @@ from tfcompose.cli.process_table import HEAD, row, uptime
 from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject, warn
 from tfcompose.cli.view_session import plan_of_session
-from tfcompose.findings import finding
-from tfcompose.ipc import RobotStatus, StatusRequest
+from tfcompose.foundation.findings import finding
+from tfcompose.foundation.signals import Stop
 from tfcompose.launcher.control import RefusedError, ask
 from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of
-from tfcompose.live.edges import SETTLE_S, TreeObserver
-from tfcompose.live.state import NAMELESS
-from tfcompose.plan.topics import parts_of
-from tfcompose.ros.environment import RosError
-from tfcompose.signals import Stop
-from tfcompose.view.joints import JointSender, joint_topics
-from tfcompose.view.live import LiveTree
-from tfcompose.view.live_panel import LivePanel
+from tfcompose.model.messages import RobotStatus, StatusRequest
+from tfcompose.model.plan.topics import parts_of
+from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+from tfcompose.tf.live.state import NAMELESS
+from tfcompose.tf.ros.environment import RosError
+from tfcompose.tools.view.joints import JointSender, joint_topics
+from tfcompose.tools.view.live import LiveTree
+from tfcompose.tools.view.live_panel import LivePanel
 
 if TYPE_CHECKING:
     import threading
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     import viser
     from rclpy.node import Node
 
-    from tfcompose.geometry import Offset
-    from tfcompose.plan import Plan
-    from tfcompose.view.reload import ReloadedPanel
+    from tfcompose.foundation.geometry import Offset
+    from tfcompose.model.plan import Plan
+    from tfcompose.tools.view.reload import ReloadedPanel
 
     Topics = tuple[str, str]
 
@@ -79,11 +79,15 @@ class Following:
         Raises:
             RosError: if ROS cannot start a node, or take messages.
         """
-        from tfcompose.live.listener import TreeListener  # rclpy reads the environment when it is loaded
-        from tfcompose.ros.node import open_node
+        from tfcompose.tf.live.listener import (
+            TreeListener,  # rclpy reads the environment when it is loaded
+        )
+        from tfcompose.tf.ros.node import open_node
 
         with open_node("tfcompose_view", "") as node:
-            listeners = [TreeListener(node, observer, topics) for topics, observer in observers.items()]
+            listeners = [
+                TreeListener(node, observer, topics) for topics, observer in observers.items()
+            ]
             begun, show_at = time.monotonic(), 0.0
             self._follow(observers, node)
             while not stop.requested:
@@ -138,7 +142,11 @@ class Following:
         for sender in self.senders:
             before = sender.text
             sender.step(now, stamp_ns, panel.session.robot, panel.positions)
-            if sender.others_found and sender.text != before and NAMELESS not in sender.others_found:
+            if (
+                sender.others_found
+                and sender.text != before
+                and NAMELESS not in sender.others_found
+            ):
                 warn(sender.text)
         if self.senders:
             self._panel.show_joints([sender.text for sender in self.senders])
@@ -149,26 +157,36 @@ class Following:
             self._panel.show_processes(f"no robot {self._plan.robot} runs here", [])
             return
         used = self._meter.usage([one.pid for one in status.processes if one.pid])
-        state = "stopping" if status.stopping else "tree complete" if status.complete else "tree not complete"
+        state = (
+            "stopping"
+            if status.stopping
+            else "tree complete"
+            if status.complete
+            else "tree not complete"
+        )
         columns = [HEAD.index(name) for name in _COLUMNS]
         table = [HEAD, *(row(process, used) for process in status.processes)]
         rows = [[cells[column] for column in columns] for cells in table]
-        self._panel.show_processes(f"{self._plan.robot}: {state}, since {uptime(status.uptime)}", rows)
+        self._panel.show_processes(
+            f"{self._plan.robot}: {state}, since {uptime(status.uptime)}", rows
+        )
 
 
 def _status(name: str) -> RobotStatus | None:
     """Return the state of the robot that runs in this domain, or None."""
     try:
         domain = domain_of(os.environ)
-        places = [place for place, _ in running() if place.domain == domain and is_meant(place, name)]
+        places = [
+            place for place, _ in running() if place.domain == domain and is_meant(place, name)
+        ]
         return ask(places[0], StatusRequest(), RobotStatus) if places else None
     except (RuntimeDirError, RefusedError, OSError):
         return None
 
 
 def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
-    from tfcompose.ros.graph import UNKNOWN_NODE, ids_say_who, writers
-    from tfcompose.ros.sensor_data import JointStatePublisher
+    from tfcompose.tf.ros.graph import UNKNOWN_NODE, ids_say_who, writers
+    from tfcompose.tf.ros.sensor_data import JointStatePublisher
 
     own: set[bytes] = set()
 
@@ -179,14 +197,21 @@ def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
 
     def others() -> list[str]:
         name = "" if ids_say_who(node) else node.get_fully_qualified_name()
-        found = {one.node for one in writers(node, topic) if one.gid not in own and one.node != name}
+        found = {
+            one.node for one in writers(node, topic) if one.gid not in own and one.node != name
+        }
         return sorted(NAMELESS if one.endswith(UNKNOWN_NODE) else one for one in found)
 
     return JointSender(topic, names, make, others)
 
 
 def follow(
-    server: viser.ViserServer, shown: ReloadedPanel, changed: threading.Event, tolerance: Offset, *, joints: bool
+    server: viser.ViserServer,
+    shown: ReloadedPanel,
+    changed: threading.Event,
+    tolerance: Offset,
+    *,
+    joints: bool,
 ) -> int:
     """Show the running tree until a signal comes, in a process that is set up for its ROS; return the exit code.
 

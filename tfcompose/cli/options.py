@@ -12,7 +12,7 @@ from tfcompose.cli.terminal import UNREADABLE, fail
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.geometry import Offset
+    from tfcompose.foundation.geometry import Offset
 
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
 _ANGLES = frozenset({"deg", "rad"})
@@ -24,7 +24,9 @@ TF_TOPICS = ("tf", "tf_static")
 
 def add_file(parser: ArgumentParser) -> None:
     """Add FILE."""
-    parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE", help="default: robot.yaml")
+    parser.add_argument(
+        "file", nargs="?", default=DEFAULT_FILE, metavar="FILE", help="default: robot.yaml"
+    )
 
 
 def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> None:
@@ -33,7 +35,13 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
     To be called after FILE is added, if that is a word too.
     """
     parser.add_argument(
-        "-p", "--profile", action="append", default=[], metavar="NAME", dest="profiles", help=f"{text}; repeatable"
+        "-p",
+        "--profile",
+        action="append",
+        default=[],
+        metavar="NAME",
+        dest="profiles",
+        help=f"{text}; repeatable",
     )
     parser.add_argument(
         "-f", "--overlay", action="append", default=[], metavar="FILE", dest="overlays",
@@ -43,9 +51,15 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
         help="set one value, applied last: sensors.camera.tf=driver; repeatable",
     )  # fmt: skip
-    parser.add_argument("--show-args", action="store_true", help="print the robot file's arguments and exit")
     parser.add_argument(
-        "given", nargs="*", default=[], metavar="NAME:=VALUE", help="the value of an argument of the robot file"
+        "--show-args", action="store_true", help="print the robot file's arguments and exit"
+    )
+    parser.add_argument(
+        "given",
+        nargs="*",
+        default=[],
+        metavar="NAME:=VALUE",
+        help="the value of an argument of the robot file",
     )
 
 
@@ -55,7 +69,9 @@ def pairs(words: list[str], between: str) -> dict[str, str]:
     Raises:
         SystemExit: after saying that one is not such a word.
     """
-    wrong = next((word for word in words if not word.partition(between)[0] or between not in word), None)
+    wrong = next(
+        (word for word in words if not word.partition(between)[0] or between not in word), None
+    )
     if wrong is not None:
         fail(f"{wrong} is not NAME{between}VALUE", UNREADABLE)
     return {name: value for name, _, value in (word.partition(between) for word in words)}
@@ -67,16 +83,26 @@ def add_frames(parser: ArgumentParser) -> None:
     parser.add_argument("b", metavar="B", help="the frame whose pose it is")
 
 
-def add_robot(parser: ArgumentParser, default: str = "the one in this ROS domain, or of ./robot.yaml") -> None:
+def add_robot(
+    parser: ArgumentParser, default: str = "the one in this ROS domain, or of ./robot.yaml"
+) -> None:
     """Add --robot."""
-    parser.add_argument("--robot", metavar="NAME", help=f"the robot, as NAME or NAME@DOMAIN; default: {default}")
+    parser.add_argument(
+        "--robot", metavar="NAME", help=f"the robot, as NAME or NAME@DOMAIN; default: {default}"
+    )
 
 
 def add_all_hosts(parser: ArgumentParser) -> None:
     """Add --all-hosts and --file."""
-    parser.add_argument("--all-hosts", action="store_true", help="on every host that the robot is deployed to, by ssh")
     parser.add_argument(
-        "--file", metavar="FILE|PLAN", help="with --all-hosts: the robot that has the hosts; default: robot.yaml"
+        "--all-hosts",
+        action="store_true",
+        help="on every host that the robot is deployed to, by ssh",
+    )
+    parser.add_argument(
+        "--file",
+        metavar="FILE|PLAN",
+        help="with --all-hosts: the robot that has the hosts; default: robot.yaml",
     )
 
 
@@ -93,7 +119,9 @@ def on_all_hosts(arguments: Namespace) -> bool:
 
 def add_processes(parser: ArgumentParser) -> None:
     """Add NAME …, the processes of a running robot, and --robot."""
-    parser.add_argument("name", nargs="+", metavar="NAME", help="a process, as listed by tfcompose ps")
+    parser.add_argument(
+        "name", nargs="+", metavar="NAME", help="a process, as listed by tfcompose ps"
+    )
     add_robot(parser)
 
 
@@ -102,7 +130,9 @@ def add_namespace(parser: ArgumentParser, text: str = "use /NS/tf and /NS/tf_sta
     parser.add_argument("--namespace", type=namespace, default="", metavar="NS", help=text)
 
 
-def add_bag(parser: ArgumentParser, text: str = "read a recording instead of the running tree") -> None:
+def add_bag(
+    parser: ArgumentParser, text: str = "read a recording instead of the running tree"
+) -> None:
     """Add --bag."""
     parser.add_argument("--bag", metavar="BAG", help=f"{text}: a rosbag2 folder, .mcap or .db3")
 
@@ -125,8 +155,8 @@ def tolerance(text: str) -> Offset:
     Raises:
         ArgumentTypeError: if it is neither.
     """
-    from tfcompose.geometry import Offset
-    from tfcompose.verdict.publishers import SAME_POSE
+    from tfcompose.foundation.geometry import Offset
+    from tfcompose.guard.verdict.publishers import SAME_POSE
 
     given: dict[bool, float] = {}
     for part in text.split(","):
@@ -139,7 +169,9 @@ def tolerance(text: str) -> Offset:
 
 def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> None:
     """Add --for."""
-    parser.add_argument("--for", dest="duration", type=positive, default=default, metavar="S", help=text)
+    parser.add_argument(
+        "--for", dest="duration", type=positive, default=default, metavar="S", help=text
+    )
 
 
 def settle_duration(arguments: Namespace, default_s: float) -> None:
@@ -151,13 +183,18 @@ def settle_duration(arguments: Namespace, default_s: float) -> None:
     if arguments.duration is not None and arguments.bag:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
     if arguments.duration is not None and not arguments.live:
-        fail("--for says how long to observe the running tree: add --live, or leave out --for", UNREADABLE)
+        fail(
+            "--for says how long to observe the running tree: add --live, or leave out --for",
+            UNREADABLE,
+        )
     arguments.duration = arguments.duration or default_s
 
 
 def add_format(parser: ArgumentParser, *others: str, text: str = "default: text") -> None:
     """Add --format: text or one of the others, json unless they are given."""
-    parser.add_argument("--format", choices=("text", *(others or ("json",))), default="text", help=text)
+    parser.add_argument(
+        "--format", choices=("text", *(others or ("json",))), default="text", help=text
+    )
 
 
 def namespace(text: str) -> str:
@@ -170,7 +207,9 @@ def namespace(text: str) -> str:
     if name in TF_TOPICS or name.endswith(tuple(f"/{topic}" for topic in TF_TOPICS)):
         raise ArgumentTypeError(f"{text} is a topic; give only the namespace before it")
     if name and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", name):
-        raise ArgumentTypeError(f"{text} is not a namespace, such as robot1: letters, digits and _, separated by /")
+        raise ArgumentTypeError(
+            f"{text} is not a namespace, such as robot1: letters, digits and _, separated by /"
+        )
     return name
 
 

@@ -1,7 +1,7 @@
 """The command ``tfcompose``: its commands, how their options are read, and the exit code.
 
-The parser loads the modules of all commands, which therefore import little at the top; a command imports what it needs
-when it runs.
+The parser loads the modules of all commands, which therefore import little at the top; a command
+imports what it needs when it runs.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from tfcompose.cli.commands import (
     wait,
 )
 from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE
-from tfcompose.signals import RememberedInterrupt, take_interrupt
+from tfcompose.foundation.signals import RememberedInterrupt, take_interrupt
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -79,7 +79,9 @@ GROUPS: dict[str, dict[str, Command]] = {
     "Ship": {"deploy": deploy, "export": export, "fleet": fleet},
     "Help": {"help": manual, "completion": completion},
 }
-COMMANDS: dict[str, Command] = {name: command for group in GROUPS.values() for name, command in group.items()}
+COMMANDS: dict[str, Command] = {
+    name: command for group in GROUPS.values() for name, command in group.items()
+}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -132,7 +134,9 @@ def _run(name: str, words: list[str]) -> int:
 
 def _run_command(name: str, words: list[str]) -> int:
     parser = parser_of(name)
-    if not {"-h", "--help"}.isdisjoint(words):  # argparse would say nothing of a reader that is gone
+    if not {"-h", "--help"}.isdisjoint(
+        words
+    ):  # argparse would say nothing of a reader that is gone
         sys.stdout.write(parser.format_help())
         return 0
     try:
@@ -173,7 +177,9 @@ def help_text() -> str:
         "usage: tfcompose COMMAND [OPTION …]\n\n"
         "One YAML file says which frames a robot has and who publishes each TF edge.\n"
         "tfcompose checks it, builds it, starts it, and names any node that publishes\n"
-        "an edge owned by another.\n\n" + "\n".join(groups) + "\noptions:\n  -V, --version  print the version\n"
+        "an edge owned by another.\n\n"
+        + "\n".join(groups)
+        + "\noptions:\n  -V, --version  print the version\n"
         "  -h, --help     print this help; after a command: its options\n\n"
         f"topics, for tfcompose help TOPIC:\n{topics}\n"
     )

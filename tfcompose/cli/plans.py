@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, reject
-from tfcompose.files import with_absolute_addresses
-from tfcompose.findings import RejectedError
-from tfcompose.plan import Plan
-from tfcompose.plan.file import read_plan, write_plan
-from tfcompose.plan.hosts import share_of
-from tfcompose.variables import SETTLE
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.model.files import with_absolute_addresses
+from tfcompose.model.plan import Plan
+from tfcompose.model.plan.file import read_plan, write_plan
+from tfcompose.model.plan.hosts import share_of
+from tfcompose.model.variables import SETTLE
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from tfcompose.findings import Span
+    from tfcompose.foundation.findings import Span
     from tfcompose.launcher.runtime_dir import RuntimeDir
 
 PLAN = "plan.json"
@@ -56,12 +56,24 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
     Raises:
         SystemExit: after saying so.
     """
-    if arguments.profiles or arguments.overlays or arguments.settings or any(getattr(arguments, one) for one in more):
+    if (
+        arguments.profiles
+        or arguments.overlays
+        or arguments.settings
+        or any(getattr(arguments, one) for one in more)
+    ):
         *options, last = ["--profile", "--overlay", "--set", *(f"--{one}" for one in more)]
-        fail(f"a built plan takes no {', '.join(options)} and {last}: these options are for building it", UNREADABLE)
+        fail(
+            f"a built plan takes no {', '.join(options)} and {last}: these options are for"
+            " building it",
+            UNREADABLE,
+        )
     if arguments.given:
         built_with = "; tfcompose up --dry-run PLAN prints those that it was built with"
-        fail(f"{next(iter(arguments.given))}:=…: a built plan takes no arguments{built_with}", UNREADABLE)
+        fail(
+            f"{next(iter(arguments.given))}:=…: a built plan takes no arguments{built_with}",
+            UNREADABLE,
+        )
 
 
 def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]]:
@@ -77,7 +89,7 @@ def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span
         refuse_variant(arguments)
         return built_plan(Path(file)), {}
     from tfcompose.cli.compiling import compiled_robot
-    from tfcompose.emit.plan import plan_of
+    from tfcompose.compiler.emit.plan import plan_of
 
     robot = compiled_robot(file, arguments).with_final_names()
     return plan_of(robot), {edge.child: edge.at for edge in robot.edges}
@@ -96,7 +108,8 @@ def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
         return plan
     env = {SETTLE: str(arguments.settle)}
     processes = tuple(
-        replace(process, env=process.env | env) if process.kind == "guard" else process for process in plan.processes
+        replace(process, env=process.env | env) if process.kind == "guard" else process
+        for process in plan.processes
     )
     return replace(plan, processes=processes)
 
@@ -113,23 +126,31 @@ def host_share(plan: Plan, host: str | None, here: str) -> Plan:
     return share
 
 
-def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool, build_dir: Path | None = None) -> Path:
+def copy_plan(
+    plan: Plan, file: Path, place: RuntimeDir, *, alone: bool, build_dir: Path | None = None
+) -> Path:
     """Copy the plan, and what stands beside it, to where the run is; return the copy.
 
-    A build then does not reach into a run. Meshes stay where they are: descriptions address them from the copy too.
-    ``alone`` removes the copies of earlier runs; ``build_dir`` is where paths begin, if not beside the plan.
+    A build then does not reach into a run. Meshes stay where they are: descriptions address them
+    from the copy too. ``alone`` removes the copies of earlier runs; ``build_dir`` is where paths
+    begin, if not beside the plan.
 
     Raises:
         SystemExit: after saying that it cannot be copied.
     """
     parts = {PLAN: write_plan(plan).encode()}
-    descriptions = {plan.description, *(one.description for one in plan.processes if one.description is not None)}
+    descriptions = {
+        plan.description,
+        *(one.description for one in plan.processes if one.description is not None),
+    }
     try:
         for name in (*descriptions, *(process.params_file for process in plan.processes)):
             if name is not None and (file.parent / name).is_file():
                 parts[name] = (file.parent / name).read_bytes()
         for name in descriptions & parts.keys():
-            parts[name] = _with_absolute_addresses(parts[name], ((build_dir or file.parent) / name).parent)
+            parts[name] = _with_absolute_addresses(
+                parts[name], ((build_dir or file.parent) / name).parent
+            )
         digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
         folder = place.plan_folder(digest)
         if alone:
@@ -137,7 +158,9 @@ def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool, build_d
                 shutil.rmtree(old, ignore_errors=True)
         try:
             _write_copy(parts, folder)
-        except FileNotFoundError:  # who has won the race for the run removed it as an earlier one's
+        except (
+            FileNotFoundError
+        ):  # who has won the race for the run removed it as an earlier one's
             _write_copy(parts, folder)
     except OSError as error:
         fail(f"the plan cannot be copied to {place.folder}: {error.strerror}", UNREADABLE)

@@ -8,20 +8,26 @@ import re
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.geometry import IDENTITY_XYZW
-from tfcompose.language.preset import Chosen, FurtherProcess, PresetOptics
-from tfcompose.numbers import clean_quat, clean_rpy, number
-from tfcompose.render.tree import wrapped
-from tfcompose.resolve.poses import rotation_of
-from tfcompose.resolve.presets import filled, node_preset, node_preset_names
+from tfcompose.compiler.render.tree import wrapped
+from tfcompose.compiler.resolve.poses import rotation_of
+from tfcompose.compiler.resolve.presets import filled, node_preset, node_preset_names
+from tfcompose.foundation.geometry import IDENTITY_XYZW
+from tfcompose.foundation.numbers import clean_quat, clean_rpy, number
+from tfcompose.spec.language.preset import Chosen, FurtherProcess, PresetOptics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.language.bodies import Shape
-    from tfcompose.language.node_preset import ClaimSpec
-    from tfcompose.language.preset import Option, PresetDriver, PresetFrame, PresetProcess, PresetSpec
-    from tfcompose.resolve import Library
+    from tfcompose.compiler.resolve import Library
+    from tfcompose.spec.language.bodies import Shape
+    from tfcompose.spec.language.node_preset import ClaimSpec
+    from tfcompose.spec.language.preset import (
+        Option,
+        PresetDriver,
+        PresetFrame,
+        PresetProcess,
+        PresetSpec,
+    )
 
 
 #: What stands in names where the sensor's name will.
@@ -31,7 +37,9 @@ NAME = "NAME"
 def facts(name: str, library: Library) -> dict[str, Any]:
     """Return the preset, with the default variant of each of its options, as plain data; what is unknown is null."""
     plain = library.get(name)
-    defaults = {key: option.default for key, option in plain.options.items() if option.type == "choice"}
+    defaults = {
+        key: option.default for key, option in plain.options.items() if option.type == "choice"
+    }
     preset = library.get(name, defaults)
     return {
         "name": name,
@@ -46,19 +54,29 @@ def facts(name: str, library: Library) -> dict[str, Any]:
         "options": {key: _option(option) for key, option in preset.options.items()},
         "frames": [_frame(key, frame, preset) for key, frame in preset.frames.items()],
         "body": _body(preset),
-        "optics": [{"stream": stream} | _optics(optics, preset) for stream, optics in preset.optics.items()],
+        "optics": [
+            {"stream": stream} | _optics(optics, preset)
+            for stream, optics in preset.optics.items()
+        ],
         "driver": _driver(preset.driver, preset) if preset.driver else None,
         "topics": [
-            {"topic": topic} | _shown(fields, preset, ("type", "frame", "hard_coded", "rate", "when"))
+            {"topic": topic}
+            | _shown(fields, preset, ("type", "frame", "hard_coded", "rate", "when"))
             for topic, fields in preset.topics.items()
         ],
-        "source": [_shown(fact, preset, ("repository", "path", "commit", "about")) for fact in preset.source],
+        "source": [
+            _shown(fact, preset, ("repository", "path", "commit", "about"))
+            for fact in preset.source
+        ],
     }
 
 
 def text(preset: dict[str, Any], columns: int | None = None) -> str:
     """Return the page, with lines of at most so many columns."""
-    parts = [f"{preset['name']}  {preset['vendor']} {preset['model']}, {preset['kind']}\n{preset['about']}"]
+    parts = [
+        f"{preset['name']}  {preset['vendor']} {preset['model']},"  # noqa: ISC004
+        f" {preset['kind']}\n{preset['about']}"
+    ]
     if preset["options"]:
         rows = [(key, _option_text(option)) for key, option in preset["options"].items()]
         parts.append("options\n" + _table(rows))
@@ -83,11 +101,17 @@ def _fitted(page: str, columns: int | None) -> str:
     lines = []
     for line in page.splitlines():
         name, *cells = re.split(r" {2,}", line.strip())
-        parts = wrapped([("  ", name, cells)], columns)[0] if len(line) > columns and len(cells) > 1 else [line]
+        parts = (
+            wrapped([("  ", name, cells)], columns)[0]
+            if len(line) > columns and len(cells) > 1
+            else [line]
+        )
         for part in parts:
             begun = re.match(r" +\S+ {2,}", part)
             indent = begun.end() if begun and begun.end() < columns // 2 else 6
-            lines += textwrap.wrap(part, columns, subsequent_indent=" " * indent, break_on_hyphens=False) or [""]
+            lines += textwrap.wrap(
+                part, columns, subsequent_indent=" " * indent, break_on_hyphens=False
+            ) or [""]
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -100,7 +124,11 @@ def _plain(value: Any, preset: PresetSpec) -> Any:
         return _named(value, preset)
     if isinstance(value, Chosen):
         fields = {"option": value.option} if value.option else {"when": value.when}
-        return fields if value.option else fields | {"value": value.value, "otherwise": value.otherwise}
+        return (
+            fields
+            if value.option
+            else fields | {"value": value.value, "otherwise": value.otherwise}
+        )
     if isinstance(value, dict):
         return {_named(key, preset): _plain(item, preset) for key, item in value.items()}
     return [_plain(item, preset) for item in value] if isinstance(value, (list, tuple)) else value
@@ -114,12 +142,19 @@ def _shown(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, A
 
 def _option(option: Option) -> dict[str, Any]:
     values = list(option.variants) if option.type == "choice" else list(option.values)
-    fields = {"type": option.type, "values": values, "default": option.default, "about": option.about}
+    fields = {
+        "type": option.type,
+        "values": values,
+        "default": option.default,
+        "about": option.about,
+    }
     return {key: value for key, value in fields.items() if value not in ([], "", None)}
 
 
 def _frame(name: str, frame: PresetFrame, preset: PresetSpec) -> dict[str, Any]:
-    quat = rotation_of(frame, _named(name, preset)) or (IDENTITY_XYZW if frame.xyz is not None else None)
+    quat = rotation_of(frame, _named(name, preset)) or (
+        IDENTITY_XYZW if frame.xyz is not None else None
+    )
     fields: dict[str, Any] = {
         "name": _named(name, preset),
         "parent": _named(frame.parent, preset),
@@ -139,26 +174,41 @@ def _body(preset: PresetSpec) -> dict[str, Any] | None:
     body = preset.body
     if body is None:
         return None
-    fields = {"frame": _named(body.frame, preset), "shape": _shape(body.shape), "xyz": list(body.shape.xyz)}
+    fields = {
+        "frame": _named(body.frame, preset),
+        "shape": _shape(body.shape),
+        "xyz": list(body.shape.xyz),
+    }
     return fields | ({"mass": body.mass} if body.mass else {})
 
 
 def _shape(shape: Shape) -> dict[str, Any]:
     if shape.cylinder:
         return {"cylinder": {"radius": shape.cylinder.radius, "length": shape.cylinder.length}}
-    return {"sphere": {"radius": shape.sphere.radius}} if shape.sphere else {"box": list(shape.box or ())}
+    return (
+        {"sphere": {"radius": shape.sphere.radius}}
+        if shape.sphere
+        else {"box": list(shape.box or ())}
+    )
 
 
 def _optics(optics: PresetOptics, preset: PresetSpec) -> dict[str, Any]:
     """Return what is known of the stream, in SI; its frame is there always."""
     keys = tuple(key for key in PresetOptics.model_fields if key != "source")
-    sources = [{"of": list(one.of), "where": one.where, "quality": one.quality} for one in optics.source or ()]
+    sources = [
+        {"of": list(one.of), "where": one.where, "quality": one.quality}
+        for one in optics.source or ()
+    ]
     return _shown(optics, preset, keys) | ({"source": sources} if sources else {})
 
 
 def _process(process: PresetProcess, preset: PresetSpec) -> dict[str, Any]:
-    fields = _shown(process, preset, ("package", "executable", "launch", "lifecycle", "params", "args"))
-    fields["node"] = "/" + "/".join(_named(part, preset) for part in (process.namespace, process.node) if part)
+    fields = _shown(
+        process, preset, ("package", "executable", "launch", "lifecycle", "params", "args")
+    )
+    fields["node"] = "/" + "/".join(
+        _named(part, preset) for part in (process.namespace, process.node) if part
+    )
     if isinstance(process, FurtherProcess) and process.when:
         fields["when"] = process.when
     return fields
@@ -166,17 +216,26 @@ def _process(process: PresetProcess, preset: PresetSpec) -> dict[str, Any]:
 
 def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
     published = any(frame.driver for frame in preset.frames.values())
-    fields = _process(driver, preset) | _shown(driver, preset, ("versions", "naming", "on", "about"))
-    fields["also"] = {f"{NAME}_{suffix}": _process(one, preset) for suffix, one in driver.also.items()}
+    fields = _process(driver, preset) | _shown(
+        driver, preset, ("versions", "naming", "on", "about")
+    )
+    fields["also"] = {
+        f"{NAME}_{suffix}": _process(one, preset) for suffix, one in driver.also.items()
+    }
     fields["tf"] = driver.tf if published else "tfcompose"
     fields["off"] = _plain(driver.off, preset) if published else None
-    fields["claims"] = [_shown(claim, preset, ("parent", "child", "off", "about")) for claim in driver.claims]
+    fields["claims"] = [
+        _shown(claim, preset, ("parent", "child", "off", "about")) for claim in driver.claims
+    ]
     return fields
 
 
 def _table(rows: Sequence[tuple[str, ...]]) -> str:
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-    lines = ("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows)
+    lines = (
+        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))
+        for row in rows
+    )
     return "\n".join(f"  {line}".rstrip() for line in lines)
 
 
@@ -196,7 +255,9 @@ def _pairs(values: dict[str, Any]) -> str:
 
 
 def _option_text(option: dict[str, Any]) -> str:
-    kind = {"set": "some of ", "choice": "one of ", "bool": "true or false", "text": "a string"}[option["type"]]
+    kind = {"set": "some of ", "choice": "one of ", "bool": "true or false", "text": "a string"}[
+        option["type"]
+    ]
     default = f", default {_value(option['default'])}" if "default" in option else ""
     about = f": {option['about']}" if "about" in option else ""
     return f"{kind}{', '.join(option.get('values', []))}{default}{about}"
@@ -224,7 +285,9 @@ def _tree(preset: dict[str, Any], columns: int | None) -> str:
 
 
 def _facts_of(frame: dict[str, Any]) -> tuple[str, str, str, str]:
-    topic = {"static": "driver, /tf_static", "dynamic": "driver, /tf", None: "static"}[frame["driver"]]
+    topic = {"static": "driver, /tf_static", "dynamic": "driver, /tf", None: "static"}[
+        frame["driver"]
+    ]
     when = f"with {_pairs(frame['when'])}" if "when" in frame else ""
     if frame["xyz"] is None:
         return "unknown", topic, when, "give its pose"
@@ -252,23 +315,42 @@ def _started(process: dict[str, Any]) -> str:
 def _driver_text(preset: dict[str, Any]) -> str:
     driver = preset["driver"]
     rows = [("starts", _started(one)) for one in (driver, *driver["also"].values())]
-    rows += [(word, driver[key]) for word, key in (("versions", "versions"), ("note", "about")) if key in driver]
+    rows += [
+        (word, driver[key])
+        for word, key in (("versions", "versions"), ("note", "about"))
+        if key in driver
+    ]
     rows += [("names", _pairs(driver["naming"]))] if "naming" in driver else []
     inside = [frame["name"] for frame in preset["frames"] if frame["driver"]]
     if inside:
-        rows.append(("publishes", f"{len(inside)} frames below {preset['root']}; by default tf: {driver['tf']}"))
+        rows.append(
+            (
+                "publishes",
+                f"{len(inside)} frames below {preset['root']}; by default tf: {driver['tf']}",
+            )
+        )
         rows.append(("switch", _pairs(driver["off"]) if driver["off"] else "there is none"))
     else:
         rows.append(("publishes", "no frame inside the sensor"))
     for claim in driver["claims"]:
         about = f" ({claim['about']})" if "about" in claim else ""
-        rows.append(("claims", f"{claim['parent']} → {claim['child']}{about}; tfcompose sets {_pairs(claim['off'])}"))
+        rows.append(
+            (
+                "claims",
+                (
+                    f"{claim['parent']} → {claim['child']}{about}; tfcompose sets"
+                    f" {_pairs(claim['off'])}"
+                ),
+            )
+        )
     return _table(rows)
 
 
 def _topic(topic: dict[str, Any]) -> tuple[str, ...]:
     rate = f"{number(float(topic['rate']))} Hz" if "rate" in topic else ""
-    frame = f"in {topic['frame']}" + (", which no parameter changes" if topic.get("hard_coded") else "")
+    frame = f"in {topic['frame']}" + (
+        ", which no parameter changes" if topic.get("hard_coded") else ""
+    )
     when = f"with {_pairs(topic['when'])}" if "when" in topic else ""
     return topic["topic"], topic["type"], rate, frame, when
 
@@ -280,7 +362,9 @@ def _degrees(sector: Sequence[float]) -> str:
 
 
 def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
-    parts = [f"{word} {_degrees(optics[word])}" for word in ("horizontal", "vertical") if word in optics]
+    parts = [
+        f"{word} {_degrees(optics[word])}" for word in ("horizontal", "vertical") if word in optics
+    ]
     if "diagonal" in optics:
         parts.append(f"diagonal {number(round(math.degrees(optics['diagonal']), 3))} deg")
     parts += [optics["projection"]] if "projection" in optics else []
@@ -305,7 +389,10 @@ def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
         for one in optics.get("source", ()):
             keys = given.setdefault((one["where"], one["quality"]), [])
             keys.append(f"{optics['stream']} {', '.join(one['of'])}")
-    return [f"  {where} ({quality.replace('_', ' ')}): {'; '.join(keys)}" for (where, quality), keys in given.items()]
+    return [
+        f"  {where} ({quality.replace('_', ' ')}): {'; '.join(keys)}"
+        for (where, quality), keys in given.items()
+    ]
 
 
 def _source(fact: dict[str, Any]) -> str:
@@ -319,9 +406,17 @@ _ROLE = re.compile(r"\{(\w+)\}")
 
 def node_rows() -> list[dict[str, str]]:
     """Return all presets of nodes as rows of a list, by package."""
-    known = sorted(((name, node_preset(name)) for name in node_preset_names()), key=lambda one: one[1].package)
+    known = sorted(
+        ((name, node_preset(name)) for name in node_preset_names()), key=lambda one: one[1].package
+    )
     return [
-        {"name": name, "vendor": preset.package, "model": preset.node, "kind": "node", "about": preset.about}
+        {
+            "name": name,
+            "vendor": preset.package,
+            "model": preset.node,
+            "kind": "node",
+            "about": preset.about,
+        }
         for name, preset in known
     ]
 
@@ -337,14 +432,19 @@ def node_facts(name: str) -> dict[str, Any]:
         "kind": "node",
         "about": preset.about,
         "frames": {
-            role: {"parameter": frame.parameter, "default": frame.default} for role, frame in preset.frames.items()
+            role: {"parameter": frame.parameter, "default": frame.default}
+            for role, frame in preset.frames.items()
         },
         "one_of": preset.one_of,
         "publishes": [_claim(claim, usual) for claim in preset.publishes],
         "set": preset.set,
         "hint": preset.hint,
         "source": [
-            {key: getattr(fact, key) for key in ("repository", "path", "commit") if getattr(fact, key)}
+            {
+                key: getattr(fact, key)
+                for key in ("repository", "path", "commit")
+                if getattr(fact, key)
+            }
             for fact in preset.source
         ],
     }
@@ -354,7 +454,9 @@ def _claim(claim: ClaimSpec, usual: Mapping[str, str]) -> dict[str, Any]:
     def named(value: Any) -> Any:
         if isinstance(value, str):
             return _ROLE.sub(lambda role: usual.get(role[1], role[0]), value)
-        return {key: named(item) for key, item in value.items()} if isinstance(value, dict) else value
+        return (
+            {key: named(item) for key, item in value.items()} if isinstance(value, dict) else value
+        )
 
     return {
         "parent": named(claim.parent),
@@ -369,12 +471,16 @@ def _claim(claim: ClaimSpec, usual: Mapping[str, str]) -> dict[str, Any]:
 
 def node_text(preset: dict[str, Any], columns: int | None = None) -> str:
     """Return the page, with lines of at most so many columns."""
-    parts = [f"{preset['name']}  the node {preset['node']} of {preset['package']}\n{preset['about']}"]
+    parts = [
+        f"{preset['name']}  the node {preset['node']} of {preset['package']}\n{preset['about']}"
+    ]
     parts.append("publishes" + (", one of these" if preset["one_of"] else ""))
     parts[-1] += "".join(f"\n  {_claim_text(claim)}" for claim in preset["publishes"])
     if preset["frames"]:
         width = max(map(len, preset["frames"]))
-        lines = [f"  {role:<{width}}  {_role_text(frame)}" for role, frame in preset["frames"].items()]
+        lines = [
+            f"  {role:<{width}}  {_role_text(frame)}" for role, frame in preset["frames"].items()
+        ]
         parts.append("frames\n" + "\n".join(lines))
     if preset["set"]:
         parts.append(f"also set\n  {_parameters(preset['set'])}")
@@ -404,5 +510,6 @@ def _role_text(frame: dict[str, Any]) -> str:
 def _parameters(values: dict[str, Any]) -> str:
     """Return parameters as ROS takes them: 0.0 is another type than 0."""
     return ", ".join(
-        f"{key}: {str(value).lower() if isinstance(value, bool) else value}" for key, value in values.items()
+        f"{key}: {str(value).lower() if isinstance(value, bool) else value}"
+        for key, value in values.items()
     )

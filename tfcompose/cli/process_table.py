@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.tables import Table
-from tfcompose.render.text import GREEN, RED, YELLOW
+from tfcompose.compiler.render.text import GREEN, RED, YELLOW
 
 if TYPE_CHECKING:
-    from tfcompose.ipc import ProcessStatus
+    from tfcompose.model.messages import ProcessStatus
 
     #: (cores, bytes) by process number.
     Usage = dict[int, tuple[float, int]]
@@ -42,7 +42,11 @@ def _state(process: ProcessStatus) -> str:
         return state if process.ready else f"{state}, not ready"
     if process.state == "stopped" and process.waits:  # it will be started
         return process.waits
-    why = f" ({process.detail[:LONGEST_WHY]}{'…' * (len(process.detail) > LONGEST_WHY)})" if process.detail else ""
+    why = (
+        f" ({process.detail[:LONGEST_WHY]}{'…' * (len(process.detail) > LONGEST_WHY)})"
+        if process.detail
+        else ""
+    )
     return f"{state}{why}{', failed' if process.failed and state != 'fatal' else ''}"
 
 

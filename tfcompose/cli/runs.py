@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING, TypeVar
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, wait_for_data, warn
-from tfcompose.findings import RejectedError
-from tfcompose.ipc import (
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.text import listed
+from tfcompose.launcher.control import RefusedError, ask, connect
+from tfcompose.launcher.procfs import environment_of, leftovers
+from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
+from tfcompose.model.messages import (
     REQUESTS,
     Done,
     EventsRequest,
@@ -21,12 +25,8 @@ from tfcompose.ipc import (
     StatusRequest,
     read_notice,
 )
-from tfcompose.launcher.control import RefusedError, ask, connect
-from tfcompose.launcher.procfs import environment_of, leftovers
-from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
-from tfcompose.plan.file import read_plan
-from tfcompose.plan.topics import judged_topics
-from tfcompose.text import listed
+from tfcompose.model.plan.file import read_plan
+from tfcompose.model.plan.topics import judged_topics
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import TextIO
 
-    from tfcompose.ipc import Notice, ProcessStatus, Request, Verb
     from tfcompose.launcher.runtime_dir import Holder, RuntimeDir
-    from tfcompose.plan import Plan
+    from tfcompose.model.messages import Notice, ProcessStatus, Request, Verb
+    from tfcompose.model.plan import Plan
 
 A = TypeVar("A")
 
@@ -59,11 +59,13 @@ def is_meant(place: RuntimeDir, name: str) -> bool:
     return name in {place.name, place.share, place.robot}
 
 
-def chosen_run(name: str | None, command: str, *, among: Callable[[], list[RuntimeDir]] | None = None) -> RuntimeDir:
+def chosen_run(
+    name: str | None, command: str, *, among: Callable[[], list[RuntimeDir]] | None = None
+) -> RuntimeDir:
     """Return the place of the robot that is meant: of those that run, or ``among`` others.
 
-    Without a name that is the one in this shell's ROS domain, else the one of the ``robot.yaml`` here; ``command`` is
-    what the user typed, to be shown with the name of another.
+    Without a name that is the one in this shell's ROS domain, else the one of the ``robot.yaml``
+    here; ``command`` is what the user typed, to be shown with the name of another.
 
     Raises:
         SystemExit: after saying that there is none, or which there are.
@@ -81,9 +83,15 @@ def chosen_run(name: str | None, command: str, *, among: Callable[[], list[Runti
         fail(f"no robot {name} {verb} here; there is {names}")
     if not found:
         example = f"tfcompose {command} --robot {known[0].name}"
-        fail(f"no robot {verb} in ROS domain {domain_of(os.environ)}; elsewhere there is {names}: {example}")
+        fail(
+            f"no robot {verb} in ROS domain {domain_of(os.environ)}; elsewhere there is {names}:"
+            f" {example}"
+        )
     if len(found) > 1:
-        fail(f"several robots: {', '.join(place.name for place in found)}; choose one with --robot", UNREADABLE)
+        fail(
+            f"several robots: {', '.join(place.name for place in found)}; choose one with --robot",
+            UNREADABLE,
+        )
     return found[0]
 
 
@@ -96,7 +104,7 @@ def in_scope(places: list[RuntimeDir]) -> list[RuntimeDir]:
 
 def _robot_here() -> str | None:
     """Return the name that the robot file of this folder gives, if it can be read."""
-    from tfcompose.load import load
+    from tfcompose.spec.load import load
 
     try:
         name = load(read_text(DEFAULT_FILE), DEFAULT_FILE).data.get("robot")
@@ -135,10 +143,12 @@ def notices(
 ) -> Iterator[tuple[Notice, float]]:
     """Yield what the launcher has reported and reports, with when, until it ends.
 
-    ``output`` is where the caller prints them: once nobody reads it any more, the notices end, even if none comes.
+    ``output`` is where the caller prints them: once nobody reads it any more, the notices end,
+    even if none comes.
 
     Raises:
-        OSError: if it cannot be reached; TimeoutError if the time is over; BrokenPipeError if nobody reads.
+        OSError: if it cannot be reached; TimeoutError if the time is over; BrokenPipeError if
+        nobody reads.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(place) as connection:
@@ -189,7 +199,10 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
         warn(f"{place.name} does not answer: {error}")
         return
     missing = status.missing
-    warn(f"{place.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose logs and down")
+    warn(
+        f"{place.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose logs"
+        " and down"
+    )
     for process in status.processes:
         if process.failed:
             warn(f"  failed: {process.name} ({process.state}, {process.detail})")
@@ -228,7 +241,10 @@ def hidden_run(place: RuntimeDir) -> str | None:
     with contextlib.suppress(OSError):
         folder = environment_of(led[0].launcher).get("XDG_RUNTIME_DIR")
         where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
-        return f"{place.name} runs already: pid {led[0].launcher}, with {where}; set it for ps and down"
+        return (
+            f"{place.name} runs already: pid {led[0].launcher}, with {where}; set it for ps and"
+            " down"
+        )
     return None
 
 
@@ -242,7 +258,9 @@ def _neighbours(place: RuntimeDir, plan: Plan) -> Iterator[str]:
     found = [
         (other.robot, holder)
         for other, holder in running()
-        if other.domain == place.domain and other.robot != place.robot and _share_topics(other, plan)
+        if other.domain == place.domain
+        and other.robot != place.robot
+        and _share_topics(other, plan)
     ]
     for robot, holder in found:
         where = f"runs in domain {place.domain} on the same TF topics"
@@ -257,7 +275,9 @@ def _neighbours(place: RuntimeDir, plan: Plan) -> Iterator[str]:
 def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
     """Return whether the plan that runs there, as far as it can be read, has TF topics of this one."""
     running_plan = plan_of_run(other)
-    return running_plan is not None and not judged_topics(plan).isdisjoint(judged_topics(running_plan))
+    return running_plan is not None and not judged_topics(plan).isdisjoint(
+        judged_topics(running_plan)
+    )
 
 
 def other_domains(place: RuntimeDir) -> Iterator[str]:
@@ -304,7 +324,9 @@ def plan_of_domain() -> Plan | None:
 
 def _left_behind(place: RuntimeDir, run_id: str) -> Iterator[str]:
     """Name processes of earlier runs that are still there."""
-    found = [one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None]
+    found = [
+        one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None
+    ]
     for one in found:
         yield f"an earlier run left {one.pid} behind: {one.command}"
     if found:

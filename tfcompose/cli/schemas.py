@@ -14,12 +14,12 @@ def schema_text(language: str) -> str:
 
 def _schema(language: str) -> dict[str, object]:
     if language == "plan":
-        from tfcompose.plan.schema import plan_schema
+        from tfcompose.model.plan.schema import plan_schema
 
         return plan_schema()
     from tfcompose.cli.compiling import library
-    from tfcompose.language.json_schema import json_schema
-    from tfcompose.resolve.presets import node_preset_names
+    from tfcompose.compiler.resolve.presets import node_preset_names
+    from tfcompose.spec.language.json_schema import json_schema
 
     known = library()
     presets = {name: known.get(name) for name in known.names}

@@ -59,7 +59,10 @@ class Keys:
 
 def _keys(text: str) -> list[str]:
     pairs = (match.groups() for match in _KEY.finditer(text))
-    return [_NAMED.get(sequence, "") if sequence else _NAMED.get(char, char) for sequence, char in pairs]
+    return [
+        _NAMED.get(sequence, "") if sequence else _NAMED.get(char, char)
+        for sequence, char in pairs
+    ]
 
 
 class _Stream(StringIO):
@@ -80,8 +83,8 @@ class _Stream(StringIO):
 class Screen:
     """A terminal whose other screen is drawn on, from the ``with`` block's begin to its end.
 
-    Ctrl-C and Ctrl-Z remain signals; Ctrl-S is a key like others. A terminal that takes nothing is not waited for. What
-    cannot be written since the terminal has gone raises OSError.
+    Ctrl-C and Ctrl-Z remain signals; Ctrl-S is a key like others. A terminal that takes nothing is
+    not waited for. What cannot be written since the terminal has gone raises OSError.
     """
 
     def __init__(self, keys_fd: int, output: NonBlockingOutput) -> None:
@@ -95,7 +98,10 @@ class Screen:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.leave()
 
@@ -105,11 +111,19 @@ class Screen:
         settings[0] &= ~termios.IXON
         settings[3] &= ~(termios.ICANON | termios.ECHO)
         settings[6][termios.VMIN], settings[6][termios.VTIME] = 1, 0
-        termios.tcsetattr(self.fd, termios.TCSANOW, settings)  # the others wait until the terminal has taken all
+        termios.tcsetattr(
+            self.fd, termios.TCSANOW, settings
+        )  # the others wait until the terminal has taken all
         stream = _Stream(self.output)
-        console = Console(file=stream, force_terminal=True, no_color=not coloured(sys.stdout), highlight=False)
+        console = Console(
+            file=stream, force_terminal=True, no_color=not coloured(sys.stdout), highlight=False
+        )
         self._live = Live(
-            console=console, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
+            console=console,
+            screen=True,
+            auto_refresh=False,
+            redirect_stdout=False,
+            redirect_stderr=False,
         )
         console.size = ConsoleDimensions(*size_of(sys.stdout.fileno()))
         self._live.start()

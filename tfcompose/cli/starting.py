@@ -1,6 +1,7 @@
 """How ``up`` starts a robot here: it checks first all that the plan needs, then makes the runtime directory.
 
-With ``-d`` the launcher goes on in the background, and the command follows it until the robot is up.
+With ``-d`` the launcher goes on in the background, and the command follows it until the robot is
+up.
 """
 
 from __future__ import annotations
@@ -40,23 +41,28 @@ from tfcompose.cli.terminal import (
     size_of,
     warn,
 )
-from tfcompose.findings import RejectedError
-from tfcompose.ipc import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
+from tfcompose.foundation.findings import RejectedError
 from tfcompose.launcher.child import end_with
 from tfcompose.launcher.control import listen
 from tfcompose.launcher.output import Logs, NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
 from tfcompose.launcher.supervisor import ENDING, Session, supervise
-from tfcompose.ros.environment import child_environment, other_distro, other_middleware, ros_trouble
+from tfcompose.model.messages import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
+from tfcompose.tf.ros.environment import (
+    child_environment,
+    other_distro,
+    other_middleware,
+    ros_trouble,
+)
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterable, Sequence
 
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.runtime_dir import RuntimeDir
-    from tfcompose.plan import Plan
+    from tfcompose.model.plan import Plan
 
 
 def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) -> int:
@@ -107,21 +113,33 @@ def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
         SystemExit: after saying all of it.
     """
     trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True), plan.ros)
-    found = [trouble] if trouble else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
+    found = (
+        [trouble]
+        if trouble
+        else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
+    )
     if found:
         reject([_with_profiles(one, arguments) for one in found])
     odd = (other_middleware(os.environ, plan.ros), other_distro(os.environ, plan.ros))
     print_findings([one for one in odd if one], sys.stderr)
 
 
-def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOutput, duration_s: float | None) -> int:
+def _run(
+    plan: Plan,
+    place: RuntimeDir,
+    session: Session,
+    output: NonBlockingOutput,
+    duration_s: float | None,
+) -> int:
     """Run the plan on this terminal until it ends, and return the exit code."""
     logs = Logs(place.logs)
     status = StatusLine(plan, lambda: size_of(output.fd)[0]) if can_redraw(sys.stdout) else None
     console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
     session.refresh = console.refresh if status else None
     try:
-        return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
+        return supervise(
+            plan, session.plan_file, report=console, duration_s=duration_s, session=session
+        )
     finally:
         logs.close()
 
@@ -130,9 +148,13 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     """Bring the running robot to the plan; exit code 0, 1 where it runs as it is and was to be started here."""
     holder = place.holder()
     who = (
-        f"{place.name} runs already: pid {holder.pid}, since {since(holder)}" if holder else f"{place.name} just ended"
+        f"{place.name} runs already: pid {holder.pid}, since {since(holder)}"
+        if holder
+        else f"{place.name} just ended"
     )
-    folder = Path(arguments.build_dir).absolute() if arguments.build_dir else file.absolute().parent
+    folder = (
+        Path(arguments.build_dir).absolute() if arguments.build_dir else file.absolute().parent
+    )
     copy = copy_plan(plan, file, place, alone=False, build_dir=folder)
     answer = request(place, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
@@ -158,14 +180,17 @@ def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
     if not profiles:
         return found
     words = "".join(f" --profile {name}" for name in arguments.profiles)
-    advice = f"to start without them: tfcompose up {arguments.file}{words} --profile {' or '.join(profiles)}"
+    advice = (
+        f"to start without them: tfcompose up {arguments.file}{words} --profile"
+        f" {' or '.join(profiles)}"
+    )
     return replace(found, help="; ".join(filter(None, (found.help, advice))))
 
 
 def _profiles_that_start(arguments: Namespace) -> list[str]:
     """Return the profiles with which, laid over those that were asked for, every program is there."""
-    from tfcompose.language import profiles_in, with_includes
-    from tfcompose.load import load
+    from tfcompose.spec.language import profiles_in, with_includes
+    from tfcompose.spec.load import load
 
     try:
         source = with_includes(load(read_text(arguments.file), arguments.file), read_text)
@@ -177,19 +202,27 @@ def _profiles_that_start(arguments: Namespace) -> list[str]:
 
 def _starts_with(profile: str, arguments: Namespace) -> bool:
     from tfcompose.cli.compiling import given_by, library, overlays_of
-    from tfcompose.compile import compile_robot
-    from tfcompose.emit.plan import plan_of
+    from tfcompose.compiler.compile import compile_robot
+    from tfcompose.compiler.emit.plan import plan_of
 
-    profiles, overlays, given = [*arguments.profiles, profile], overlays_of(arguments), given_by(arguments)
+    profiles, overlays, given = (
+        [*arguments.profiles, profile],
+        overlays_of(arguments),
+        given_by(arguments),
+    )
     file, presets = arguments.file, library()
-    compiled = compile_robot(read_text(file), file, presets, profiles, overlays=overlays, read=read_text, given=given)
+    compiled = compile_robot(
+        read_text(file), file, presets, profiles, overlays=overlays, read=read_text, given=given
+    )
     if compiled.robot is None or compiled.errors:
         return False
     plan = plan_of(compiled.robot)
     return not commands_of(plan, plan.managed, Path(file), os.environ, child_environment)[1]
 
 
-def _detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:
+def _detach(
+    plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace
+) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
     pid = _fork(plan, place, lock, session, arguments.duration)
     return _follow(plan, place, pid, arguments)
@@ -245,7 +278,9 @@ def _launch(plan: Plan, place: RuntimeDir, session: Session, duration_s: float |
     logs = Logs(place.logs)
     console = Console(plan, Nowhere(), colour=False, keep=logs.write)
     try:
-        return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
+        return supervise(
+            plan, session.plan_file, report=console, duration_s=duration_s, session=session
+        )
     finally:
         logs.close()
 
@@ -260,13 +295,18 @@ def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> in
                 if isinstance(notice, Ended):
                     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
                 if isinstance(notice, goal):
-                    print(f"{place.name} runs in the background: pid {pid}; see tfcompose ps, logs -f and down")
+                    print(
+                        f"{place.name} runs in the background: pid {pid}; see tfcompose ps, logs"
+                        " -f and down"
+                    )
                     return 0
         except TimeoutError:
             print_missing(place, arguments.timeout)
             return FAILED
         except KeyboardInterrupt:
-            warn(f"{place.name} keeps running in the background: pid {pid}; tfcompose down stops it")
+            warn(
+                f"{place.name} keeps running in the background: pid {pid}; tfcompose down stops it"
+            )
             return INTERRUPTED
     warn(f"the launcher has ended; see {place.logs / 'launcher.err'}")
     return FAILED

@@ -1,8 +1,9 @@
 """Tables of text: as wide as they are for files and pipes; for a terminal fitted, coloured and drawn again in place.
 
-A pipe gets the same bytes whatever the terminal is. On a narrow terminal the columns that matter least are left out,
-and names are shortened after their first third: their ends tell them apart. Of an edge the parent is shortened before
-the child, which no other edge has. rich would cut numbers there, too.
+A pipe gets the same bytes whatever the terminal is. On a narrow terminal the columns that matter
+least are left out, and names are shortened after their first third: their ends tell them apart. Of
+an edge the parent is shortened before the child, which no other edge has. rich would cut numbers
+there, too.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import plain, size_of
-from tfcompose.render.text import PLAIN
+from tfcompose.compiler.render.text import PLAIN
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,9 +23,10 @@ if TYPE_CHECKING:
 class Table:
     """How the columns of a table are laid out; they go by their numbers, from 0.
 
-    Columns in ``right`` are aligned to the right. To fit a width, those in ``spare`` are left out, in their order,
-    until those in ``least`` can be shortened enough; these are shortened in their order, to no fewer characters than
-    it says. ``colour`` returns the colour of a cell, or nothing, for its column and text.
+    Columns in ``right`` are aligned to the right. To fit a width, those in ``spare`` are left out,
+    in their order, until those in ``least`` can be shortened enough; these are shortened in their
+    order, to no fewer characters than it says. ``colour`` returns the colour of a cell, or
+    nothing, for its column and text.
     """
 
     right: frozenset[int] = frozenset()
@@ -33,10 +35,17 @@ class Table:
     colour: Callable[[int, str], str] | None = None
 
     def lines(
-        self, rows: Sequence[Sequence[str]], width: int | None = None, *, coloured: bool = False, indent: str = ""
+        self,
+        rows: Sequence[Sequence[str]],
+        width: int | None = None,
+        *,
+        coloured: bool = False,
+        indent: str = "",
     ) -> list[str]:
         """Return a line for each row, narrower than ``width`` where possible: a terminal's last column stays free."""
-        widths = {column: max(map(len, cells)) for column, cells in enumerate(zip(*rows, strict=True))}
+        widths = {
+            column: max(map(len, cells)) for column, cells in enumerate(zip(*rows, strict=True))
+        }
         if width is not None:
             self._fit(widths, width - 1 - len(indent))
         colour = self.colour if coloured else None
@@ -45,7 +54,9 @@ class Table:
     def _fit(self, widths: dict[int, int], width: int) -> None:
         for column in [one for one, wide in widths.items() if not wide]:
             del widths[column]
-        least = {column: min(wide, self.least.get(column, wide)) for column, wide in widths.items()}
+        least = {
+            column: min(wide, self.least.get(column, wide)) for column, wide in widths.items()
+        }
         for column in [one for one in self.spare if one in widths]:
             if _excess(least, width) <= 0:
                 break
@@ -53,7 +64,9 @@ class Table:
         for column in [one for one in self.least if one in widths]:
             widths[column] = max(widths[column] - max(_excess(widths, width), 0), least[column])
 
-    def _line(self, row: Sequence[str], widths: dict[int, int], colour: Callable[[int, str], str] | None) -> str:
+    def _line(
+        self, row: Sequence[str], widths: dict[int, int], colour: Callable[[int, str], str] | None
+    ) -> str:
         cells, last = [], max(widths)
         for column, width in widths.items():
             text = shortened(row[column], width, at_end=column == last)
@@ -72,14 +85,19 @@ def _excess(widths: dict[int, int], width: int) -> int:
 def shortened(text: str, width: int, *, at_end: bool = False) -> str:
     """Return the text in so many characters: with an ellipsis at its end, or after its first third.
 
-    Of an edge, ``parent → child``, that is the first third of the parent; of the child alone where there is no room.
+    Of an edge, ``parent → child``, that is the first third of the parent; of the child alone where
+    there is no room.
     """
     if len(text) <= width:
         return text
     parent, arrow, child = text.partition(" → ")
     if arrow and not at_end:
         room = width - len(arrow) - len(child)
-        return f"{shortened(parent, room)}{arrow}{child}" if room > 0 else f"→ {shortened(child, width - 2)}"
+        return (
+            f"{shortened(parent, room)}{arrow}{child}"
+            if room > 0
+            else f"→ {shortened(child, width - 2)}"
+        )
     head = width - 1 if at_end else (width - 1) // 3
     return f"{text[:head]}…{text[len(text) - (width - 1 - head) :]}"
 
@@ -98,9 +116,14 @@ class LiveLines:
         room = max(rows - 1, 2)
         shown = list(lines)
         if len(shown) > room:
-            shown = [*shown[: room - 1], f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe"]
+            shown = [
+                *shown[: room - 1],
+                f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe",
+            ]
         up = f"\r\033[{self._drawn}A" if self._drawn else ""
-        if columns < self._columns:  # what was drawn takes more lines now, and how many is the terminal's secret
+        if (
+            columns < self._columns
+        ):  # what was drawn takes more lines now, and how many is the terminal's secret
             up = "\033[H\033[2J"
         body = "".join(f"{_fitted(line, columns - 1)}\033[K\n" for line in shown)
         self._stream.write(f"{up}{body}\033[J")  # what was below the last line goes

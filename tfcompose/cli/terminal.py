@@ -9,23 +9,25 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
 
-from tfcompose.render.text import PLAIN, render_text
+from tfcompose.compiler.render.text import PLAIN, render_text
 
 if TYPE_CHECKING:
     import socket
     from collections.abc import Sequence
     from typing import TextIO
 
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
 
-#: Exit codes: findings, or a process that failed; wrong use, what cannot be read, or what is not installed; and as a
-#: shell has them for a program that was ended by Ctrl-C, or by writing where nobody reads.
+#: Exit codes: findings, or a process that failed; wrong use, what cannot be read, or what is not
+#: installed; and as a shell has them for a program that was ended by Ctrl-C, or by writing where
+#: nobody reads.
 FAILED, UNREADABLE, INTERRUPTED, OUTPUT_CLOSED = 1, 2, 130, 141
 
 #: A file that cannot be read; ROS or a package of it, trimesh, rosbags and eclipse-zenoh.
 _LACKING = frozenset({"TF001", "TF901", "TF905", "TF906", "TF920"})
 
-#: Control sequences (ECMA-48): those that end in m set colours, the others do something; and titles and links.
+#: Control sequences (ECMA-48): those that end in m set colours, the others do something; and
+#: titles and links.
 _SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?|\033[ -/]*[0-~])")
 _COLOUR = re.compile(r"\033\[[0-9;:]*m")
 
@@ -118,7 +120,9 @@ def coloured_only(text: str) -> str:
 def _marked(text: str) -> str:
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c == "\t" else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return "".join(
+        c if c.isprintable() or c == "\t" else "\N{REPLACEMENT CHARACTER}" for c in text
+    )
 
 
 def has_reader(stream: TextIO) -> bool:
@@ -132,10 +136,14 @@ def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
     The connection's timeout limits the wait.
     """
     timeout_s = connection.gettimeout()
-    return _first_ready(stream, connection, None if timeout_s is None else timeout_s * 1e3) != stream
+    return (
+        _first_ready(stream, connection, None if timeout_s is None else timeout_s * 1e3) != stream
+    )
 
 
-def _first_ready(stream: TextIO, connection: socket.socket | None, timeout_ms: float | None) -> object:
+def _first_ready(
+    stream: TextIO, connection: socket.socket | None, timeout_ms: float | None
+) -> object:
     """Return the stream if nobody reads it; else the connection if it has something; else None."""
     poll = select.poll()
     with suppress(OSError):  # it has no descriptor: nobody can leave

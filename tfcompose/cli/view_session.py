@@ -11,20 +11,20 @@ from tfcompose.cli.compiling import disk, given_by, library, overlays_of
 from tfcompose.cli.fixing import rewrite
 from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
 from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, reject
-from tfcompose.compile import Compiled, compile_robot
-from tfcompose.emit.plan import plan_of
-from tfcompose.findings import RejectedError
-from tfcompose.plan.file import read_plan
-from tfcompose.urdf.packages import Packages
-from tfcompose.view.plan_robot import robot_of_plan
-from tfcompose.view.session import Session
+from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.emit.plan import plan_of
+from tfcompose.compiler.urdf.packages import Packages
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.model.plan.file import read_plan
+from tfcompose.tools.view.plan_robot import robot_of_plan
+from tfcompose.tools.view.session import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Mapping
 
-    from tfcompose.plan import Plan
-    from tfcompose.view.reload import Files
+    from tfcompose.model.plan import Plan
+    from tfcompose.tools.view.reload import Files
 
 
 def session_of(file: str, arguments: Namespace, files: Files) -> Session:

@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import compiled_without_errors
 from tfcompose.cli.terminal import UNREADABLE, fail, reject, warn
-from tfcompose.emit import described, emit
-from tfcompose.files import Target, unaddressed
-from tfcompose.findings import Finding, finding
-from tfcompose.plan import DESCRIPTION
+from tfcompose.compiler.emit import described, emit
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.model.files import Target, unaddressed
+from tfcompose.model.plan import DESCRIPTION
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterable, Sequence
 
-    from tfcompose.files import File, Form
-    from tfcompose.model import Asset, Robot
+    from tfcompose.model.files import File, Form
+    from tfcompose.model.robot import Asset, Robot
 
 
 def replace_file(path: Path, data: bytes) -> None:
@@ -52,7 +52,9 @@ def replace_file(path: Path, data: bytes) -> None:
             if before:
                 with contextlib.suppress(PermissionError):  # another's file, in a folder of ours
                     os.fchown(stream.fileno(), before.st_uid, before.st_gid)
-            os.fchmod(stream.fileno(), stat.S_IMODE(before.st_mode) if before else 0o666 & ~_umask())
+            os.fchmod(
+                stream.fileno(), stat.S_IMODE(before.st_mode) if before else 0o666 & ~_umask()
+            )
         new.replace(path)
     except BaseException:
         with contextlib.suppress(OSError):
@@ -69,9 +71,9 @@ def _umask() -> int:
 def write_all(folder: Path, files: Sequence[File]) -> None:
     """Write the files of a build below ``folder``; a reader sees each as it was or as it is, never half.
 
-    All of them are written to a folder beside first. Only when the last byte is on the disk are they moved into place,
-    which needs no more space; if one cannot be moved, those before it are put back. Parameter files of an earlier build
-    that are not among the files are removed.
+    All of them are written to a folder beside first. Only when the last byte is on the disk are
+    they moved into place, which needs no more space; if one cannot be moved, those before it are
+    put back. Parameter files of an earlier build that are not among the files are removed.
 
     Raises:
         OSError: if the files cannot be written; then nothing has changed.
@@ -96,7 +98,11 @@ def write_all(folder: Path, files: Sequence[File]) -> None:
 
 def _move(staging: Path, folder: Path, paths: list[str]) -> None:
     """Move the files into place, all or none: what they replace is kept until the last one is there."""
-    made = [parent for parent in {(folder / path).parent: None for path in paths} if not parent.exists()]
+    made = [
+        parent
+        for parent in {(folder / path).parent: None for path in paths}
+        if not parent.exists()
+    ]
     done: list[str] = []
     try:
         for path in paths:
@@ -157,7 +163,11 @@ def _parameter_files(folder: Path) -> list[str]:
         named = [process["params_file"] for process in processes]
     except (OSError, ValueError, LookupError, TypeError):
         return []
-    return [name for name in named if isinstance(name, str) and name.startswith("params/") and ".." not in name]
+    return [
+        name
+        for name in named
+        if isinstance(name, str) and name.startswith("params/") and ".." not in name
+    ]
 
 
 def _remove_stale(folder: Path, stale: Sequence[str]) -> None:
@@ -190,7 +200,9 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
     try:
         write_all(folder, files)
         if not arguments.output and Path(arguments.file).is_file():
-            replace_file(_source_file(folder), os.fsencode(f"{os.path.relpath(arguments.file, folder)}\n"))
+            replace_file(
+                _source_file(folder), os.fsencode(f"{os.path.relpath(arguments.file, folder)}\n")
+            )
     except OSError as error:
         where = f": {error.filename}" if error.filename else ""
         fail(f"nothing was written to {folder}: {error.strerror}{where}", UNREADABLE)
@@ -222,7 +234,7 @@ def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:
 
 def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Finding]:
     """Return where the descriptions among the robot's files differ from it when they are read back."""
-    from tfcompose.urdf.read_back import differences
+    from tfcompose.compiler.urdf.read_back import differences
 
     texts = {file.path: file.text for file in files}
     advice = "nothing was written; this is a bug in tfcompose: please report it"
@@ -240,6 +252,14 @@ def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Fi
 def _without_address(asset: Asset, form: Form) -> Finding:
     """Return the finding that a file cannot be addressed as the command line asks for."""
     if form != "package":
-        return finding("TF724", f"{asset.uri} was not found and has no path", asset.at, help="build without --mesh")
-    advice = "a folder with a package.xml above it, packages: {name: FOLDER} and package://name/…, or no --mesh"
+        return finding(
+            "TF724",
+            f"{asset.uri} was not found and has no path",
+            asset.at,
+            help="build without --mesh",
+        )
+    advice = (
+        "a folder with a package.xml above it, packages: {name: FOLDER} and package://name/…, or"
+        " no --mesh"
+    )
     return finding("TF726", f"{asset.uri} is in no package", asset.at, help=advice)

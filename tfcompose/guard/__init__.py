@@ -1,6 +1,7 @@
 """The guard, a process of the plan: it observes /tf and reports who publishes an edge that another process owns.
 
-``judge`` decides over messages and publishers, ``liveness`` over rates; ``relay`` passes messages on in strict mode,
-``channel`` and ``ipc`` talk to the launcher. Must not import ``launcher``, ``publishers``, ``model``, ``pydantic``: it
-runs on the robot, from the plan alone.
+``judge`` decides over messages and publishers, ``liveness`` over rates; ``relay`` passes messages
+on in strict mode, ``channel`` and ``ipc`` talk to the launcher. Must not import ``spec``,
+``compiler``, ``launcher``, ``cli``, ``tools``, ``pydantic``, ``yaml``: it runs on the robot, from
+the plan alone.
 """

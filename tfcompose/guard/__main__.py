@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.process import start
+from tfcompose.tf.process import start
 
 if TYPE_CHECKING:
-    from tfcompose.process import Own
-    from tfcompose.signals import Stop
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.tf.process import Own
 
 
 def _guard(own: Own, stop: Stop) -> None:

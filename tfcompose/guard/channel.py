@@ -1,8 +1,9 @@
 """The guard's ends of the pipes to and from the launcher: orders in, events out, and what the next guard must know.
 
-Without a launcher there are no orders, and events go to the guard's own output. What a guard leaves to the one that
-follows it, should it die, the launcher keeps without looking into it: ``ipc.MEMORY_FD`` names the environment
-variable that holds the descriptor of a file with the memory, one JSON object, by the TF topics that a judge watches.
+Without a launcher there are no orders, and events go to the guard's own output. What a guard
+leaves to the one that follows it, should it die, the launcher keeps without looking into it:
+``ipc.MEMORY_FD`` names the environment variable that holds the descriptor of a file with the
+memory, one JSON object, by the TF topics that a judge watches.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.guard.liveness import MOST_NAMED
-from tfcompose.ipc import (
+from tfcompose.model.messages import (
     GUARD_EVENTS,
     GUARD_ORDERS,
     Absent,
@@ -37,9 +38,9 @@ from tfcompose.ipc import (
     Unload,
     Unloaded,
 )
-from tfcompose.plan.codec import encode
-from tfcompose.process import say
-from tfcompose.variables import EVENTS_FD, MEMORY_FD, ORDERS_FD
+from tfcompose.model.plan.codec import encode
+from tfcompose.model.variables import EVENTS_FD, MEMORY_FD, ORDERS_FD
+from tfcompose.tf.process import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -155,8 +156,14 @@ class SilentEdges:
         if changes == self._changes:
             return
         self._changes = changes
-        before, self._reported = self._reported, [child for judge in self._judges for child in judge.live.silent()]
-        for children, others, over in ((self._reported, before, False), (before, self._reported, True)):
+        before, self._reported = (
+            self._reported,
+            [child for judge in self._judges for child in judge.live.silent()],
+        )
+        for children, others, over in (
+            (self._reported, before, False),
+            (before, self._reported, True),
+        ):
             new = sorted(set(children).difference(others))
             for start in range(0, len(new), MOST_NAMED):
                 self._emit(Silent(tuple(new[start : start + MOST_NAMED]), over=over))
@@ -178,7 +185,9 @@ def recalled(env: Mapping[str, str]) -> dict[str, Any]:
 class Memory:
     """Hands on what a judge knows, and a relay latches, part by part, whenever a part has changed."""
 
-    def __init__(self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]) -> None:
+    def __init__(
+        self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]
+    ) -> None:
         self._topics = topics
         self._judge = judge
         self._relay = relay
@@ -203,7 +212,9 @@ class Memory:
 class SwitchMemory:
     """Remembers which nodes have answered for their switches, so that nothing is reported twice."""
 
-    def __init__(self, switches: Switches, emit: Callable[[GuardEvent], None], left: Mapping[str, Any]) -> None:
+    def __init__(
+        self, switches: Switches, emit: Callable[[GuardEvent], None], left: Mapping[str, Any]
+    ) -> None:
         self._switches = switches
         self._emit = emit
         self._left = left.get(_SWITCHES, {}).get(_ANSWERED, [])

@@ -1,8 +1,8 @@
 """What the guard has containers load and unload: by orders of the launcher, or, where there is none, by itself.
 
-A container is asked one thing at a time, in the order of the orders. Where no launcher gives orders, in units and
-containers of an export, the guard looks at each container now and then, and loads what it does not have: also into one
-that was started again.
+A container is asked one thing at a time, in the order of the orders. Where no launcher gives
+orders, in units and containers of an export, the guard looks at each container now and then, and
+loads what it does not have: also into one that was started again.
 """
 
 from __future__ import annotations
@@ -14,25 +14,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.ipc import Load, Loaded, NotLoaded, Unload, Unloaded
-from tfcompose.plan.codec import decode
-from tfcompose.plan.components import LoadRequest, load_request
-from tfcompose.process import say
+from tfcompose.model.messages import Load, Loaded, NotLoaded, Unload, Unloaded
+from tfcompose.model.plan.codec import decode
+from tfcompose.model.plan.components import LoadRequest, load_request
+from tfcompose.tf.process import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rclpy.node import Node
 
-    from tfcompose.ipc import GuardEvent
-    from tfcompose.process import Own
-    from tfcompose.ros.composition import Container
+    from tfcompose.model.messages import GuardEvent
+    from tfcompose.tf.process import Own
+    from tfcompose.tf.ros.composition import Container
 
-#: A container that is to unload something, and does not answer for so long, is left alone; seconds.
+#: A container that is to unload something, and does not answer for so long, is left alone;
+#: seconds.
 ANSWER_S = 5.0
 #: An answer that is not there by then may be lost: what the container has says it, too; seconds.
 LIST_AFTER_S = 2.0
-#: More often than this a component is not missing by chance: it was unloaded, or the request to load it was lost.
+#: More often than this a component is not missing by chance: it was unloaded, or the request to
+#: load it was lost.
 ABSENT_AT_MOST = 1
 #: How often the guard looks whether a container has its components; seconds.
 CHECK_EVERY_S = 2.0
@@ -42,7 +44,8 @@ CHECK_EVERY_S = 2.0
 class _Job:
     """One order, how far it is, and since when; ``step`` is empty until the container was asked.
 
-    ``listed`` is when the container was asked what it has, ``absent`` how often the component was not there.
+    ``listed`` is when the container was asked what it has, ``absent`` how often the component was
+    not there.
     """
 
     order: Load | Unload
@@ -56,8 +59,8 @@ class _Job:
 class Components:
     """The orders that are not carried out yet, by container, and the components that were loaded.
 
-    A component that a container does not have any more, because somebody unloaded it, or because a container that the
-    launcher did not start is another one now, is reported as unloaded.
+    A component that a container does not have any more, because somebody unloaded it, or because a
+    container that the launcher did not start is another one now, is reported as unloaded.
     """
 
     def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
@@ -83,7 +86,9 @@ class Components:
         try:
             self._container(request.container)
         except ImportError:
-            self._answer(order, "composition_interfaces cannot be imported, which comes with the containers")
+            self._answer(
+                order, "composition_interfaces cannot be imported, which comes with the containers"
+            )
             return
         self.forget(order.process)
         jobs = self._jobs.setdefault(request.container, deque())
@@ -120,12 +125,15 @@ class Components:
             self._absent[order.process] = is_absent * (self._absent.get(order.process, 0) + 1)
             if self._absent[order.process] > ABSENT_AT_MOST:
                 del self._loaded[order.process]
-                self._emit(Unloaded(order.process, order.number, f"{name} has no {request.node} any more"))
+                self._emit(
+                    Unloaded(order.process, order.number, f"{name} has no {request.node} any more")
+                )
         if loaded and is_there:
             container.list.ask()
 
     def _container(self, name: str) -> Container:
-        from tfcompose.ros.composition import Container  # noqa: PLC0415 (its messages come with containers only)
+        # Its messages come with containers only.
+        from tfcompose.tf.ros.composition import Container  # noqa: PLC0415
 
         if name not in self._containers:
             self._containers[name] = Container(self._node, name)
@@ -146,7 +154,11 @@ class Components:
             return not self._begins(job, container, now, "look")
         if job.step == "load" and (answer := container.load.answer()) is not None:
             words = answer.error_message or "it does not say why"
-            why = "" if answer.success else f"{container.name} did not load {job.request.what}: {words}"
+            why = (
+                ""
+                if answer.success
+                else f"{container.name} did not load {job.request.what}: {words}"
+            )
             self._loaded_or_not(job, order, why)
             return True
         if (there := container.list.answer()) is not None:
@@ -155,7 +167,9 @@ class Components:
                 self._loaded_or_not(job, order, _already(job.request, there) if before else "")
                 return True
             job.absent += 1
-            if job.step == "look" or job.absent > ABSENT_AT_MOST:  # it carries out one request after the other
+            if (
+                job.step == "look" or job.absent > ABSENT_AT_MOST
+            ):  # it carries out one request after the other
                 return not self._begins(job, container, now, "load")
         elif now - max(job.since, job.listed) > LIST_AFTER_S and container.list.is_there:
             job.listed = now
@@ -193,7 +207,9 @@ class Components:
             job.step = "unload"
             container.unload.ask(unique_id=named[job.request.node])
         elif job.step == "unload" and (answer := container.unload.answer()) is not None:
-            self._answer(order, "" if answer.success else f"{container.name}: {answer.error_message}")
+            self._answer(
+                order, "" if answer.success else f"{container.name}: {answer.error_message}"
+            )
             return True
         return False
 
@@ -207,7 +223,11 @@ class Components:
         if isinstance(order, Unload):
             self._emit(Unloaded(order.process, order.number, why))
         else:
-            done = NotLoaded(order.process, order.number, why) if why else Loaded(order.process, order.number)
+            done = (
+                NotLoaded(order.process, order.number, why)
+                if why
+                else Loaded(order.process, order.number)
+            )
             self._emit(done)
 
 
@@ -215,7 +235,10 @@ def _already(request: LoadRequest, there: Any) -> str:
     """Return why a component is not loaded whose node the container has already: two would have one name."""
     number = there.unique_ids[list(there.full_node_names).index(request.node)]
     unload = f"ros2 component unload {request.container} {number}"
-    return f"{request.container} has a node {request.node} already, which is not of this run: {unload}"
+    return (
+        f"{request.container} has a node {request.node} already, which is not of this run:"
+        f" {unload}"
+    )
 
 
 class ComponentDriver:
@@ -226,7 +249,8 @@ class ComponentDriver:
             return text.replace("${build_dir}", str(own.file.absolute().parent))
 
         self._requests = {
-            process.name: load_request(own.plan, process, fill, private=private) for process in own.plan.components
+            process.name: load_request(own.plan, process, fill, private=private)
+            for process in own.plan.components
         }
         self._components = Components(node, self._hear)
         self._due = 0.0

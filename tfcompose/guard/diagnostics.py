@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.process import say
+from tfcompose.tf.process import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rclpy.node import Node
 
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
     from tfcompose.guard.judge import Judge
     from tfcompose.guard.liveness import EdgeHealth
 
@@ -56,7 +56,9 @@ class DiagnosticsPublisher:
 
     def publish(self, statuses: Sequence[Status], stamp_ns: int) -> None:
         """Publish them with this time, in nanoseconds."""
-        array = self._messages.DiagnosticArray(status=[self._status(status) for status in statuses])
+        array = self._messages.DiagnosticArray(
+            status=[self._status(status) for status in statuses]
+        )
         array.header.stamp.sec, array.header.stamp.nanosec = divmod(stamp_ns, _SECOND_NS)
         self._publisher.publish(array)
 
@@ -82,7 +84,10 @@ def _level(edge: EdgeHealth) -> int:
 
 def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
     """Return the status of what a strict guard held back: transforms by their sender's node, parent and child."""
-    lines = [(f"{parent} → {child} from {who}", str(count)) for (who, parent, child), count in held.items()]
+    lines = [
+        (f"{parent} → {child} from {who}", str(count))
+        for (who, parent, child), count in held.items()
+    ]
     message = f"{sum(held.values())} transforms were held back"
     return Status(f"tfcompose {robot}: strict", WARN if held else OK, message, lines)
 
@@ -91,8 +96,15 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) 
     """Return one status for the tree, with what is wrong now, and one for each owner, with its edges."""
     severe = any(one.severity == "error" for one in found)
     level = ERROR if severe else WARN if found else OK
-    message = "; ".join(f"{one.code} {one.message}" for one in found) or f"{len(edges)} edges are watched"
-    lines = [Status(f"tfcompose {robot}: tree", level, message, [(one.code, one.message) for one in found])]
+    message = (
+        "; ".join(f"{one.code} {one.message}" for one in found)
+        or f"{len(edges)} edges are watched"
+    )
+    lines = [
+        Status(
+            f"tfcompose {robot}: tree", level, message, [(one.code, one.message) for one in found]
+        )
+    ]
     for owner in dict.fromkeys(one.edge.owner for one in edges):
         owned = [one for one in edges if one.edge.owner == owner]
         # Not seen yet is worse than fine, and better than silent.
@@ -100,7 +112,12 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) 
         number = sum(_level(one) == worst for one in owned)
         summary = f"{number} of {len(owned)} edges: {_NAMES[worst]}"
         lines.append(
-            Status(f"tfcompose {robot}: {owner}", worst, summary, [(one.edge.name, one.text) for one in owned])
+            Status(
+                f"tfcompose {robot}: {owner}",
+                worst,
+                summary,
+                [(one.edge.name, one.text) for one in owned],
+            )
         )
     return lines
 
@@ -111,11 +128,17 @@ class DiagnosticsPage:
     def __init__(self, node: Node, robot: str) -> None:
         self._robot = robot
         self._due = 0.0
-        self._publisher = DiagnosticsPublisher(node, robot) if DiagnosticsPublisher.is_installed() else None
+        self._publisher = (
+            DiagnosticsPublisher(node, robot) if DiagnosticsPublisher.is_installed() else None
+        )
         if self._publisher is None:
             say("nothing on /diagnostics: the package diagnostic_msgs is not installed")
 
-    def publish(self, judges: Sequence[Judge], held: Callable[[], Mapping[tuple[str, str, str], int] | None]) -> None:
+    def publish(
+        self,
+        judges: Sequence[Judge],
+        held: Callable[[], Mapping[tuple[str, str, str], int] | None],
+    ) -> None:
         """Publish if it is due and there is a subscriber; ``held`` says what a strict guard held back."""
         now = time.monotonic()
         if self._publisher is None or now < self._due:

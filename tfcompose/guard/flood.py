@@ -6,16 +6,17 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.live.flood import BUSY_S
-from tfcompose.ros.tf_codec import encode, transforms
+from tfcompose.tf.live.flood import BUSY_S
+from tfcompose.tf.ros.tf_codec import encode, transforms
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from tfcompose.live.topics import TFData
-    from tfcompose.ros.tf_codec import Transform
+    from tfcompose.tf.live.topics import TFData
+    from tfcompose.tf.ros.tf_codec import Transform
 
-#: At one time it reads for so long, in seconds, and as long as it has to read, the guard waits no longer than that.
+#: At one time it reads for so long, in seconds, and as long as it has to read, the guard waits no
+#: longer than that.
 SLICE_S, WAIT_S = 0.001, 0.01
 _TOGETHER = 50
 
@@ -23,8 +24,9 @@ _TOGETHER = 50
 class FloodReader:
     """Takes the declared edges out of long messages, each message's as one of their own.
 
-    ``children`` are the frames whose edges are declared. A message that comes while another is read is skipped, and
-    ``skipped`` counts it; so much of each second goes into reading, whoever floods the tree.
+    ``children`` are the frames whose edges are declared. A message that comes while another is
+    read is skipped, and ``skipped`` counts it; so much of each second goes into reading, whoever
+    floods the tree.
     """
 
     def __init__(self, children: Collection[str]) -> None:

@@ -1,12 +1,13 @@
 """What the guard requests from nodes: whether gates that the plan waits for are open, and whether switches apply.
 
-Gates are topics, services, and the lifecycle states of nodes, which the guard may also drive. Where no launcher gives
-orders, in units and containers, the guard brings nodes into their states by itself: a node that was started again is
-brought there again; one that somebody deactivated stays so.
+Gates are topics, services, and the lifecycle states of nodes, which the guard may also drive.
+Where no launcher gives orders, in units and containers, the guard brings nodes into their states
+by itself: a node that was started again is brought there again; one that somebody deactivated
+stays so.
 
-Switches are parameters that the plan wrote for nodes; they are read back. Each node is asked once after it appears.
-Drivers declare parameters late, once they have found their device: one that is not there yet is asked for again, for a
-while. A node that leaves and comes back is asked anew.
+Switches are parameters that the plan wrote for nodes; they are read back. Each node is asked once
+after it appears. Drivers declare parameters late, once they have found their device: one that is
+not there yet is asked for again, for a while. A node that leaves and comes back is asked anew.
 """
 
 from __future__ import annotations
@@ -15,22 +16,22 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.text import listed
 from tfcompose.guard.judge import FINDING_S
-from tfcompose.ipc import Found, Gate, GateOpen, GateShut
-from tfcompose.process import say
-from tfcompose.ros.graph import is_offered, services, writers
-from tfcompose.text import listed
-from tfcompose.verdict.drivers import not_taken
+from tfcompose.guard.verdict.drivers import not_taken
+from tfcompose.model.messages import Found, Gate, GateOpen, GateShut
+from tfcompose.tf.process import say
+from tfcompose.tf.ros.graph import is_offered, services, writers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from rclpy.node import Node
 
-    from tfcompose.ipc import GuardEvent
-    from tfcompose.plan import Driven, Plan
-    from tfcompose.ros.lifecycle import Lifecycle
-    from tfcompose.ros.parameters import ParameterReader, Value
+    from tfcompose.model.messages import GuardEvent
+    from tfcompose.model.plan import Driven, Plan
+    from tfcompose.tf.ros.lifecycle import Lifecycle
+    from tfcompose.tf.ros.parameters import ParameterReader, Value
 
 
 #: How often a gate is looked at, in seconds.
@@ -94,7 +95,11 @@ class Gates:
             states.append((bool(found), observed))
         if gate.service:
             is_there = is_offered(self._node, gate.service)
-            observed = f"the service {gate.service} is there" if is_there else self._services(gate.service)
+            observed = (
+                f"the service {gate.service} is there"
+                if is_there
+                else self._services(gate.service)
+            )
             states.append((is_there, observed))
         for topic in gate.writers:
             names = ", ".join(one.node for one in writers(self._node, topic))
@@ -102,7 +107,9 @@ class Gates:
         return all(is_open for is_open, _ in states), "; ".join(observed for _, observed in states)
 
     def _topics(self, wanted: str) -> str:
-        return _some("topics", [name for name, _ in self._node.get_topic_names_and_types()], wanted)
+        return _some(
+            "topics", [name for name, _ in self._node.get_topic_names_and_types()], wanted
+        )
 
     def _services(self, wanted: str) -> str:
         return _some("services", services(self._node), wanted)
@@ -120,8 +127,13 @@ class LifecycleDriver:
     """The plan's lifecycle nodes, where no launcher gives orders."""
 
     def __init__(self, node: Node, plan: Plan) -> None:
-        wanted = {name: state for process in plan.processes for name, state in process.lifecycle.items()}
-        self._nodes = [_DrivenNode(name, _lifecycle(node, name, state, drive=True)) for name, state in wanted.items()]
+        wanted = {
+            name: state for process in plan.processes for name, state in process.lifecycle.items()
+        }
+        self._nodes = [
+            _DrivenNode(name, _lifecycle(node, name, state, drive=True))
+            for name, state in wanted.items()
+        ]
 
     def check(self) -> None:
         """Drive each node that is due one step further, and print what has changed."""
@@ -142,12 +154,16 @@ class LifecycleDriver:
 def _some(what: str, names: list[str], wanted: str) -> str:
     """Return the first names: those with another namespace, then those of the same, then the others."""
     above, _, last = wanted.rpartition("/")
-    names = sorted(names, key=lambda name: (name.rpartition("/")[2] != last, name.rpartition("/")[0] != above, name))
+    names = sorted(
+        names,
+        key=lambda name: (name.rpartition("/")[2] != last, name.rpartition("/")[0] != above, name),
+    )
     return f"{what} {listed(names, NAMED_AT_MOST)}" if names else f"no {what}"
 
 
 def _lifecycle(node: Node, name: str, state: str, *, drive: bool) -> Lifecycle:
-    from tfcompose.ros.lifecycle import Lifecycle  # noqa: PLC0415 (its messages are loaded where a node has states)
+    # Its messages are loaded where a node has states.
+    from tfcompose.tf.ros.lifecycle import Lifecycle  # noqa: PLC0415
 
     return Lifecycle(node, name, state, drive=drive)
 
@@ -225,6 +241,7 @@ class Switches:
 
 
 def _reader(node: Node, name: str, parameters: tuple[str, ...]) -> ParameterReader:
-    from tfcompose.ros.parameters import ParameterReader  # noqa: PLC0415 (its services are loaded where one is read)
+    # Its services are loaded where one is read.
+    from tfcompose.tf.ros.parameters import ParameterReader  # noqa: PLC0415
 
     return ParameterReader(node, name, parameters)

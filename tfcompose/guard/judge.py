@@ -1,10 +1,12 @@
 """The guard's judgement: who may publish which edge, and how, message by message.
 
-What was judged of a message holds for the next one of the same publisher with the same edges, until an owner, the
-tree's shape or a case changes. What has a sender without a name waits for that, for a while.
+What was judged of a message holds for the next one of the same publisher with the same edges,
+until an owner, the tree's shape or a case changes. What has a sender without a name waits for
+that, for a while.
 
-A judge is given messages, the graph and the time, and returns events; it reads no clock and no topic, so that histories
-can be replayed. Times are monotonic seconds, but for those of messages, which are nanoseconds of the system clock.
+A judge is given messages, the graph and the time, and returns events; it reads no clock and no
+topic, so that histories can be replayed. Times are monotonic seconds, but for those of messages,
+which are nanoseconds of the system clock.
 """
 
 from __future__ import annotations
@@ -14,25 +16,34 @@ from typing import TYPE_CHECKING
 
 from tfcompose.guard.liveness import EdgeHealth, Liveness, LivenessMemory
 from tfcompose.guard.reports import CaseMemory, Cases, Flood, PublisherReports
-from tfcompose.ipc import Clear, Found, GuardEvent
-from tfcompose.live.publishers import NAMELESS_S, SenderMemory, Senders
-from tfcompose.verdict.drivers import SentPoses
-from tfcompose.verdict.ownership import MOST_UNDECLARED, OwnershipRules, SentEdge, Start, Violation, violation_finding
-from tfcompose.verdict.stamps import Clocks, StampHistory
+from tfcompose.guard.verdict.drivers import SentPoses
+from tfcompose.guard.verdict.ownership import (
+    MOST_UNDECLARED,
+    OwnershipRules,
+    SentEdge,
+    Start,
+    Violation,
+    violation_finding,
+)
+from tfcompose.guard.verdict.stamps import Clocks, StampHistory
+from tfcompose.model.messages import Clear, Found, GuardEvent
+from tfcompose.tf.live.publishers import NAMELESS_S, SenderMemory, Senders
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
     from tfcompose.guard.reports import Case
-    from tfcompose.live.publishers import Message, Publisher
-    from tfcompose.plan import Plan
+    from tfcompose.model.plan import Plan
+    from tfcompose.tf.live.publishers import Message, Publisher
 
     Edges = tuple[tuple[str, str], ...]
 
-#: A guard that follows one that died misses nobody for so long: it takes that to find all nodes again.
+#: A guard that follows one that died misses nobody for so long: it takes that to find all nodes
+#: again.
 FINDING_S = 5.0
-#: How long a publisher that may be the owner can stay without a name before it is judged all the same.
+#: How long a publisher that may be the owner can stay without a name before it is judged all the
+#: same.
 NAMELESS_OWNER_S = 5.0
 #: For so many kinds of messages what was judged of them is remembered.
 MOST_VERDICTS = 4096
@@ -46,7 +57,8 @@ STRANGE_S = 1.0
 class JudgeMemory:
     """What the guard that follows this one must know of one pair of topics; the launcher keeps it, part by part.
 
-    ``owners`` holds by frame who sent it last and before, ``senders`` are by publishers' ids, ``reported`` publishers.
+    ``owners`` holds by frame who sent it last and before, ``senders`` are by publishers' ids,
+    ``reported`` publishers.
     """
 
     start: Start
@@ -61,9 +73,10 @@ class JudgeMemory:
 class Judge:
     """The state of one watch over one plan. ``settle_s`` is how many seconds it observes before it reports all clear.
 
-    ``says_who`` says whether the ids of messages are those of the graph; where they are not, they tell senders apart.
-    ``remapped`` says that what the plan's processes send is fenced off by remappings.
-    ``admitted`` are the edges of the last message that may pass in a strict plan; None: all.
+    ``says_who`` says whether the ids of messages are those of the graph; where they are not, they
+    tell senders apart. ``remapped`` says that what the plan's processes send is fenced off by
+    remappings. ``admitted`` are the edges of the last message that may pass in a strict plan;
+    None: all.
     """
 
     plan: Plan
@@ -130,7 +143,9 @@ class Judge:
             events += self.cases.report(now, at_once=one.gid)
             events += self._publishers.unfenced(one, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
-            events += self.live.static_writers({one.node for one in publishers if one.static and one.node is not None})
+            events += self.live.static_writers(
+                {one.node for one in publishers if one.static and one.node is not None}
+            )
         return events
 
     def clock(self, sim_ns: int | None, now: float) -> None:
@@ -163,7 +178,11 @@ class Judge:
             silence = self.live.judge(now, self.clocks.speed(now), paused=self.clocks.stands(now))
             return [*events, *silence, *replaced, *over]
         self.live.tick(now)
-        if now - self.begun >= self.settle_s and not self._verdicts.waits and not self.cases.unreported:
+        if (
+            now - self.begun >= self.settle_s
+            and not self._verdicts.waits
+            and not self.cases.unreported
+        ):
             self._start.clear(now)
             self._rules.changes += 1
             events.append(Clear())
@@ -175,16 +194,28 @@ class Judge:
         for track in self.live.tracks:
             age_s, rate = self.live.seconds_since(track, now) if track.live else (None, None)
             for edge in track.edges:
-                names = self._senders.nodes(self._rules.owners.current(edge.child), static=edge.kind == "static")
+                names = self._senders.nodes(
+                    self._rules.owners.current(edge.child), static=edge.kind == "static"
+                )
                 publisher = names[0] if len(names) == 1 else edge.node
                 found[edge.child] = EdgeHealth(
-                    edge, publisher if track.live else "", rate, age_s, track.delay_s, track.silent, track.slow
+                    edge,
+                    publisher if track.live else "",
+                    rate,
+                    age_s,
+                    track.delay_s,
+                    track.silent,
+                    track.slow,
                 )
         return [found[edge.child] for edge in self.plan.edges]
 
     def wrong(self) -> list[Finding]:
         """Return what was reported and is not over, worst first; silence and low rates are part of ``health``."""
-        found = [violation_finding([case.violation], self.plan) for case in self.cases.open.values() if case.reported]
+        found = [
+            violation_finding([case.violation], self.plan)
+            for case in self.cases.open.values()
+            if case.reported
+        ]
         return sorted(found, key=lambda one: (one.severity, one.code))
 
     def absent(self, owner: str) -> None:
@@ -232,7 +263,11 @@ class Judge:
 
     def _see_again(self, now: float) -> list[GuardEvent]:
         """Judge what waited for a name."""
-        return [event for children in self._verdicts.see_again(now) for event in self.live.arrived(children, now)]
+        return [
+            event
+            for children in self._verdicts.see_again(now)
+            for event in self.live.arrived(children, now)
+        ]
 
     def _judge_stamps(self, verdict: Verdict, message: Message, now: float) -> float | None:
         """Judge the stamps of an owner's message, and return the age of the first in seconds, where it is known."""
@@ -245,7 +280,9 @@ class Judge:
             nodes = self._senders.nodes(message.gid, static=False)
             for child in verdict.children:
                 edge = self._rules.planned[child]
-                violation = Violation(code, edge.parent, child, nodes, static=False, edge=edge, detail=detail)
+                violation = Violation(
+                    code, edge.parent, child, nodes, static=False, edge=edge, detail=detail
+                )
                 self.cases.note(violation, message.gid, now)
         reference = clocks.reference_ns(message.received_ns)
         return None if reference is None else (reference - message.stamps_ns[0]) / 1e9
@@ -255,7 +292,8 @@ class Judge:
 class Verdict:
     """What was judged of a publisher's messages with the same edges; it holds for a time, while nothing changes.
 
-    ``children`` are the planned edges that come with it, ``admitted`` the edges that may pass; None: all.
+    ``children`` are the planned edges that come with it, ``admitted`` the edges that may pass;
+    None: all.
     """
 
     stamps: StampHistory = field(default_factory=StampHistory)
@@ -269,7 +307,9 @@ class Verdict:
 class Verdicts:
     """What was judged of each publisher's messages, by the rules of ownership, and what waits for a name."""
 
-    def __init__(self, rules: OwnershipRules, senders: Senders, cases: Cases, start: Start) -> None:
+    def __init__(
+        self, rules: OwnershipRules, senders: Senders, cases: Cases, start: Start
+    ) -> None:
         self._rules = rules
         self._senders = senders
         self._cases = cases
@@ -321,7 +361,8 @@ class Verdicts:
                     continue
             sent = SentEdge(message.gid, parent, child, message.static)
             violation = self._rules.violation(sent, nodes, now) if nodes else None
-            # Where ids do not say whose they are, the sender may be one that the graph does not show yet.
+            # Where ids do not say whose they are, the sender may be one that the graph does not
+            # show yet.
             if not nodes or (violation and not sure and not violation.namesake):
                 self._pending.setdefault(sent, now)
                 certain = False
@@ -353,7 +394,9 @@ class Verdicts:
         arrived: dict[bytes | None, list[str]] = {}
         for sent, since in list(self._pending.items()):
             nodes = self._senders.nodes(sent.gid, static=sent.static)
-            if (nodes and self._senders.is_sure(sent.gid)) or now - since >= self._patience_s(sent, nodes):
+            if (nodes and self._senders.is_sure(sent.gid)) or now - since >= self._patience_s(
+                sent, nodes
+            ):
                 del self._pending[sent]
                 if self._note(self._rules.violation(sent, nodes, now), sent, now)[1]:
                     arrived.setdefault(sent.gid, []).append(sent.child)
@@ -367,13 +410,19 @@ class Verdicts:
         if edge is None or not edge.may_hang_on(sent.parent):
             return NAMELESS_S
         owners = self._rules.owners
-        known = owners.is_known(sent.child) and self._senders.is_present(owners.current(sent.child))
+        known = owners.is_known(sent.child) and self._senders.is_present(
+            owners.current(sent.child)
+        )
         early = self._start.cleared is None and self._rules.started.get(edge.owner, False)
         return NAMELESS_S if known or early else NAMELESS_OWNER_S
 
-    def _note(self, violation: Violation | None, sent: SentEdge, now: float) -> tuple[Case | None, bool]:
+    def _note(
+        self, violation: Violation | None, sent: SentEdge, now: float
+    ) -> tuple[Case | None, bool]:
         """Return the case that the violation is, if there is one, and whether the owner's edge has come."""
         case = self._cases.note(violation, sent.gid, now) if violation else None
         planned = sent.child in self._rules.planned
         # Of two that take turns either may be the owner; its edge is not silent.
-        return case, planned and (violation is None or (violation.namesake and self._rules.owners.is_known(sent.child)))
+        return case, planned and (
+            violation is None or (violation.namesake and self._rules.owners.is_known(sent.child))
+        )

@@ -1,10 +1,11 @@
 """Whether owners send what they own, often enough: arrivals, judged at given times.
 
-Edges that have always come together share one history. At first those of one owner do, and a message that holds only
-some of them parts them; so a message costs what it brings, however many edges it holds.
+Edges that have always come together share one history. At first those of one owner do, and a
+message that holds only some of them parts them; so a message costs what it brings, however many
+edges it holds.
 
-Times are monotonic seconds. What is measured is the time in which the guard looked: a guard that was kept from looking
-knows nothing of the time between, and blames nobody for it.
+Times are monotonic seconds. What is measured is the time in which the guard looked: a guard that
+was kept from looking knows nothing of the time between, and blames nobody for it.
 """
 
 from __future__ import annotations
@@ -13,19 +14,19 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.ipc import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
-from tfcompose.live.arrivals import Arrivals
-from tfcompose.plan import SLOW_BELOW
-from tfcompose.text import listed
-from tfcompose.verdict.rates import left, silent, slow
+from tfcompose.foundation.text import listed
+from tfcompose.guard.verdict.rates import left, silent, slow
+from tfcompose.model.messages import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
+from tfcompose.model.plan import SLOW_BELOW
+from tfcompose.tf.live.arrivals import Arrivals
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from tfcompose.plan import Plan, PlanEdge
+    from tfcompose.model.plan import Plan, PlanEdge
 
-#: A rate is judged over this time, or so many periods; half of it at least. Arrivals are counted in stretches of this
-#: part of it, of which the last two count.
+#: A rate is judged over this time, or so many periods; half of it at least. Arrivals are counted
+#: in stretches of this part of it, of which the last two count.
 WINDOW_S = 2.0
 WINDOW_PERIODS = 8.0
 STRETCH = 0.6
@@ -37,7 +38,8 @@ MOST_MESSAGES = 1000
 MOST_NAMED = 1000
 #: Of the time between two ticks only so much counts; the guard ticks ten times a second.
 MAX_TICK_S = 0.25
-#: After so long without a tick messages are lost, and come when the writer's next heartbeat does: 3 s in Fast DDS.
+#: After so long without a tick messages are lost, and come when the writer's next heartbeat does:
+#: 3 s in Fast DDS.
 STALLED_S = 1.0
 CATCH_UP_S = 3.5
 
@@ -46,8 +48,8 @@ CATCH_UP_S = 3.5
 class EdgeHealth:
     """One planned edge: which node publishes it (full name, empty while none has), and how.
 
-    ``rate`` is in hertz, ``age_s`` counts since it came last, ``delay_s`` is how old its stamp was then; None: not
-    known. ``silent`` and ``slow`` are against what the plan says.
+    ``rate`` is in hertz, ``age_s`` counts since it came last, ``delay_s`` is how old its stamp was
+    then; None: not known. ``silent`` and ``slow`` are against what the plan says.
     """
 
     edge: PlanEdge
@@ -104,8 +106,9 @@ class WatchedTime:
 class Track:
     """What is known of planned edges that come together: of one owner, kind and rate.
 
-    ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age of the last stamp when
-    it came, ``silent_after`` how long the edges may be quiet, in seconds, or None if they say no rate.
+    ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age
+    of the last stamp when it came, ``silent_after`` how long the edges may be quiet, in seconds,
+    or None if they say no rate.
     """
 
     edges: tuple[PlanEdge, ...]
@@ -180,7 +183,9 @@ class Liveness:
         self.tracks = [Track(tuple(edges)) for edges in together.values()]
         self._track_of = {edge.child: track for track in self.tracks for edge in track.edges}
         self._of_message: dict[tuple[str, ...], list[Track]] = {}
-        self._waiting = {name: {e.child for e in plan.edges_of(name)} for name in {e.owner for e in plan.edges}}
+        self._waiting = {
+            name: {e.child for e in plan.edges_of(name)} for name in {e.owner for e in plan.edges}
+        }
         self._complete = False
         self._gone: set[str] = set()
         self._absent: set[str] = set()
@@ -204,7 +209,11 @@ class Liveness:
 
     def memory(self) -> LivenessMemory:
         """Return what the next guard must know."""
-        silent = tuple(SilentMemory(track.silent_since, _children([track])) for track in self.tracks if track.silent)
+        silent = tuple(
+            SilentMemory(track.silent_since, _children([track]))
+            for track in self.tracks
+            if track.silent
+        )
         live, slow = ([t for t in self.tracks if t.live], [t for t in self.tracks if t.slow])
         return LivenessMemory(_children(live), _children(slow), silent, tuple(sorted(self._gone)))
 
@@ -225,7 +234,9 @@ class Liveness:
     def _planned(self, children: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(child for child in children if child in self._track_of)
 
-    def arrived(self, children: tuple[str, ...], now: float, delay_s: float | None = None) -> list[GuardEvent]:
+    def arrived(
+        self, children: tuple[str, ...], now: float, delay_s: float | None = None
+    ) -> list[GuardEvent]:
         """Note that owners sent these edges, in one message, and return what that means."""
         watched, events = self._watched.at(now), []
         for track in self._of_message.get(children) or self._parted(children):
@@ -263,7 +274,8 @@ class Liveness:
         self.changes += 1
         children = tuple(edge.child for edge in track.edges)
         events: list[GuardEvent] = [
-            Live(owner, children[start : start + MOST_NAMED]) for start in range(0, len(children), MOST_NAMED)
+            Live(owner, children[start : start + MOST_NAMED])
+            for start in range(0, len(children), MOST_NAMED)
         ]
         waiting = self._waiting[owner]
         waiting.difference_update(children)
@@ -280,7 +292,13 @@ class Liveness:
 
     def silent(self) -> tuple[str, ...]:
         """Return the children of the edges that were live and come no more."""
-        return _children([track for track in self.tracks if track.live and (track.silent or self._is_gone(track))])
+        return _children(
+            [
+                track
+                for track in self.tracks
+                if track.live and (track.silent or self._is_gone(track))
+            ]
+        )
 
     def _is_gone(self, track: Track) -> bool:
         return track.edge.kind == "static" and track.edge.owner in self._gone
@@ -296,8 +314,8 @@ class Liveness:
     def judge(self, now: float, speed: float = 1.0, *, paused: bool = False) -> list[GuardEvent]:
         """Return which owners fell silent or slow since the last time, and came back: one event for each owner.
 
-        ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are lower, and in one that
-        is ``paused`` nobody falls silent.
+        ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are
+        lower, and in one that is ``paused`` nobody falls silent.
         """
         watched = self._watched.tick(now)
         if paused:
@@ -305,11 +323,18 @@ class Liveness:
                 track.heard = track.heard if track.silent else watched
         changed: dict[tuple[str, str], list[Track]] = {}
         for track in self.tracks:
-            change = _change(track, watched, speed) if track.live and track.silent_after is not None else None
+            change = (
+                _change(track, watched, speed)
+                if track.live and track.silent_after is not None
+                else None
+            )
             if change:
                 changed.setdefault((change, track.edge.owner), []).append(track)
         self.changes += len(changed)
-        return [change_event(change, self._in_order(tracks), now) for (change, _), tracks in changed.items()]
+        return [
+            change_event(change, self._in_order(tracks), now)
+            for (change, _), tracks in changed.items()
+        ]
 
     def _in_order(self, tracks: list[Track]) -> list[Track]:
         """Return tracks by their first edge's place in the plan."""
@@ -319,7 +344,11 @@ class Liveness:
         """Return the fixed edges, by name, that never came from a node of which others came."""
         if not any(self._waiting.values()):
             return {}
-        fixed = [t for t in self._in_order(self.tracks) if t.edge.kind == "static" and t.edge.owner not in self._absent]
+        fixed = [
+            t
+            for t in self._in_order(self.tracks)
+            if t.edge.kind == "static" and t.edge.owner not in self._absent
+        ]
         heard = {track.edge.node for track in fixed if track.live}
         missing: dict[str, list[str]] = {}
         for track in fixed:
@@ -359,7 +388,10 @@ def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
             silence_s = now - min(track.silent_since for track in tracks)
             return Recovered(f"{named} {are} back after {silence_s:.1f} s")
         case _:
-            return Recovered(f"{named} {are} sent at {min(track.rate() or 0.0 for track in tracks):.3g} Hz again")
+            return Recovered(
+                f"{named} {are} sent at {min(track.rate() or 0.0 for track in tracks):.3g} Hz"
+                " again"
+            )
 
 
 def _children(tracks: list[Track]) -> tuple[str, ...]:

@@ -1,9 +1,10 @@
 """The guard's process: it watches TF topics until a signal comes.
 
-What it finds goes to the launcher as lines of JSON on the descriptor that ``TFCOMPOSE_EVENTS_FD`` names, and to its
-own output where there is no launcher. ``TFCOMPOSE_SETTLE_S`` is how long it observes before the others are started.
-Robots beside each other on topics of their own have one guard, and one judge for each pair of topics: what one owner
-may publish on its robot's topics is a violation on another's, so each pair is judged alone.
+What it finds goes to the launcher as lines of JSON on the descriptor that ``TFCOMPOSE_EVENTS_FD``
+names, and to its own output where there is no launcher. ``TFCOMPOSE_SETTLE_S`` is how long it
+observes before the others are started. Robots beside each other on topics of their own have one
+guard, and one judge for each pair of topics: what one owner may publish on its robot's topics is a
+violation on another's, so each pair is judged alone.
 """
 
 from __future__ import annotations
@@ -13,27 +14,27 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.guard.channel import EventWriter, Memory, OrderReader, SilentEdges, SwitchMemory, recalled
+from tfcompose.foundation.text import counted
+from tfcompose.guard.channel import (
+    EventWriter,
+    Memory,
+    OrderReader,
+    SilentEdges,
+    SwitchMemory,
+    recalled,
+)
 from tfcompose.guard.components import ComponentDriver, Components
 from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.flood import WAIT_S, FloodReader
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.relay import Feedback, Relay
-from tfcompose.ipc import Clear, Complete
-from tfcompose.live.publishers import MessageReader, forget_oldest
-from tfcompose.live.topics import RunMarks, TFGraph, TFTopics
-from tfcompose.plan.codec import decode
-from tfcompose.plan.middleware import IMPLEMENTATIONS
-from tfcompose.plan.topics import GLOBAL, parts_of, private_topics
-from tfcompose.process import ready, say
-from tfcompose.ros.clock import ClockWatch, SimClock
-from tfcompose.ros.environment import PROFILE_VARIABLES
-from tfcompose.ros.graph import ids_say_who
-from tfcompose.ros.node import WaitSet, middleware, open_node
-from tfcompose.ros.tf_codec import number_of_transforms
-from tfcompose.text import counted
-from tfcompose.variables import (
+from tfcompose.guard.verdict.ownership import MOST_UNDECLARED
+from tfcompose.model.messages import Clear, Complete
+from tfcompose.model.plan.codec import decode
+from tfcompose.model.plan.middleware import IMPLEMENTATIONS
+from tfcompose.model.plan.topics import GLOBAL, parts_of, private_topics
+from tfcompose.model.variables import (
     JOINS,
     LAUNCHER,
     ORDERS_FD,
@@ -42,7 +43,14 @@ from tfcompose.variables import (
     RUN_ID,
     SETTLE,
 )
-from tfcompose.verdict.ownership import MOST_UNDECLARED
+from tfcompose.tf.live.publishers import MessageReader, forget_oldest
+from tfcompose.tf.live.topics import RunMarks, TFGraph, TFTopics
+from tfcompose.tf.process import ready, say
+from tfcompose.tf.ros.clock import ClockWatch, SimClock
+from tfcompose.tf.ros.environment import PROFILE_VARIABLES
+from tfcompose.tf.ros.graph import ids_say_who
+from tfcompose.tf.ros.node import WaitSet, middleware, open_node
+from tfcompose.tf.ros.tf_codec import number_of_transforms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -50,11 +58,11 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from tfcompose.ipc import GuardEvent
-    from tfcompose.live.topics import TFData
-    from tfcompose.plan import Plan, PlanProcess
-    from tfcompose.process import Own
-    from tfcompose.signals import Stop
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.model.messages import GuardEvent
+    from tfcompose.model.plan import Plan, PlanProcess
+    from tfcompose.tf.live.topics import TFData
+    from tfcompose.tf.process import Own
 
     Topics = tuple[str, str]
 
@@ -85,9 +93,13 @@ class TopicWatch:
         self._reader = MessageReader(judge.compared)
         profile = PROFILE_VARIABLES[0] if self._by_partition else ""
         marks = _run_marks(judge.plan, profile) if RUN_ID in os.environ else None
-        self._graph = TFGraph(node, topics, None if private is None else tuple(private.values()), ours=marks)
+        self._graph = TFGraph(
+            node, topics, None if private is None else tuple(private.values()), ours=marks
+        )
         feedback = None if private is None else Feedback(node, private, self.data.own)
-        self.relay = Relay(node, self._graph, judge.plan, self.data.own, feedback) if strict else None
+        self.relay = (
+            Relay(node, self._graph, judge.plan, self.data.own, feedback) if strict else None
+        )
         self.judge = judge
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None
@@ -96,7 +108,9 @@ class TopicWatch:
         self._known: dict[bytes | None, None] = {}
         self._decoder = self._reader.decoder
         self._flood = FloodReader(frozenset(edge.child for edge in judge.plan.edges))
-        self._most = len(judge.plan.edges) + MOST_UNDECLARED  # who sends more floods the tree, whatever it sends
+        self._most = (
+            len(judge.plan.edges) + MOST_UNDECLARED
+        )  # who sends more floods the tree, whatever it sends
 
     def watch_global_topics(self) -> None:
         """Look for nodes of the plan on the global topics too, where they do not belong."""
@@ -104,9 +118,15 @@ class TopicWatch:
 
     def begin(self, now: float, memory: dict[str, Any] | None) -> None:
         """Skip the observation before the start: the start was long ago."""
-        self._pass_on(self.judge.tick(now) if memory is None else self.judge.recall(decode(JudgeMemory, memory), now))
+        self._pass_on(
+            self.judge.tick(now)
+            if memory is None
+            else self.judge.recall(decode(JudgeMemory, memory), now)
+        )
         if self.relay and memory:
-            self.relay.recall(memory, lambda message: self.judge.admits(message, now), now + FINDING_S)
+            self.relay.recall(
+                memory, lambda message: self.judge.admits(message, now), now + FINDING_S
+            )
 
     @property
     def wait_s(self) -> float:
@@ -180,7 +200,9 @@ class TopicWatch:
             return
         self._pass_on(self.judge.message(message, now))
         if self.relay:
-            self.relay.pass_on(data, message, self.judge.admitted, self.judge.name_of(received.gid))
+            self.relay.pass_on(
+                data, message, self.judge.admitted, self.judge.name_of(received.gid)
+            )
 
     def _ask_graph(self, now: float) -> None:
         """Take who publishes now; what waited for a name may pass."""
@@ -215,13 +237,19 @@ def _run_marks(plan: Plan, profile: str) -> RunMarks:
 def _with_id(data: TFData) -> TFData:
     """Return it with the id that it has instead, where the rmw does not say who sent it: that tells senders apart."""
     received = data.received
-    return data if received.gid else replace(data, received=replace(received, gid=received.raw_gid))
+    return (
+        data if received.gid else replace(data, received=replace(received, gid=received.raw_gid))
+    )
 
 
 def held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int] | None:
     """Return what was held back, or None where nothing is."""
     relays = [watch.relay for watch in watches if watch.relay]
-    return {key: count for relay in relays for key, count in relay.held.counts.items()} if relays else None
+    return (
+        {key: count for relay in relays for key, count in relay.held.counts.items()}
+        if relays
+        else None
+    )
 
 
 def plans_by_topics(plan: Plan, guard: PlanProcess) -> dict[Topics, Plan]:
@@ -234,7 +262,9 @@ def plans_by_topics(plan: Plan, guard: PlanProcess) -> dict[Topics, Plan]:
     return {guard.topics: own, **parts}
 
 
-def together(emit: Callable[[GuardEvent], None], plans: Sequence[Plan]) -> Callable[[GuardEvent], None]:
+def together(
+    emit: Callable[[GuardEvent], None], plans: Sequence[Plan]
+) -> Callable[[GuardEvent], None]:
     """Return what passes on the events of the judges of these plans.
 
     All clear and tree complete are reported once, when the last judge has reported them.
@@ -268,7 +298,10 @@ def guard(own: Own, stop: Stop) -> None:
     left = recalled(os.environ)
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         if not ids_say_who(node):
-            say("this rmw does not say with a message who sent it: findings name all who may have, where several may")
+            say(
+                "this rmw does not say with a message who sent it: findings name all who may have,"
+                " where several may"
+            )
             if middleware() == IMPLEMENTATIONS["zenoh"]:
                 say("pip install 'tfcompose[zenoh]' reads it from Zenoh's liveliness tokens")
         watches = _watches(own, node, plans, emit, left)
@@ -297,8 +330,15 @@ def guard(own: Own, stop: Stop) -> None:
         steps += [switches.check] if switches else []
         if ORDERS_FD not in os.environ:
             steps += [LifecycleDriver(node, own.plan).check]
-            steps += [ComponentDriver(node, own, private=REMAPPED in os.environ).check] if own.plan.components else []
-        steps += [ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check, *(watch.report for watch in watches)]
+            steps += (
+                [ComponentDriver(node, own, private=REMAPPED in os.environ).check]
+                if own.plan.components
+                else []
+            )
+        steps += [
+            ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check,
+            *(watch.report for watch in watches),
+        ]
         wait_set = WaitSet(node, [each for watch in watches for each in watch.data.readers], stop)
         while not stop.requested:
             wait_set.wait(min(watch.wait_s for watch in watches))
@@ -310,7 +350,11 @@ def guard(own: Own, stop: Stop) -> None:
 
 
 def _watches(
-    own: Own, node: Node, plans: dict[Topics, Plan], emit: Callable[[GuardEvent], None], left: dict[str, Any]
+    own: Own,
+    node: Node,
+    plans: dict[Topics, Plan],
+    emit: Callable[[GuardEvent], None],
+    left: dict[str, Any],
 ) -> list[TopicWatch]:
     """Return the watch over each pair of topics; one that follows another guard, or has mode off, has begun."""
     judges, joins = own.plan.guard.mode != "off", bool(os.environ.get(JOINS))
@@ -322,7 +366,9 @@ def _watches(
     for topics, plan in plans.items():
         # One that judges nobody, or joins, takes every owner as the plan's, whenever it began.
         begun_ns = 0 if joins or not judges else time.time_ns()
-        judge = Judge(plan, settle_s, now, begun_ns, says_who=says_who, remapped=private is not None)
+        judge = Judge(
+            plan, settle_s, now, begun_ns, says_who=says_who, remapped=private is not None
+        )
         watches.append(TopicWatch(node, topics, judge, emit, _of(private, own.plan, topics)))
         if joins or not judges:
             watches[-1].begin(now, left.get(" ".join(topics)))

@@ -1,8 +1,9 @@
 """What a strict guard passes on: of what the plan's own processes send, which is fenced off, that which is theirs.
 
-A message that is all its sender's goes on as it is, byte for byte. Of others what is not is left out. Each sender of
-fixed edges has a latched publisher here, so that late joiners get all of them while their sender is there, also where
-it sent one after the other; a guard that follows one that died latches them again.
+A message that is all its sender's goes on as it is, byte for byte. Of others what is not is left
+out. Each sender of fixed edges has a latched publisher here, so that late joiners get all of them
+while their sender is there, also where it sent one after the other; a guard that follows one that
+died latches them again.
 """
 
 from __future__ import annotations
@@ -11,19 +12,19 @@ from base64 import b64decode, b64encode
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.live.publishers import Message
-from tfcompose.process import say
-from tfcompose.ros.node import TFPublisher
-from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.live.publishers import Message
+from tfcompose.tf.process import say
+from tfcompose.tf.ros.node import TFPublisher
+from tfcompose.tf.ros.tf_codec import Transform, decode, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
 
     from rclpy.node import Node
 
-    from tfcompose.live.publishers import Publisher
-    from tfcompose.live.topics import TFData, TFGraph
-    from tfcompose.plan import Plan
+    from tfcompose.model.plan import Plan
+    from tfcompose.tf.live.publishers import Publisher
+    from tfcompose.tf.live.topics import TFData, TFGraph
 
     Edge = tuple[str, str]
     Topics = tuple[str, str]
@@ -52,12 +53,17 @@ class _Latched:
 class Relay:
     """Passes on what is sent behind the fence on one pair of topics (moving, fixed).
 
-    ``own`` takes the ids of its publishers. With ``feedback`` the fence is one of remappings. ``changes`` counts what
-    was latched.
+    ``own`` takes the ids of its publishers. With ``feedback`` the fence is one of remappings.
+    ``changes`` counts what was latched.
     """
 
     def __init__(
-        self, node: Node, graph: TFGraph, plan: Plan, own: set[bytes | None], feedback: Feedback | None = None
+        self,
+        node: Node,
+        graph: TFGraph,
+        plan: Plan,
+        own: set[bytes | None],
+        feedback: Feedback | None = None,
     ) -> None:
         self._node = node
         self._graph = graph
@@ -72,7 +78,9 @@ class Relay:
         self.waiting: list[tuple[TFData, Message]] = []
         self.held = HeldBack()
 
-    def pass_on(self, sent: TFData, message: Message, admitted: Collection[Edge] | None, who: str) -> None:
+    def pass_on(
+        self, sent: TFData, message: Message, admitted: Collection[Edge] | None, who: str
+    ) -> None:
         """Pass on what is admitted of the message that ``who`` sent; None: all of it."""
         if self._feedback and not sent.fenced:
             self._feed(self._feedback, sent, message)  # everybody has it
@@ -101,7 +109,8 @@ class Relay:
     def memory(self) -> dict[str, Any]:
         """Return what the guard that follows must latch: not every sender latches all that it has sent."""
         return {
-            f"{_LATCHED}{gid.hex()}": [one.process, b64encode(one.data).decode()] for gid, one in self._fixed.items()
+            f"{_LATCHED}{gid.hex()}": [one.process, b64encode(one.data).decode()]
+            for gid, one in self._fixed.items()
         }
 
     def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
@@ -113,7 +122,9 @@ class Relay:
         for part, entry in memory.items():
             if part.startswith(_LATCHED) and entry is not None:
                 gid, data = bytes.fromhex(part.removeprefix(_LATCHED)), b64decode(entry[1])
-                edges = tuple((t.parent.removeprefix("/"), t.child.removeprefix("/")) for t in decode(data))
+                edges = tuple(
+                    (t.parent.removeprefix("/"), t.child.removeprefix("/")) for t in decode(data)
+                )
                 message = Message(edges, static=True, gid=gid, source_ns=0, sequence=0)
                 self._latch(gid, data, message, admits(message), entry[0])
 
@@ -158,7 +169,12 @@ class Relay:
             feedback.moving(sent.received.data, "")
 
     def _latch(
-        self, gid: bytes, data: bytes, message: Message, admitted: Collection[Edge] | None, process: str
+        self,
+        gid: bytes,
+        data: bytes,
+        message: Message,
+        admitted: Collection[Edge] | None,
+        process: str,
     ) -> None:
         found = {t.child: t for t in _admitted(data, message, admitted)}
         latched = self._fixed.get(gid)
@@ -181,7 +197,9 @@ class Relay:
         return latched
 
 
-def _admitted(data: bytes, message: Message, admitted: Collection[Edge] | None) -> Iterator[Transform]:
+def _admitted(
+    data: bytes, message: Message, admitted: Collection[Edge] | None
+) -> Iterator[Transform]:
     for transform, edge in zip(decode(data), message.edges, strict=True):
         if admitted is None or edge in admitted:
             yield transform
@@ -198,14 +216,21 @@ class HeldBack:
         """Count what is not admitted of a message."""
         for parent, child in message.edges:
             key = (who, parent, child)
-            if (parent, child) not in admitted and (key in self.counts or len(self.counts) < MOST_COUNTED):
+            if (parent, child) not in admitted and (
+                key in self.counts or len(self.counts) < MOST_COUNTED
+            ):
                 self.counts[key] = self.counts.get(key, 0) + 1
 
     def report(self) -> str:
         """Return how much was held back since the last time, and whose it is; empty if nothing was."""
-        now = {key: count for key, count in self.counts.items() if count != self._reported.get(key)}
+        now = {
+            key: count for key, count in self.counts.items() if count != self._reported.get(key)
+        }
         self._reported.update(now)
-        parts = [f"{count} × {parent} → {child} from {who}" for (who, parent, child), count in now.items()]
+        parts = [
+            f"{count} × {parent} → {child} from {who}"
+            for (who, parent, child), count in now.items()
+        ]
         more = [f"and {len(parts) - NAMED_AT_MOST} more"] if len(parts) > NAMED_AT_MOST else []
         return ", ".join([*parts[:NAMED_AT_MOST], *more])
 
@@ -223,8 +248,8 @@ class _Listener:
 class Feedback:
     """Sends to processes that are fenced off by remapping what others send, which their listeners would miss.
 
-    Moving edges go on as they come, fixed ones latched, all in one message, as long as there is a subscriber. ``own``
-    takes the ids of its publishers; the node listens there itself.
+    Moving edges go on as they come, fixed ones latched, all in one message, as long as there is a
+    subscriber. ``own`` takes the ids of its publishers; the node listens there itself.
     """
 
     def __init__(self, node: Node, private: Mapping[str, Topics], own: set[bytes | None]) -> None:

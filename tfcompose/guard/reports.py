@@ -1,6 +1,7 @@
 """What the guard reports, once: violations as cases, and publishers whose settings are wrong.
 
-A violation is reported together with others of its kind and node, and said to be over when it has ended.
+A violation is reported together with others of its kind and node, and said to be over when it has
+ended.
 """
 
 from __future__ import annotations
@@ -8,13 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Note
-from tfcompose.ipc import Found, GuardEvent, Recovered, Taken, Unfenced
-from tfcompose.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
-from tfcompose.live.state import NAMELESS
-from tfcompose.plan.topics import GLOBAL
-from tfcompose.verdict.drivers import drives_of
-from tfcompose.verdict.ownership import (
+from tfcompose.foundation.findings import Note
+from tfcompose.guard.verdict.drivers import drives_of
+from tfcompose.guard.verdict.ownership import (
     Violation,
     misnamed_help,
     other_robot_finding,
@@ -22,7 +19,7 @@ from tfcompose.verdict.ownership import (
     taken_finding,
     violation_finding,
 )
-from tfcompose.verdict.publishers import (
+from tfcompose.guard.verdict.publishers import (
     best_effort_publisher,
     flood,
     leak,
@@ -30,25 +27,31 @@ from tfcompose.verdict.publishers import (
     unfenced,
     volatile_publisher,
 )
+from tfcompose.model.messages import Found, GuardEvent, Recovered, Taken, Unfenced
+from tfcompose.model.plan.topics import GLOBAL
+from tfcompose.tf.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
+from tfcompose.tf.live.state import NAMELESS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from tfcompose.findings import Finding
-    from tfcompose.live.publishers import Publisher, Senders
-    from tfcompose.plan import Plan, PlanEdge
-    from tfcompose.verdict.ownership import Start
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.guard.verdict.ownership import Start
+    from tfcompose.model.plan import Plan, PlanEdge
+    from tfcompose.tf.live.publishers import Publisher, Senders
 
-#: For how long after the start a publisher can turn out to have been there first, and by how much it must have been.
+#: For how long after the start a publisher can turn out to have been there first, and by how much
+#: it must have been.
 FIRST_S = 15.0
 FIRST_BY_NS = 500_000_000
 #: How long messages are waited for that tell from their count when a publisher began.
 COUNTING_S = 0.7
-#: A violation is over when its publisher has left and nothing came for so long, or for longer from one that stays.
+#: A violation is over when its publisher has left and nothing came for so long, or for longer from
+#: one that stays.
 OVER_S = 3.0
 OVER_WHILE_PRESENT_S = 30.0
-#: Further edges of an offender that was just reported are collected for so long, and for longer while more come and
-#: come: who names frames after what it tracks has new ones each second.
+#: Further edges of an offender that was just reported are collected for so long, and for longer
+#: while more come and come: who names frames after what it tracks has new ones each second.
 COLLECTED_S = 0.5
 COLLECTED_AT_MOST_S = 60.0
 #: Of so many publishers, and groups of cases, it is known that they were reported.
@@ -57,7 +60,8 @@ MOST_REPORTED = 2000
 FLOOD_COUNTED_S = 1.0
 #: So many edges have a line each when they are over; more are reported in one.
 OVER_IN_LINES = 3
-#: So long after it was first heard, an owner's latched message is surely all that is left of those before, in seconds.
+#: So long after it was first heard, an owner's latched message is surely all that is left of those
+#: before, in seconds.
 ALL_HEARD_S = 2.0
 #: What a publisher can do before the start that keeps the plan from starting.
 _TAKES = frozenset({"TF801", "TF802", "TF820"})
@@ -72,7 +76,8 @@ FATE_S = 0.3
 #: Violations that ``stop-offender`` ends: who commits them breaks the tree.
 _STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
 
-#: So long what a publisher past the fence sends is waited for, so that it is reported before that is stopped.
+#: So long what a publisher past the fence sends is waited for, so that it is reported before that
+#: is stopped.
 UNFENCED_SILENT_S = 0.5
 _UNFENCED = "TF852"
 
@@ -107,7 +112,9 @@ class Cases:
         self._drives = drives_of(plan)
         self._reported: dict[Group, tuple[float, float]] = {}
         self._ended: dict[Group, list[tuple[Violation, bool]]] = {}
-        started = [process for process in plan.processes if process.kind not in {"external", "guard"}]
+        started = [
+            process for process in plan.processes if process.kind not in {"external", "guard"}
+        ]
         self._started = {process.name for process in started}
         self._nodes = {node for process in started for node in process.nodes}
 
@@ -160,8 +167,14 @@ class Cases:
 
     def _is_reported(self, robot: str, now: float, cases: list[Case]) -> bool:
         """Return whether it was reported that the robot runs here, with edges that are as wrong as these."""
-        severe = any(case.violation.edge for case in cases) or any(self._was_first(case, now) for case in cases)
-        known = [one for one in self.open.values() if one.reported and self._group(one) == (OTHER_ROBOT, robot)]
+        severe = any(case.violation.edge for case in cases) or any(
+            self._was_first(case, now) for case in cases
+        )
+        known = [
+            one
+            for one in self.open.values()
+            if one.reported and self._group(one) == (OTHER_ROBOT, robot)
+        ]
         return any(not severe or one.violation.edge for one in known)
 
     def _new(self, gid: bytes) -> Iterator[Case]:
@@ -171,13 +184,21 @@ class Cases:
     def _ripe(self, now: float) -> Iterator[Case]:
         """Yield the cases to report: those of which nothing more comes to be known.
 
-        Where ids do not say whose they are, whoever takes turns with the owner may not be in the graph yet; all that it
-        shows a while later are named.
+        Where ids do not say whose they are, whoever takes turns with the owner may not be in the
+        graph yet; all that it shows a while later are named.
         """
         for case in self.open.values():
-            if case.reported or self._may_learn_more(case.gid, now) or self._may_see_fate(case, now):
+            if (
+                case.reported
+                or self._may_learn_more(case.gid, now)
+                or self._may_see_fate(case, now)
+            ):
                 continue
-            if case.violation.namesake and case.gid is not None and not self._senders.is_sure(case.gid):
+            if (
+                case.violation.namesake
+                and case.gid is not None
+                and not self._senders.is_sure(case.gid)
+            ):
                 if now - case.since < NAMELESS_S:
                     continue
                 nodes = self._senders.nodes(case.gid, static=case.violation.static)
@@ -191,7 +212,10 @@ class Cases:
             return False
         goes_on = self._start.cleared is not None and now - at < 2 * collected_s
         self._reported.pop(group, None)  # the newest comes last
-        self._reported[group] = (now, min(2 * collected_s, COLLECTED_AT_MOST_S) if goes_on else COLLECTED_S)
+        self._reported[group] = (
+            now,
+            min(2 * collected_s, COLLECTED_AT_MOST_S) if goes_on else COLLECTED_S,
+        )
         if len(self._reported) > MOST_REPORTED:
             del self._reported[next(iter(self._reported))]
         return True
@@ -201,7 +225,11 @@ class Cases:
         ours = self._senders.process(cases[0].gid)
         violations = [replace(case.violation, stranger=bool(where) and not ours) for case in cases]
         if any(self._was_first(case, now) for case in cases):
-            found = other_robot_finding(violations, run, self._plan) if run else taken_finding(violations, where)
+            found = (
+                other_robot_finding(violations, run, self._plan)
+                if run
+                else taken_finding(violations, where)
+            )
             return Taken(found)
         if run:
             return Found(other_robot_finding(violations, run, self._plan))
@@ -210,10 +238,18 @@ class Cases:
         if advice := misnamed_help(violations, self._plan, ours):
             found = replace(found, help=advice)
         if self._says_fate(violations[0]):
-            found = replace(found, notes=(*found.notes, Note(_FATE[self._senders.is_held_back(cases[0].gid)])))
+            found = replace(
+                found, notes=(*found.notes, Note(_FATE[self._senders.is_held_back(cases[0].gid)]))
+            )
         process = self._process(violations[0], cases[0].gid)
         if not process and self._may_be_ours(violations[0]):
-            found = replace(found, notes=(*found.notes, Note("it is not proven which process did it: none is stopped")))
+            found = replace(
+                found,
+                notes=(
+                    *found.notes,
+                    Note("it is not proven which process did it: none is stopped"),
+                ),
+            )
         return Found(found, process)
 
     def _process(self, violation: Violation, gid: bytes | None) -> str:
@@ -223,7 +259,9 @@ class Cases:
 
     def _may_be_ours(self, violation: Violation) -> bool:
         """Return whether somebody would be stopped for it, if it were proven to be a process of this run."""
-        is_policy = self._plan.guard.on_violation == "stop-offender" and violation.code in _STOPPED_FOR
+        is_policy = (
+            self._plan.guard.on_violation == "stop-offender" and violation.code in _STOPPED_FOR
+        )
         return is_policy and not self._nodes.isdisjoint(violation.nodes)
 
     def _says_fate(self, violation: Violation) -> bool:
@@ -267,12 +305,16 @@ class Cases:
 
     def over(self, now: float) -> list[GuardEvent]:
         """Forget violations that have ended, and report that; the next of their kind is a new case."""
-        ended = [key for key, case in self.open.items() if case.reported and self._has_ended(case, now)]
+        ended = [
+            key for key, case in self.open.items() if case.reported and self._has_ended(case, now)
+        ]
         self.changes += len(ended)
         for key in ended:
             case = self.open.pop(key)
             one = case.violation
-            kept = one.static and not one.is_of_stamps and not self._senders.was_held_back(case.gid)
+            kept = (
+                one.static and not one.is_of_stamps and not self._senders.was_held_back(case.gid)
+            )
             self._ended.setdefault((*self._group(case), True), []).append((one, kept))
         due = [group for group in self._ended if self._is_due(group, now)]
         return [Recovered(text) for group in due for text in _over(group, self._ended.pop(group))]
@@ -313,14 +355,22 @@ class CaseMemory:
         """Return what must be known of the case."""
         one = case.violation
         what = (one.code, one.parent, one.child, one.nodes, one.static, one.edge is not None)
-        return cls(*what, one.namesake, one.loop, one.detail, None if case.gid is None else case.gid.hex())
+        return cls(
+            *what, one.namesake, one.loop, one.detail, None if case.gid is None else case.gid.hex()
+        )
 
     def case(self, planned: dict[str, PlanEdge], last: float) -> Case:
         """Return the case, as going on until then at least."""
         edge = planned.get(self.child) if self.is_planned else None
         what = (self.code, self.parent, self.child, self.nodes, self.static)
         violation = Violation(*what, edge, self.namesake, self.loop, self.detail)
-        return Case(violation, None if self.gid is None else bytes.fromhex(self.gid), last, last, reported=True)
+        return Case(
+            violation,
+            None if self.gid is None else bytes.fromhex(self.gid),
+            last,
+            last,
+            reported=True,
+        )
 
 
 @dataclass(slots=True)
@@ -334,7 +384,11 @@ class Flood:
 
     def count(self, transforms: int, now: float) -> None:
         """Count a message."""
-        self.messages, self.last, self.transforms = self.messages + 1, now, max(self.transforms, transforms)
+        self.messages, self.last, self.transforms = (
+            self.messages + 1,
+            now,
+            max(self.transforms, transforms),
+        )
 
     @property
     def hertz(self) -> float | None:
@@ -362,19 +416,30 @@ class PublisherReports:
 
     def wrong_settings(self, publishers: Sequence[Publisher]) -> list[Found]:
         """Return the findings for those on the plan's topics whose quality of service no listener accepts."""
-        return [found for one in publishers for wrong in self._wrong_settings(one) for found in self._once(one, wrong)]
+        return [
+            found
+            for one in publishers
+            for wrong in self._wrong_settings(one)
+            for found in self._once(one, wrong)
+        ]
 
     def _wrong_settings(self, one: Publisher) -> Iterator[Finding]:
         if one.node is None:
             return
         topic = one.topic or GLOBAL[one.static]
         if one.static and not one.latched:
-            owned = [edge.name for edge in self._plan.edges if edge.node == one.node and edge.kind == "static"]
+            owned = [
+                edge.name
+                for edge in self._plan.edges
+                if edge.node == one.node and edge.kind == "static"
+            ]
             yield volatile_publisher(one.node, topic, owned)
         if not one.reliable:
             yield best_effort_publisher(one.node, topic)
 
-    def leaving_the_fence(self, publishers: Sequence[Publisher], senders: Senders, now: float) -> list[Publisher]:
+    def leaving_the_fence(
+        self, publishers: Sequence[Publisher], senders: Senders, now: float
+    ) -> list[Publisher]:
         """Return the run's own publishers that send past the fence, once something of theirs was judged.
 
         One that sends nothing for a while is returned then.
@@ -382,11 +447,19 @@ class PublisherReports:
         outside = [
             one
             for one in publishers
-            if one.node and one.ours and one.process and one.fenced is False and not self._is_known(_UNFENCED, one)
+            if one.node
+            and one.ours
+            and one.process
+            and one.fenced is False
+            and not self._is_known(_UNFENCED, one)
         ]
         since = {one.gid: self._silent_since.get(one.gid, now) for one in outside}
         self._silent_since = since
-        return [one for one in outside if senders.sender(one.gid) or now - since[one.gid] >= UNFENCED_SILENT_S]
+        return [
+            one
+            for one in outside
+            if senders.sender(one.gid) or now - since[one.gid] >= UNFENCED_SILENT_S
+        ]
 
     def unfenced(self, one: Publisher, *, remapped: bool) -> list[Unfenced]:
         """Return the finding for one of these; the fence may be of remappings."""
@@ -394,14 +467,18 @@ class PublisherReports:
         found = unfenced(one.node or "", one.process, topic, one.profile, remapped=remapped)
         return [Unfenced(new.found, one.process) for new in self._once(one, found)]
 
-    def floods(self, senders: Senders, flooders: dict[bytes | None, Flood], now: float) -> list[Found]:
+    def floods(
+        self, senders: Senders, flooders: dict[bytes | None, Flood], now: float
+    ) -> list[Found]:
         """Return the findings for publishers of more undeclared edges than are judged; forget those that have left."""
         found = []
         for gid, one in list(flooders.items()):
             publisher = senders.known.get(gid) if gid is not None else None
             if publisher is None or not publisher.node or now - one.since < FLOOD_COUNTED_S:
                 continue
-            found += self._once(publisher, flood(publisher.node, publisher.where, one.transforms, one.hertz))
+            found += self._once(
+                publisher, flood(publisher.node, publisher.where, one.transforms, one.hertz)
+            )
             if not senders.is_present(gid):
                 del flooders[gid]
         return found
@@ -416,7 +493,9 @@ class PublisherReports:
             for found in self._once(one, leak(one.node, GLOBAL[one.static], topics[one.static]))
         ]
 
-    def replaced(self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float) -> list[Found]:
+    def replaced(
+        self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float
+    ) -> list[Found]:
         """Return the findings for nodes that sent latched messages before they were first heard.
 
         ``missing`` are names of fixed edges that did not come, by the node, of which others came.

@@ -1,6 +1,7 @@
 """Starts a plan, restarts what fails and stops all of it.
 
-``machine`` decides: a pure function over the values of ``state`` and ``events``. ``supervisor`` acts: it turns pipes,
-signals and time into events, and starts, signals and reads processes. Must not import ``guard``, ``publishers``,
-``model``, ``pydantic``, ``yaml``: it knows the plan, and talks to other processes through ``ipc``.
+``machine`` decides: a pure function over the values of ``state`` and ``events``. ``supervisor``
+acts: it turns pipes, signals and time into events, and starts, signals and reads processes. Must
+not import ``spec``, ``compiler``, ``guard``, ``cli``, ``tools``, ``pydantic``, ``yaml``: it knows
+the plan, and talks to other processes through messages.
 """

@@ -9,8 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import RejectedError
-from tfcompose.ipc import (
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.launcher.events import NewPlan
+from tfcompose.launcher.preflight import commands_of
+from tfcompose.launcher.readiness import is_ready, unmet_in_words, waits_for
+from tfcompose.launcher.stopping import refusal
+from tfcompose.model.messages import (
     Done,
     DownRequest,
     PlanChange,
@@ -20,21 +24,17 @@ from tfcompose.ipc import (
     RobotStatus,
     UpdateRequest,
 )
-from tfcompose.launcher.events import NewPlan
-from tfcompose.launcher.preflight import commands_of
-from tfcompose.launcher.readiness import is_ready, unmet_in_words, waits_for
-from tfcompose.launcher.stopping import refusal
-from tfcompose.plan.file import read_plan
+from tfcompose.model.plan.file import read_plan
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.ipc import Request
     from tfcompose.launcher.child import Command
     from tfcompose.launcher.events import Event
     from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.state import State, Tracked
-    from tfcompose.plan import Plan
+    from tfcompose.model.messages import Request
+    from tfcompose.model.plan import Plan
 
 
 #: A larger plan is not read.
@@ -57,7 +57,9 @@ def status(state: State, now: float) -> RobotStatus:
         ready=is_ready(state),
         stopping=state.stop is not None,
         missing=tuple(edge.name for edge in state.missing),
-        silent=tuple(edge.name for edge in state.plan.edges if edge.child in state.silent & state.live),
+        silent=tuple(
+            edge.name for edge in state.plan.edges if edge.child in state.silent & state.live
+        ),
         processes=tuple(_process(state, one, now) for one in state.tracked.values()),
     )
 
@@ -85,7 +87,11 @@ def _process(state: State, one: Tracked, now: float) -> ProcessStatus:
 
 
 def answer(
-    request: Request, state: State, plan_file: Path, base: Mapping[str, str], environment: Environment
+    request: Request,
+    state: State,
+    plan_file: Path,
+    base: Mapping[str, str],
+    environment: Environment,
 ) -> Outcome:
     """Return the answer, what it means for the machine, and, for another plan, its file and commands."""
     match request:
@@ -103,7 +109,11 @@ def answer(
 
 
 def _update(
-    request: UpdateRequest, state: State, plan_file: Path, base: Mapping[str, str], environment: Environment
+    request: UpdateRequest,
+    state: State,
+    plan_file: Path,
+    base: Mapping[str, str],
+    environment: Environment,
 ) -> Outcome:
     file = Path(request.plan)
     try:
@@ -113,13 +123,18 @@ def _update(
     if state.stop:
         return Refusal("everything is being stopped"), None, None
     try:
-        commands, found = commands_of(plan, plan.managed, file, base, environment, Path(request.base))
+        commands, found = commands_of(
+            plan, plan.managed, file, base, environment, Path(request.base)
+        )
     except ValueError as error:  # a NUL in the folder's name
         return Refusal(f"{request.base!r} cannot be used: {error}"), None, None
     if found:
         return Refusal("; ".join(one.message for one in found)), None, None
     different = change(state.plan, plan_file.parent, plan, file.parent)
-    names, before = [process.name for process in plan.processes], [process.name for process in state.plan.processes]
+    names, before = (
+        [process.name for process in plan.processes],
+        [process.name for process in state.plan.processes],
+    )
     started = {process.name for process in (*state.plan.managed, *plan.managed)}
     answer = PlanChange(
         changed=tuple(name for name in names if name in different.changed & started),
@@ -187,4 +202,6 @@ def _bytes(folder: Path, name: str | None) -> bytes | None:
 def _held(old: Plan, new: Plan) -> tuple[str, ...]:
     """Return the fixed edges that vanish: tf2 never forgets one, so listeners keep it until they start anew."""
     children = {edge.child for edge in new.edges}
-    return tuple(edge.name for edge in old.edges if edge.kind == "static" and edge.child not in children)
+    return tuple(
+        edge.name for edge in old.edges if edge.kind == "static" and edge.child not in children
+    )

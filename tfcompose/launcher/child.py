@@ -1,7 +1,7 @@
 """One child process: it dies with the launcher, leads a process group of its own, and is read without waiting.
 
-The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own children; for
-those there is the reaper.
+The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own
+children; for those there is the reaper.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.signals import SIGNALS
 from tfcompose.launcher.schedule import apply_schedule
-from tfcompose.signals import SIGNALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -29,25 +29,29 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import IO
 
-    from tfcompose.plan import Schedule
-    from tfcompose.plan.components import LoadRequest
+    from tfcompose.model.plan import Schedule
+    from tfcompose.model.plan.components import LoadRequest
 
 #: A line longer than this comes in pieces; bytes.
 LINE_LIMIT = 64 * 1024
 #: What is read at once, so that a process that floods leaves time for the others; bytes.
 READ_SIZE = 64 * 1024
-#: What a process may write: so much at once, and so much a second; more is read, counted and thrown away; bytes.
+#: What a process may write: so much at once, and so much a second; more is read, counted and
+#: thrown away; bytes.
 BURST = 8_000_000
 PER_SECOND = 1_000_000
-#: The end of what is thrown away is kept, and comes when there is time again: a process's last words count; bytes.
+#: The end of what is thrown away is kept, and comes when there is time again: a process's last
+#: words count; bytes.
 TAIL = 4096
-#: What is read from a process that has ended, at most: more than a pipe holds, less than for ever; bytes.
+#: What is read from a process that has ended, at most: more than a pipe holds, less than for ever;
+#: bytes.
 DRAIN_LIMIT = 1024 * 1024
 
 #: The size of a pseudo-terminal: lines and columns.
 TERMINAL_SIZE = (40, 120)
 
-#: How much of its log goes into the finding for a process that failed: lines, and characters of each.
+#: How much of its log goes into the finding for a process that failed: lines, and characters of
+#: each.
 LAST_LINES = 8
 LAST_LINE_LENGTH = 300
 
@@ -60,10 +64,10 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 class Command:
     """Program and arguments, environment, and folder.
 
-    ``own`` says that it is one of tfcompose's; ``schedule`` is how the kernel schedules it. ``fence`` is a file that
-    must be there first, and what it holds. ``load`` is what a container is asked instead of starting anything.
-    ``emulate_tty`` gives it pseudo-terminals in place of pipes.
-    ``missing`` says, of a process that the run goes on without, why it cannot be started.
+    ``own`` says that it is one of tfcompose's; ``schedule`` is how the kernel schedules it.
+    ``fence`` is a file that must be there first, and what it holds. ``load`` is what a container
+    is asked instead of starting anything. ``emulate_tty`` gives it pseudo-terminals in place of
+    pipes. ``missing`` says, of a process that the run goes on without, why it cannot be started.
     """
 
     argv: tuple[str, ...]
@@ -124,7 +128,8 @@ class Bucket:
         now = self._clock()
         self._left = min(BURST, self._left + (now - self._at) * PER_SECOND)
         self._at = now
-        # Once it is empty, it is filled a little, so that what is kept comes in pieces that can be read.
+        # Once it is empty, it is filled a little, so that what is kept comes in pieces that can be
+        # read.
         self._dry = self._left < (PER_SECOND if self._dry else size)
         self._left -= 0 if self._dry else size
         return not self._dry
@@ -182,7 +187,10 @@ class Pipe:
             bucket.thrown += begin
             tail = tail[begin:]
         if bucket.thrown:
-            self._sink(f"… {bucket.thrown:,} bytes of output were thrown away here: more came than a log can hold")
+            self._sink(
+                f"… {bucket.thrown:,} bytes of output were thrown away here: more came than a log"
+                " can hold"
+            )
             bucket.thrown = 0
         for line in self._lines.feed(tail):
             self._sink(line)
@@ -222,9 +230,9 @@ class Child:
 def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
     """Start the command as the leader of a new session, with its output in pipes.
 
-    One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it handles them
-    (``tfcompose.signals``): one that comes while Python itself starts waits, and neither kills it nor prints a
-    traceback.
+    One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it
+    handles them (``tfcompose.foundation.signals``): one that comes while Python itself starts
+    waits, and neither kills it nor prints a traceback.
 
     Raises:
         OSError: if it cannot be started.
@@ -245,7 +253,9 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
     return subprocess.Popen(
         command.argv,
         bufsize=0,
-        cwd="/" if command.own and not command.folder.is_dir() else command.folder,  # ours need none
+        cwd=(
+            "/" if command.own and not command.folder.is_dir() else command.folder
+        ),  # ours need none
         env=command.env,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

@@ -14,12 +14,27 @@ from typing import TYPE_CHECKING, Any
 
 import regex
 
-from tfcompose.ipc import GUARD_EVENTS, GUARD_ORDERS, LogLine
-from tfcompose.launcher.child import LAST_LINE_LENGTH, Child, Pipe, has_ended, kill_group, reap_adopted, spawn
+from tfcompose.foundation.signals import SIGNALS
+from tfcompose.launcher.child import (
+    LAST_LINE_LENGTH,
+    Child,
+    Pipe,
+    has_ended,
+    kill_group,
+    reap_adopted,
+    spawn,
+)
 from tfcompose.launcher.events import Exited, LogMatched, Started, StartFailed
-from tfcompose.launcher.procfs import descendants, end, launcher_mark, leftovers, leftovers_of, signal_leftovers
-from tfcompose.signals import SIGNALS
-from tfcompose.variables import (
+from tfcompose.launcher.procfs import (
+    descendants,
+    end,
+    launcher_mark,
+    leftovers,
+    leftovers_of,
+    signal_leftovers,
+)
+from tfcompose.model.messages import GUARD_EVENTS, GUARD_ORDERS, LogLine
+from tfcompose.model.variables import (
     EVENTS_FD,
     GO,
     HOLD_FD,
@@ -35,10 +50,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from selectors import BaseSelector
 
-    from tfcompose.ipc import GuardOrder, Notice, Stream
     from tfcompose.launcher.child import Command
     from tfcompose.launcher.events import Event
-    from tfcompose.plan import PlanProcess
+    from tfcompose.model.messages import GuardOrder, Notice, Stream
+    from tfcompose.model.plan import PlanProcess
 
 #: So much of a line is compared with what a gate waits for, in characters.
 LONGEST_MATCHED = 4000
@@ -51,8 +66,8 @@ EVENT_LIMIT = 1024 * 1024
 class Children:
     """The processes that run. ``happened`` is given what becomes of them, ``notify`` what they write.
 
-    ``writer`` says, of a process and a line that it wrote, whose line it is: a container writes its components'.
-    With a run's id, what they leave behind is this process's to reap and to end.
+    ``writer`` says, of a process and a line that it wrote, whose line it is: a container writes
+    its components'. With a run's id, what they leave behind is this process's to reap and to end.
     """
 
     def __init__(
@@ -78,14 +93,18 @@ class Children:
         self._ran: set[str] = set()
         self._left: set[str] = set()
 
-    def start(self, process: PlanProcess, command: Command, guard: GuardPipes | None = None) -> Event:
+    def start(
+        self, process: PlanProcess, command: Command, guard: GuardPipes | None = None
+    ) -> Event:
         """Start the process, with the pipes of a guard if it is one, and return what came of it."""
         if process.name in self._held:
             return self._let_go(process.name)
         try:
             if command.missing:
                 return StartFailed(process.name, command.missing)
-            if process.name in self._ran and self._run_id:  # nobody wants two of what it left behind
+            if (
+                process.name in self._ran and self._run_id
+            ):  # nobody wants two of what it left behind
                 signal_leftovers(self._run_id, {process.name}, signal.SIGKILL)
             self._left.discard(process.name)
             child = self._spawn(process, command, guard)
@@ -99,14 +118,22 @@ class Children:
                 guard.handed_over()
         if guard:
             self._guard, self._guard_pipes = process.name, guard
-            self._watch(child, Pipe(guard.events, lambda line: self._guard_line(process.name, line), EVENT_LIMIT))
+            self._watch(
+                child,
+                Pipe(guard.events, lambda line: self._guard_line(process.name, line), EVENT_LIMIT),
+            )
         return Started(process.name, child.popen.pid)
 
     def prepare(self, process: PlanProcess, command: Command) -> None:
         """Have one of tfcompose's own load what it needs; it joins ROS when it is started, without that delay."""
         theirs, ours = os.pipe()
         try:
-            self._spawn(process, replace(command, env=command.env | {HOLD_FD: str(theirs)}), None, (theirs,))
+            self._spawn(
+                process,
+                replace(command, env=command.env | {HOLD_FD: str(theirs)}),
+                None,
+                (theirs,),
+            )
             self._held[process.name] = ours
         except (OSError, subprocess.SubprocessError, ValueError):
             os.close(ours)  # its start will say why
@@ -139,7 +166,8 @@ class Children:
     def reap(self) -> None:
         """Take leave of those that have ended."""
         for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
-            # The guard's end dismisses those that are held, so that one of these may be gone by now.
+            # The guard's end dismisses those that are held, so that one of these may be gone by
+            # now.
             if child.name not in self._held and self._children.get(child.name) is child:
                 self._ended(child)
         if self._run_id:
@@ -188,21 +216,35 @@ class Children:
             pipe.file.close()
 
     def _spawn(
-        self, process: PlanProcess, command: Command, guard: GuardPipes | None, pass_fds: tuple[int, ...] = ()
+        self,
+        process: PlanProcess,
+        command: Command,
+        guard: GuardPipes | None,
+        pass_fds: tuple[int, ...] = (),
     ) -> Child:
-        more = (guard.env if guard else {}) | self._marks | ({PROCESS: process.name} if self._run_id else {})
+        more = (
+            (guard.env if guard else {})
+            | self._marks
+            | ({PROCESS: process.name} if self._run_id else {})
+        )
         self._ran.add(process.name)
         if command.fence:
             command.fence[0].parent.mkdir(exist_ok=True)
             command.fence[0].write_text(command.fence[1], encoding="utf-8")
-        popen = spawn(replace(command, env=command.env | more), guard.theirs if guard else pass_fds)
+        popen = spawn(
+            replace(command, env=command.env | more), guard.theirs if guard else pass_fds
+        )
         child = Child(process.name, popen)
         self._children[process.name] = child
         self._update_reaper()
         gate = process.ready.text if process.ready and process.ready.kind == "log" else None
         if popen.stdout and popen.stderr:
-            self._watch(child, Pipe(popen.stdout, self._logger(child, "stdout", gate), bucket=child.bucket))
-            self._watch(child, Pipe(popen.stderr, self._logger(child, "stderr", gate), bucket=child.bucket))
+            self._watch(
+                child, Pipe(popen.stdout, self._logger(child, "stdout", gate), bucket=child.bucket)
+            )
+            self._watch(
+                child, Pipe(popen.stderr, self._logger(child, "stderr", gate), bucket=child.bucket)
+            )
         return child
 
     def _watch(self, child: Child, pipe: Pipe) -> None:
@@ -232,7 +274,11 @@ class Children:
                 child.gate_matched = matches(text[:LONGEST_MATCHED])
             except TimeoutError:
                 matches = None
-                self._notify(LogLine(child.name, "stderr", f"ready: log: {gate!r} takes too long here: given up"))
+                self._notify(
+                    LogLine(
+                        child.name, "stderr", f"ready: log: {gate!r} takes too long here: given up"
+                    )
+                )
             if child.gate_matched:
                 self._happened(LogMatched(child.name, text[:LAST_LINE_LENGTH]))
 
@@ -277,8 +323,8 @@ class Children:
 def _matcher(pattern: str) -> Callable[[str], bool]:
     """Return a function that returns whether a line contains the pattern.
 
-    It raises a TimeoutError where that takes too long: ``(a|aa)+$`` needs time that doubles with each character, and
-    ``re`` cannot be stopped.
+    It raises a TimeoutError where that takes too long: ``(a|aa)+$`` needs time that doubles with
+    each character, and ``re`` cannot be stopped.
     """
     compiled = regex.compile(pattern)
     return lambda line: compiled.search(line, timeout=MATCHED_WITHIN_S) is not None
@@ -302,7 +348,9 @@ class GuardPipes:
         os.set_blocking(self._orders, False)
         self.theirs: tuple[int, ...] = (write_fd, orders_fd)
         self.events = io.FileIO(read_fd)
-        self.env = {EVENTS_FD: str(write_fd), ORDERS_FD: str(orders_fd)} | ({JOINS: "1"} if joins else {})
+        self.env = {EVENTS_FD: str(write_fd), ORDERS_FD: str(orders_fd)} | (
+            {JOINS: "1"} if joins else {}
+        )
 
         if memory:
             memory_fd = os.memfd_create("tfcompose-guard-memory")
@@ -349,8 +397,9 @@ def _ignore_signals() -> None:
 class Reaper:
     """What ends a run whose launcher was killed: a shell that outlives the launcher by a moment.
 
-    It kills the groups that it was given last, those of everything that descends from the launcher, and then whatever
-    carries the run's id in its environment: processes that left their groups since.
+    It kills the groups that it was given last, those of everything that descends from the
+    launcher, and then whatever carries the run's id in its environment: processes that left their
+    groups since.
     """
 
     def __init__(self, run_id: str = "") -> None:

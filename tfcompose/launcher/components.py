@@ -1,7 +1,8 @@
 """What becomes of components: nodes that the guard has containers load and unload.
 
-A component has no operating system's process of its own. It is started by an order to the guard, runs once its
-container has answered, and goes with the container; a guard that follows another is told again.
+A component has no operating system's process of its own. It is started by an order to the guard,
+runs once its container has answered, and goes with the container; a guard that follows another is
+told again.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import finding
-from tfcompose.ipc import Loaded, NotLoaded, Unloaded
+from tfcompose.foundation.findings import finding
 from tfcompose.launcher.events import LoadComponent, UnloadComponent
 from tfcompose.launcher.readiness import order_gate
 from tfcompose.launcher.stopping import left, lose_edges, schedule_restart
+from tfcompose.model.messages import Loaded, NotLoaded, Unloaded
 
 if TYPE_CHECKING:
     from tfcompose.launcher.state import State, Tracked, Transition
@@ -25,11 +26,20 @@ def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -
     one = step.state.tracked[event.process]
     match event:
         case Loaded() if one.state == "starting":
-            container = one.process.component and step.state.tracked[one.process.component.container]
-            step.enter(event.process, "running", pid=container.pid if container else None, began=step.now)
+            container = (
+                one.process.component and step.state.tracked[one.process.component.container]
+            )
+            step.enter(
+                event.process, "running", pid=container.pid if container else None, began=step.now
+            )
             order_gate(step, step.state.tracked[event.process])
         case NotLoaded(why=why) if one.state == "starting":
-            _ended(step, replace(one, since=step.now), why, f"{one.process.name} could not be started: {why}")
+            _ended(
+                step,
+                replace(one, since=step.now),
+                why,
+                f"{one.process.name} could not be started: {why}",
+            )
         case Unloaded(why=why) if one.state == "running":
             _ended(step, one, why, f"{one.process.name} has ended: {why}")
         case Unloaded(why=why) if one.state == "stopping" and step.state.stop:
@@ -63,7 +73,10 @@ def order_components(step: Transition) -> None:
     It has to hear first who is absent: it forgets what it was ordered about those.
     """
     for name, one in step.state.tracked.items():
-        if one.process.component and one.state in ("starting", "running"):  # it watches over those that run
+        if one.process.component and one.state in (
+            "starting",
+            "running",
+        ):  # it watches over those that run
             step.actions.append(LoadComponent(name, one.order, again=True))
         elif one.process.component and one.state == "stopping":
             step.actions.append(UnloadComponent(name, one.order))
@@ -79,7 +92,11 @@ def writer_of(state: State, process: str, line: str) -> str:
     components = state.components_of(process)
     if not components:
         return process
-    loggers = {node.strip("/").replace("/", "."): one.process.name for one in components for node in one.process.nodes}
+    loggers = {
+        node.strip("/").replace("/", "."): one.process.name
+        for one in components
+        for node in one.process.nodes
+    }
     for name in _LOGGER.findall(line[:_BEGINNING]):
         found = next((one for one in loggers if name == one or name.startswith(f"{one}.")), None)
         if found:

@@ -1,7 +1,8 @@
 """The control socket: other commands send requests to the launcher, and receive its notices.
 
-One request is one line of JSON, as ``tfcompose.ipc`` describes it; each answer is one line, too. Whoever asks for
-events is sent the last ones again, and then each as it comes. Only the user who runs the robot is answered.
+One request is one line of JSON, as ``tfcompose.model.messages`` describes it; each answer is one
+line, too. Whoever asks for events is sent the last ones again, and then each as it comes. Only the
+user who runs the robot is answered.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
-from tfcompose.ipc import REQUESTS, EventsRequest, Refusal
 from tfcompose.launcher.procfs import is_suspended
-from tfcompose.plan.codec import decode, encode
+from tfcompose.model.messages import REQUESTS, EventsRequest, Refusal
+from tfcompose.model.plan.codec import decode, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from tfcompose.ipc import Request
     from tfcompose.launcher.runtime_dir import RuntimeDir
+    from tfcompose.model.messages import Request
 
 A = TypeVar("A")
 
@@ -100,7 +101,9 @@ def _ensure_it_runs(place: RuntimeDir) -> None:
     if holder is None:
         return
     if is_suspended(holder.pid):
-        raise ConnectionError(f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} lets it go on")
+        raise ConnectionError(
+            f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} lets it go on"
+        )
 
 
 def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
@@ -122,14 +125,19 @@ def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
             raise RefusedError(decode(Refusal, data).error)
         return decode(answer, data)
     except (ValueError, TypeError) as error:
-        raise ConnectionError(f"its launcher answers what this tfcompose does not understand: {error}") from None
+        raise ConnectionError(
+            f"its launcher answers what this tfcompose does not understand: {error}"
+        ) from None
 
 
 class Control:
     """The launcher's end. ``answer`` is given each request and returns the object that is sent back."""
 
     def __init__(
-        self, listener: socket.socket, selector: selectors.BaseSelector, answer: Callable[[Request], object]
+        self,
+        listener: socket.socket,
+        selector: selectors.BaseSelector,
+        answer: Callable[[Request], object],
     ) -> None:
         self._listener = listener
         self._selector = selector
@@ -159,7 +167,9 @@ class Control:
             connection, _ = self._listener.accept()
         except OSError:
             return
-        _, uid, _ = struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
+        _, uid, _ = struct.unpack(
+            "3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
+        )
         if uid not in {os.getuid(), 0}:
             connection.close()
             return

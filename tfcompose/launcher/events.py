@@ -1,6 +1,7 @@
 """What can happen to the process machine, and what it decides: values only.
 
-What the guard reports and what other commands request are events too; they are in ``tfcompose.ipc``.
+What the guard reports and what other commands request are events too; they are in
+``tfcompose.model.messages``.
 """
 
 from __future__ import annotations
@@ -8,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.ipc import DownRequest, GuardEvent, ProcessRequest
+from tfcompose.model.messages import DownRequest, GuardEvent, ProcessRequest
 
 if TYPE_CHECKING:
-    from tfcompose.findings import Finding
-    from tfcompose.ipc import GuardOrder, Notice
-    from tfcompose.plan import Plan
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.messages import GuardOrder, Notice
+    from tfcompose.model.plan import Plan
 
 
 # Events.
@@ -83,7 +84,8 @@ class LogMatched:
 class NewPlan:
     """From now on another plan holds.
 
-    ``changed`` are the processes that must be started anew for it, ``held`` the fixed edges that listeners still hold.
+    ``changed`` are the processes that must be started anew for it, ``held`` the fixed edges that
+    listeners still hold.
     """
 
     plan: Plan

@@ -1,7 +1,8 @@
 """One process of a plan, started as ``tfcompose up`` starts it: ``python -m tfcompose.launcher.exec PLAN_FILE NAME``.
 
-This program becomes the process, so that whoever supervises it (systemd, a container) supervises that one. Exit codes:
-1 something that it needs is missing, 2 the arguments or the plan are not usable.
+This program becomes the process, so that whoever supervises it (systemd, a container) supervises
+that one. Exit codes: 1 something that it needs is missing, 2 the arguments or the plan are not
+usable.
 """
 
 from __future__ import annotations
@@ -12,17 +13,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import RejectedError
+from tfcompose.foundation.findings import RejectedError
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.schedule import apply_schedule
-from tfcompose.plan.file import read_plan
-from tfcompose.ros.environment import child_environment
-from tfcompose.variables import JOINS
+from tfcompose.model.plan.file import read_plan
+from tfcompose.model.variables import JOINS
+from tfcompose.tf.ros.environment import child_environment
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.child import Command
 
 _ARGUMENTS = 2
@@ -43,13 +44,17 @@ def command_of(argv: Sequence[str], base: Mapping[str, str]) -> Command | int:
     if process.kind == "external":
         return _fail(f"{name} is external, and started elsewhere", 2)
     if process.component:
-        return _fail(f"{name} is a component, which the guard has {process.component.container} load", 2)
-    # What is sent in a partition is known to be ours by the launcher's run; topics of each process's own need none.
+        return _fail(
+            f"{name} is a component, which the guard has {process.component.container} load", 2
+        )
+    # What is sent in a partition is known to be ours by the launcher's run; topics of each
+    # process's own need none.
     plan = replace(plan, guard=replace(plan.guard, fence="remap"))
     commands, found = commands_of(plan, [process], file, base, child_environment)
     if found:
         return _fail("\n".join(map(_text, found)), 1)
-    # No launcher holds the others back until the guard has looked: it takes every owner as the plan's.
+    # No launcher holds the others back until the guard has looked: it takes every owner as the
+    # plan's.
     joins = {JOINS: "1"} if process.kind == "guard" else {}
     return replace(commands[name], env=commands[name].env | joins)
 
@@ -70,7 +75,11 @@ def main(argv: Sequence[str]) -> int:
 
 def _text(found: Finding) -> str:
     return "\n".join(
-        [found.message, *(f"  {note.message}" for note in found.notes), *([found.help] if found.help else [])]
+        [
+            found.message,
+            *(f"  {note.message}" for note in found.notes),
+            *([found.help] if found.help else []),
+        ]
     )
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import signal
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Finding, Note, finding
-from tfcompose.text import listed
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.text import listed
 
 if TYPE_CHECKING:
     from tfcompose.launcher.events import Exited
     from tfcompose.launcher.state import Tracked
-    from tfcompose.plan import PlanEdge
+    from tfcompose.model.plan import PlanEdge
 
 
 #: How many of an owner's edges a finding names.
@@ -52,7 +52,9 @@ def guard_hangs(name: str, seconds: float, *, strict: bool) -> Finding:
     """Return the finding for a guard that runs and shows no sign of life."""
     blind = "passed nothing on" if strict else "watched nothing"
     message = f"{name} hangs: it has {blind} for {seconds:.0f} s"
-    return finding("TF808", message, None, severity="warning", help="it is ended and started again")
+    return finding(
+        "TF808", message, None, severity="warning", help="it is ended and started again"
+    )
 
 
 def not_started(name: str, why: str) -> Finding:
@@ -62,13 +64,22 @@ def not_started(name: str, why: str) -> Finding:
 
 def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
     """Return the finding for a process that is not started, because it waits for what cannot come any more."""
-    return finding("TF808", f"{name} is not started: it waits for {other} to be {what}, and {other} {why}", None)
+    return finding(
+        "TF808",
+        f"{name} is not started: it waits for {other} to be {what}, and {other} {why}",
+        None,
+    )
 
 
 def never_clear(name: str, seconds: float) -> Finding:
     """Return the finding for a guard that does not report whether the plan's edges are free."""
-    message = f"{name} did not report within {seconds:g} s whether the plan's edges are published already"
-    return finding("TF808", message, None, help="its log shows how far it got; --guard off starts without it")
+    message = (
+        f"{name} did not report within {seconds:g} s whether the plan's edges are published"
+        " already"
+    )
+    return finding(
+        "TF808", message, None, help="its log shows how far it got; --guard off starts without it"
+    )
 
 
 def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
@@ -76,12 +87,17 @@ def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
     names = listed((edge.name for edge in edges), NAMED_AT_MOST)
     name = owner.process.name
     if owner.state == "stopped" and owner.order == 0:
-        waits = " and ".join(f"{other} to be {what}" for other, what in owner.process.after.items())
+        waits = " and ".join(
+            f"{other} to be {what}" for other, what in owner.process.after.items()
+        )
         why = f"was not started: it waits for {waits}" if waits else "was not started"
         return finding("TF811", f"nobody published {names}: {name} {why}", None)
     if owner.state in ("stopped", "exited", "fatal", "backoff"):
         why = f"{owner.state}: {owner.detail}" if owner.detail else owner.state
         return finding("TF811", f"nobody publishes {names}: {name} is {why}", None)
     host = owner.process.host if owner.process.kind == "external" else None
-    advice = f"start its share on {host}: tfcompose up --host {host}; a profile with host: null starts it here"
+    advice = (
+        f"start its share on {host}: tfcompose up --host {host}; a profile with host: null starts"
+        " it here"
+    )
     return finding("TF811", f"{name} never published {names}", None, help=advice if host else "")

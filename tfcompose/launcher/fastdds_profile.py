@@ -1,7 +1,8 @@
 """Profile files of Fast DDS (XML), with partitions added for the writers or readers of topics.
 
-rmw_fastrtps takes the profile that has a topic's name for its writers and readers, and nothing of the default one
-then: what a new profile does not say is taken from the default profile of the file, if there is one.
+rmw_fastrtps takes the profile that has a topic's name for its writers and readers, and nothing of
+the default one then: what a new profile does not say is taken from the default profile of the
+file, if there is one.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
-from tfcompose.ros.environment import RosError
+from tfcompose.tf.ros.environment import RosError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +35,8 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
     What ``file`` holds stays, but for its comments.
 
     Raises:
-        RosError: with the reason, if it cannot be read, or puts one of the topics into a partition itself.
+        RosError: with the reason, if it cannot be read, or puts one of the topics into a partition
+        itself.
     """
     root = _read(file)
     profiles = root if root.tag == "profiles" else root.find("profiles")
@@ -89,8 +91,8 @@ class _Reader:
     """Reads XML as Fast DDS does: names stand for themselves, whatever namespace they are in.
 
     Raises:
-        ValueError: with one sentence, for a document type with its entities, or elements nested too deep.
-        expat.ExpatError: for what is not XML.
+        ValueError: with one sentence, for a document type with its entities, or elements nested
+        too deep. expat.ExpatError: for what is not XML.
     """
 
     def __init__(self) -> None:

@@ -1,9 +1,10 @@
 """How a strict plan's processes are fenced off, so that only the guard receives what they send on TF.
 
 Where their rmw is Fast DDS, a profile file moves their writers into a DDS partition. Elsewhere, or
-where the plan says so, their TF topics are remapped to topics of their own: then their listeners are moved too, and
-the guard feeds the rest of the tree back to them. A remapping reaches every process that takes ROS arguments: one of a
-package, of a launch file, of tfcompose's own, and a command that owns an edge.
+where the plan says so, their TF topics are remapped to topics of their own: then their listeners
+are moved too, and the guard feeds the rest of the tree back to them. A remapping reaches every
+process that takes ROS arguments: one of a package, of a launch file, of tfcompose's own, and a
+command that owns an edge.
 """
 
 from __future__ import annotations
@@ -12,11 +13,18 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Finding, finding
+from tfcompose.foundation.findings import Finding, finding
 from tfcompose.launcher.fastdds_profile import with_partitions
-from tfcompose.plan.middleware import middleware_variables
-from tfcompose.plan.topics import GLOBAL, fence_file, judged_topics, partition_of, private_topics, takes_remappings
-from tfcompose.ros.environment import PROFILE_VARIABLES, RMW, RosError, is_fastdds
+from tfcompose.model.plan.middleware import middleware_variables
+from tfcompose.model.plan.topics import (
+    GLOBAL,
+    fence_file,
+    judged_topics,
+    partition_of,
+    private_topics,
+    takes_remappings,
+)
+from tfcompose.tf.ros.environment import PROFILE_VARIABLES, RMW, RosError, is_fastdds
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +32,7 @@ if TYPE_CHECKING:
     from typing import Literal
 
     from tfcompose.launcher.child import Command
-    from tfcompose.plan import Plan, PlanProcess
+    from tfcompose.model.plan import Plan, PlanProcess
 
     Way = Literal["", "partition", "remap"]
 
@@ -40,7 +48,11 @@ def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
     if plan.guard.fence != "auto":
         return plan.guard.fence
     common = {**base, **middleware_variables(plan.ros, base)}
-    return "partition" if all(is_fastdds({**common, **process.env}) for process in plan.processes) else "remap"
+    return (
+        "partition"
+        if all(is_fastdds({**common, **process.env}) for process in plan.processes)
+        else "remap"
+    )
 
 
 def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
@@ -53,10 +65,15 @@ def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
         return process
     rules = dict([*zip(GLOBAL, private, strict=True), *zip(process.topics, private, strict=True)])
     if process.argv[0].startswith("${launch:"):
-        return replace(process, remap=rules | {old: new for old, new in process.remap.items() if old not in rules})
+        return replace(
+            process,
+            remap=rules | {old: new for old, new in process.remap.items() if old not in rules},
+        )
     words = [word for old, new in rules.items() for word in ("-r", f"{old}:={new}")]
     at = process.argv.index("--ros-args") if "--ros-args" in process.argv else len(process.argv)
-    return replace(process, argv=(*process.argv[:at], "--ros-args", *words, *process.argv[at + 1 :]))
+    return replace(
+        process, argv=(*process.argv[:at], "--ros-args", *words, *process.argv[at + 1 :])
+    )
 
 
 def not_remapped(plan: Plan) -> list[Finding]:
@@ -68,12 +85,20 @@ def not_remapped(plan: Plan) -> list[Finding]:
     ]
     if not missed:
         return []
-    message = f"guard: strict fences off by remapping, and the command of {_all(missed)} takes no ROS arguments"
-    advice = "start it as {package, executable}, or as a list of words, and not in a shell; or let the guard watch"
+    message = (
+        f"guard: strict fences off by remapping, and the command of {_all(missed)} takes no ROS"
+        " arguments"
+    )
+    advice = (
+        "start it as {package, executable}, or as a list of words, and not in a shell; or let the"
+        " guard watch"
+    )
     return [finding("TF902", message, None, help=advice)]
 
 
-def by_partition(plan: Plan, commands: Mapping[str, Command], folder: Path) -> tuple[dict[str, Command], list[Finding]]:
+def by_partition(
+    plan: Plan, commands: Mapping[str, Command], folder: Path
+) -> tuple[dict[str, Command], list[Finding]]:
     """Return the commands with profiles that move what they send on TF into a partition, and why that cannot be."""
     judged = judged_topics(plan)
     fenced: dict[str, Command] = {}
@@ -83,7 +108,11 @@ def by_partition(plan: Plan, commands: Mapping[str, Command], folder: Path) -> t
         if process.component:
             continue  # its writers are its container's
         reads = process.kind == "guard"
-        topics = [topic for pair in (sorted(judged) if reads else judged & {process.topics}) for topic in pair]
+        topics = [
+            topic
+            for pair in (sorted(judged) if reads else judged & {process.topics})
+            for topic in pair
+        ]
         if not topics:
             continue
         try:
@@ -96,7 +125,8 @@ def by_partition(plan: Plan, commands: Mapping[str, Command], folder: Path) -> t
         env = command.env | dict.fromkeys(PROFILE_VARIABLES, str(file))
         fenced[name] = replace(command, env=env, fence=(file, text))
     return {**commands, **fenced}, [
-        finding("TF902", f"{message}: {_all(names)}", None, help=advice) for (message, advice), names in wrong.items()
+        finding("TF902", f"{message}: {_all(names)}", None, help=advice)
+        for (message, advice), names in wrong.items()
     ]
 
 
@@ -116,8 +146,13 @@ def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) ->
         message = f"guard: strict needs full names of TF's topics, not {_all(moved)}, which has"
         raise _CannotFenceError(message, "write the remapping with a leading slash")
     if not is_fastdds(env):
-        message = f"guard: {{fence: partition}} needs rmw_fastrtps_cpp, and {env[RMW]} is what they are started with"
-        raise _CannotFenceError(message, f"let it fence off by remapping: leave fence out; or unset {RMW}")
+        message = (
+            f"guard: {{fence: partition}} needs rmw_fastrtps_cpp, and {env[RMW]} is what they are"
+            " started with"
+        )
+        raise _CannotFenceError(
+            message, f"let it fence off by remapping: leave fence out; or unset {RMW}"
+        )
     named = next((env[name] for name in PROFILE_VARIABLES if env.get(name)), None)
     file = command.folder / named if named else None
     partition = partition_of(plan)
@@ -125,7 +160,9 @@ def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) ->
         return with_partitions(file, "data_reader" if reads else "data_writer", topics, partition)
     except RosError as error:
         message = f"guard: strict cannot add its fence to the profile file {file}: {error}"
-        raise _CannotFenceError(message, "let it fence off by remapping: guard: {fence: remap}") from None
+        raise _CannotFenceError(
+            message, "let it fence off by remapping: guard: {fence: remap}"
+        ) from None
 
 
 def _refuse_own_profile(process: PlanProcess, command: Command) -> None:
@@ -134,9 +171,17 @@ def _refuse_own_profile(process: PlanProcess, command: Command) -> None:
     if found is None:
         return
     variable, file = found[1], (found["file"] or "").strip("\"'")
-    message = f"guard: strict cannot fence off a command that sets {variable} itself{f', to {file}' if file else ''}"
-    advice = f"name the file in the robot's file, and the fence is added to it: env: {{{variable}: {file or 'FILE'}}}"
-    raise _CannotFenceError(message, f"{advice}; or let it fence off by remapping: guard: {{fence: remap}}")
+    message = (
+        f"guard: strict cannot fence off a command that sets {variable}"
+        f" itself{f', to {file}' if file else ''}"
+    )
+    advice = (
+        f"name the file in the robot's file, and the fence is added to it: env: {{{variable}:"
+        f" {file or 'FILE'}}}"
+    )
+    raise _CannotFenceError(
+        message, f"{advice}; or let it fence off by remapping: guard: {{fence: remap}}"
+    )
 
 
 def _all(names: list[str]) -> str:

@@ -1,7 +1,8 @@
 """The launch file that ``ros2 launch`` runs: the user's, with the plan's settings for all of its nodes.
 
-The variable ``TFCOMPOSE_LAUNCH`` holds it as JSON: ``file``, ``arguments``, ``namespace``, ``remap``, ``sim_time``. The
-Python of ROS runs this file, and tfcompose need not be installed there.
+The variable ``TFCOMPOSE_LAUNCH`` holds it as JSON: ``file``, ``arguments``, ``namespace``,
+``remap``, ``sim_time``. The Python of ROS runs this file, and tfcompose need not be installed
+there.
 """
 
 from __future__ import annotations
@@ -23,5 +24,7 @@ def generate_launch_description() -> LaunchDescription:
     if given["sim_time"]:
         group.append(SetParameter("use_sim_time", value=True))
     source = AnyLaunchDescriptionSource(given["file"])
-    group.append(IncludeLaunchDescription(source, launch_arguments=list(given["arguments"].items())))
+    group.append(
+        IncludeLaunchDescription(source, launch_arguments=list(given["arguments"].items()))
+    )
     return LaunchDescription([GroupAction(group)])

@@ -1,10 +1,11 @@
 """What the launcher does next: a pure function of what is known, what happened, and the time.
 
-The guard is started first, after what it waits for itself, and listens; once it reports that nobody publishes a
-planned edge, the others follow in the plan's order, each when what it waits for is there. A guard that is switched
-off only reports which edges are live, and nothing waits for it. Whatever goes wrong, or is requested, everything is
-stopped: a process when all that wait for it are gone, the guard last of all. What the guard reports while everything
-stops is ignored, because an owner that is stopped falls silent.
+The guard is started first, after what it waits for itself, and listens; once it reports that
+nobody publishes a planned edge, the others follow in the plan's order, each when what it waits for
+is there. A guard that is switched off only reports which edges are live, and nothing waits for it.
+Whatever goes wrong, or is requested, everything is stopped: a process when all that wait for it
+are gone, the guard last of all. What the guard reports while everything stops is ignored, because
+an owner that is stopped falls silent.
 """
 
 from __future__ import annotations
@@ -13,8 +14,44 @@ from dataclasses import replace
 from signal import SIGKILL
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Note
-from tfcompose.ipc import (
+from tfcompose.foundation.findings import Note
+from tfcompose.launcher.components import component_answered, order_components
+from tfcompose.launcher.events import (
+    Begin,
+    Event,
+    Exited,
+    Kill,
+    LogMatched,
+    NewPlan,
+    Order,
+    Started,
+    StartFailed,
+)
+from tfcompose.launcher.failures import guard_hangs, never_clear, not_started
+from tfcompose.launcher.readiness import (
+    check_gates,
+    gate_of,
+    give_up_waiting,
+    late_at,
+    open_gate,
+    opens_at,
+    order_gate,
+    report_progress,
+    unmet,
+)
+from tfcompose.launcher.state import Stop, Transition, by_owner
+from tfcompose.launcher.stopping import (
+    backoff_s,
+    edge_taken,
+    firmer_at,
+    follow_plan,
+    process_exited,
+    process_requested,
+    refusal,
+    send_due_signals,
+    stop_if_requested,
+)
+from tfcompose.model.messages import (
     Absent,
     Alive,
     Clear,
@@ -40,38 +77,12 @@ from tfcompose.ipc import (
     Unloaded,
     Waiting,
 )
-from tfcompose.launcher.components import component_answered, order_components
-from tfcompose.launcher.events import Begin, Event, Exited, Kill, LogMatched, NewPlan, Order, Started, StartFailed
-from tfcompose.launcher.failures import guard_hangs, never_clear, not_started
-from tfcompose.launcher.readiness import (
-    check_gates,
-    gate_of,
-    give_up_waiting,
-    late_at,
-    open_gate,
-    opens_at,
-    order_gate,
-    report_progress,
-    unmet,
-)
-from tfcompose.launcher.state import Stop, Transition, by_owner
-from tfcompose.launcher.stopping import (
-    backoff_s,
-    edge_taken,
-    firmer_at,
-    follow_plan,
-    process_exited,
-    process_requested,
-    refusal,
-    send_due_signals,
-    stop_if_requested,
-)
 
 if TYPE_CHECKING:
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.events import Action
     from tfcompose.launcher.state import State, Tracked
-    from tfcompose.plan import Plan, PlanEdge
+    from tfcompose.model.plan import Plan, PlanEdge
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
@@ -130,7 +141,9 @@ def _requested_or_reported(step: Transition, event: Event) -> None:
             process_requested(step, event)
         case NewPlan():
             follow_plan(step, event)
-        case GateOpen(process, observed) | LogMatched(process, observed) if process in step.state.tracked:
+        case GateOpen(process, observed) | LogMatched(process, observed) if (
+            process in step.state.tracked
+        ):
             if gate_of(step.state.tracked[process].process) not in ("edges", "exit", "time"):
                 open_gate(step, process, observed)
         case GateShut(process, observed) if process in step.state.tracked:
@@ -276,9 +289,10 @@ def _noted(found: Finding, text: str) -> Finding:
     return replace(found, notes=(*found.notes, Note(text)))
 
 
-# A watchdog over the guard: one that hangs is ended, and started again like one that dies. It reports once a second
-# that it works. Where that does not come for long, the launcher itself may have been kept from running; so it waits
-# once more, with its own clock going, before it believes it.
+# A watchdog over the guard: one that hangs is ended, and started again like one that dies. It
+# reports once a second that it works. Where that does not come for long, the launcher itself may
+# have been kept from running; so it waits once more, with its own clock going, before it believes
+# it.
 
 
 def _expect_no_sign_of_life(step: Transition) -> None:
@@ -288,7 +302,11 @@ def _expect_no_sign_of_life(step: Transition) -> None:
 
 def _guard_due(state: State) -> float | None:
     """Return when the guard is overdue, or taken to hang; None if nothing is expected of it."""
-    if state.guard is None or state.guard_alive is None or state.tracked[state.guard].state != "running":
+    if (
+        state.guard is None
+        or state.guard_alive is None
+        or state.tracked[state.guard].state != "running"
+    ):
         return None
     if state.guard_overdue is None:
         return state.guard_alive + state.times.guard_silent_s
@@ -316,7 +334,11 @@ def _settle(step: Transition) -> None:
     state = step.state
     if state.begun is None:
         return
-    if state.stop is None and state.clear is None and step.now >= state.begun + state.times.clear_s:
+    if (
+        state.stop is None
+        and state.clear is None
+        and step.now >= state.begun + state.times.clear_s
+    ):
         step.fail(never_clear(state.guard or "guard", state.times.clear_s))
     if step.state.stop is None:
         _go_on(step)
@@ -344,9 +366,17 @@ def _go_on(step: Transition) -> None:
     if due is not None and step.now >= due:
         missing = step.state.awaited
         step.update(reminded_of=frozenset(edge.child for edge in missing), reminded=step.now)
-        step.notify(Waiting(tuple(_missing(step.state.plan, owner, edges) for owner, edges in by_owner(missing))))
+        step.notify(
+            Waiting(
+                tuple(
+                    _missing(step.state.plan, owner, edges) for owner, edges in by_owner(missing)
+                )
+            )
+        )
     tracked = step.state.tracked.values()
-    if step.state.stop is None and all(one.failed or one.state in ("exited", "expected") for one in tracked):
+    if step.state.stop is None and all(
+        one.failed or one.state in ("exited", "expected") for one in tracked
+    ):
         step.finish(1 if step.state.given_up else 0)
 
 
@@ -366,4 +396,6 @@ def _reminder_due(state: State) -> float | None:
 
 
 def _missing(plan: Plan, owner: str, edges: tuple[PlanEdge, ...]) -> Missing:
-    return Missing(owner, edges[0].node, tuple(edge.name for edge in edges), len(plan.edges_of(owner)))
+    return Missing(
+        owner, edges[0].node, tuple(edge.name for edge in edges), len(plan.edges_of(owner))
+    )

@@ -1,10 +1,12 @@
 """Where the launcher's notices and the output of processes go: to a person, to the control socket, and into files.
 
-The robot does not wait for its reader: a terminal that was stopped, a pipe to a pager. What cannot be written at once
-is kept, up to a limit; beyond it, lines of processes are left out and counted, and they are in the logs.
+The robot does not wait for its reader: a terminal that was stopped, a pipe to a pager. What cannot
+be written at once is kept, up to a limit; beyond it, lines of processes are left out and counted,
+and they are in the logs.
 
-A log is one file for each process, ``TIME TEXT`` a line, rotated when it is full. The times are local, with
-milliseconds and zone, so that lines of several files can be merged. A disk that is full costs lines, and stops nobody.
+A log is one file for each process, ``TIME TEXT`` a line, rotated when it is full. The times are
+local, with milliseconds and zone, so that lines of several files can be merged. A disk that is
+full costs lines, and stops nobody.
 """
 
 from __future__ import annotations
@@ -21,15 +23,15 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
-from tfcompose.ipc import LogLine, notice_line
 from tfcompose.launcher.control import Control
+from tfcompose.model.messages import LogLine, notice_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
     from socket import socket
 
-    from tfcompose.ipc import Notice, Request
+    from tfcompose.model.messages import Notice, Request
 
 
 #: So much is kept for a slow reader; what the launcher itself says may take as much again; bytes.
@@ -64,7 +66,8 @@ class NonBlockingOutput:
             return
         if self.left_out and not self._owed:
             self._owed += (
-                f"… {self.left_out} lines are left out here: they came too fast, and are in the logs\n".encode()
+                f"… {self.left_out} lines are left out here: they came too fast, and are in the"
+                " logs\n".encode()
             )
             self._announced, self.left_out = self.left_out, 0
         self._owed += text.encode(errors="backslashreplace")
@@ -113,8 +116,8 @@ class NonBlockingOutput:
 def _not_waiting(fd: int) -> tuple[int, bool]:
     """Return a descriptor for the same thing that never waits, and whether it is one.
 
-    The flag belongs to what was opened, which others share; so pipes and terminals are opened once more. Regular files
-    never wait.
+    The flag belongs to what was opened, which others share; so pipes and terminals are opened once
+    more. Regular files never wait.
     """
     kind = os.fstat(fd).st_mode
     if stat.S_ISREG(kind):
@@ -172,7 +175,9 @@ class Notifier:
             return
         if output.owes:
             self._owing = output.fd
-            self._selector.register(output.fd, selectors.EVENT_WRITE, lambda: self._try(output.push))
+            self._selector.register(
+                output.fd, selectors.EVENT_WRITE, lambda: self._try(output.push)
+            )
         elif self._owing is not None:
             self._selector.unregister(self._owing)
             self._owing = None
@@ -262,7 +267,10 @@ class Logs:
         if second != self._second:
             local = time.localtime(second)
             zone = time.strftime("%z", local)
-            self._second, self._stamp = second, (time.strftime("%Y-%m-%dT%H:%M:%S", local), f"{zone[:3]}:{zone[3:]}")
+            self._second, self._stamp = (
+                second,
+                (time.strftime("%Y-%m-%dT%H:%M:%S", local), f"{zone[:3]}:{zone[3:]}"),
+            )
         return f"{self._stamp[0]}.{int(now * 1000) % 1000:03d}{self._stamp[1]}"
 
 
@@ -291,7 +299,9 @@ def _ensure_kept(folder: Path) -> None:
 
 def logged(folder: Path) -> list[str]:
     """Return the names of the processes that have a log, the launcher's among them."""
-    return sorted(file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log"))
+    return sorted(
+        file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log")
+    )
 
 
 def last_modified(folder: Path) -> float:
@@ -308,7 +318,10 @@ def read_logs(folder: Path, names: list[str]) -> Iterator[tuple[str, str, str]]:
 
 
 def _lines(folder: Path, name: str) -> Iterator[tuple[str, str, str]]:
-    for file in [*(folder / f"{name}.log.{number}" for number in range(KEPT_FILES, 0, -1)), folder / f"{name}.log"]:
+    for file in [
+        *(folder / f"{name}.log.{number}" for number in range(KEPT_FILES, 0, -1)),
+        folder / f"{name}.log",
+    ]:
         with (
             contextlib.suppress(FileNotFoundError),
             file.open(encoding="utf-8", errors="replace", newline="\n") as lines,

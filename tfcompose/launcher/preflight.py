@@ -1,9 +1,10 @@
 """Before anything is started: the command of each process, and all that cannot work on this machine, at once.
 
-What only the starting machine knows stands in a plan as a placeholder, ``tfcompose.plan`` lists them. A ROS package's
-program, ``${executable:PACKAGE/NAME}``, is ``lib/PACKAGE/NAME`` below one of the prefixes of AMENT_PREFIX_PATH, else
-NAME on the PATH. A launch file, ``${launch:PACKAGE/FILE}``, is FILE in PACKAGE's share folder, anywhere below it, or
-at the path that is written; it is started as one process, ``ros2 launch`` of a wrapper around it.
+What only the starting machine knows stands in a plan as a placeholder, ``tfcompose.model.plan``
+lists them. A ROS package's program, ``${executable:PACKAGE/NAME}``, is ``lib/PACKAGE/NAME`` below
+one of the prefixes of AMENT_PREFIX_PATH, else NAME on the PATH. A launch file,
+``${launch:PACKAGE/FILE}``, is FILE in PACKAGE's share folder, anywhere below it, or at the path
+that is written; it is started as one process, ``ros2 launch`` of a wrapper around it.
 """
 
 from __future__ import annotations
@@ -18,19 +19,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from tfcompose.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
 from tfcompose.launcher.schedule import refused_schedule
-from tfcompose.plan.components import load_request
-from tfcompose.plan.fleet import missing_zenoh
-from tfcompose.ros.environment import missing_composition
-from tfcompose.variables import REMAPPED
+from tfcompose.model.plan.components import load_request
+from tfcompose.model.plan.fleet import missing_zenoh
+from tfcompose.model.variables import REMAPPED
+from tfcompose.tf.ros.environment import missing_composition
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.plan import Plan, PlanProcess, RosSettings
+    from tfcompose.model.plan import Plan, PlanProcess, RosSettings
 
 _PLACEHOLDER = re.compile(r"\$\{(python|plan|build_dir|params_file)\}")
 _ROS_EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
@@ -91,7 +92,9 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
         commands, wrong = by_partition(plan, commands, plan_file.absolute().parent)
         found += wrong
     elif way == "remap":
-        commands = {name: _with_remapping_mark(plan, name, command) for name, command in commands.items()}
+        commands = {
+            name: _with_remapping_mark(plan, name, command) for name, command in commands.items()
+        }
     if missing:
         found.append(not_found(missing))
     return commands, list(dict.fromkeys(found))
@@ -116,14 +119,24 @@ def _command_of(
     if not own and not folder.is_dir():
         lost = f"the folder {folder} that {process.name} runs in does not exist"
         optional = process.required is False
-        return Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)
+        return (
+            Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)
+        )
     command: Command | NotFound | Finding
     if _is_launch(argv[0]):
         launched = _launch_command(process, ros, argv, env)
-        command = Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
+        command = (
+            Command(launched[0], env | launched[1], folder)
+            if isinstance(launched, tuple)
+            else launched
+        )
     else:
         program = executable_of(process, argv[0], folder, env)
-        command = program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+        command = (
+            program
+            if isinstance(program, NotFound)
+            else Command((program, *argv[1:]), env, folder, own)
+        )
     if isinstance(command, Command):
         command = replace(command, emulate_tty=process.emulate_tty)
     if isinstance(command, Command) and process.prefix:
@@ -151,11 +164,19 @@ def _never_started(plan: Plan) -> list[Finding]:
     for process in plan.processes:
         for name, what in process.after.items():
             if name not in known:
-                found.append(finding("TF902", f"{process.name} waits for {name}, which is not in the plan", None))
+                found.append(
+                    finding(
+                        "TF902", f"{process.name} waits for {name}, which is not in the plan", None
+                    )
+                )
             elif what not in _promises(known[name]):
                 message = f"{process.name} waits until {name} is {what}, which never happens"
                 found.append(finding("TF902", message, None))
-    waiting = {process.name: set(process.after) & set(known) for process in plan.processes if process.kind != "guard"}
+    waiting = {
+        process.name: set(process.after) & set(known)
+        for process in plan.processes
+        if process.kind != "guard"
+    }
     while free := [name for name, others in waiting.items() if not others & set(waiting)]:
         for name in free:
             del waiting[name]
@@ -170,7 +191,9 @@ def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]
     if not names:
         return []
     if not any(process.kind == "guard" for process in plan.processes):
-        return [finding("TF902", f"the plan has no guard, which would load {', '.join(names)}", None)]
+        return [
+            finding("TF902", f"the plan has no guard, which would load {', '.join(names)}", None)
+        ]
     trouble = missing_composition()
     return [trouble] if trouble else []
 
@@ -197,18 +220,30 @@ def _here() -> Path:
         return Path(str(Path("/proc/self/cwd").readlink()).removesuffix(" (deleted)"))
 
 
-def filled_in(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> tuple[str, ...]:
+def filled_in(
+    process: PlanProcess, plan_file: Path, build_dir: Path | None = None
+) -> tuple[str, ...]:
     """Return the process's ``argv`` with the placeholders replaced; both paths are absolute."""
     return tuple(_filled(word, process, plan_file, build_dir) for word in process.argv)
 
 
-def own_env(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> dict[str, str]:
+def own_env(
+    process: PlanProcess, plan_file: Path, build_dir: Path | None = None
+) -> dict[str, str]:
     """Return the variables that the plan gives the process, with the placeholders replaced."""
-    return {name: _filled(value, process, plan_file, build_dir) for name, value in process.env.items()}
+    return {
+        name: _filled(value, process, plan_file, build_dir) for name, value in process.env.items()
+    }
 
 
-def _filled(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> str:
-    values = {"python": sys.executable, "plan": str(plan_file), "build_dir": str(build_dir or plan_file.parent)}
+def _filled(
+    text: str, process: PlanProcess, plan_file: Path, build_dir: Path | None = None
+) -> str:
+    values = {
+        "python": sys.executable,
+        "plan": str(plan_file),
+        "build_dir": str(build_dir or plan_file.parent),
+    }
     if process.params_file is not None:
         values["params_file"] = str(plan_file.parent / process.params_file)
     return _PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), text)
@@ -234,10 +269,18 @@ def not_found(missing: Sequence[NotFound]) -> Finding:
     places = dict.fromkeys(place for one in missing for place in one.places)
     paths = ["looked in the folders of PATH"] if any(one.path for one in missing) else []
     advice = dict.fromkeys(one.advice for one in missing if one.advice)
-    return finding("TF810", message, None, notes=[Note(note) for note in (*places, *paths)], help="; ".join(advice))
+    return finding(
+        "TF810",
+        message,
+        None,
+        notes=[Note(note) for note in (*places, *paths)],
+        help="; ".join(advice),
+    )
 
 
-def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[str, str]) -> str | NotFound:
+def executable_of(
+    process: PlanProcess, word: str, folder: Path, env: Mapping[str, str]
+) -> str | NotFound:
     """Return the path of the program that ``word`` means, or what is missing.
 
     A relative path is looked up in ``folder``, a bare name on the PATH of ``env``.
@@ -250,15 +293,24 @@ def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[st
         if _can_run(path):
             return str(path)
         advice = (
-            "" if word.startswith("/") else f"${{file({word})}} is relative to the robot file, wherever up is called"
+            ""
+            if word.startswith("/")
+            else f"${{file({word})}} is relative to the robot file, wherever up is called"
         )
         return NotFound(process.name, word, (_why_not(path),), advice=advice)
     path_variable = env.get("PATH", os.defpath)
-    advice = f"install {word}, or write its path; a node of a package is run: {{package: …, executable: {word}}}"
-    return shutil.which(word, path=path_variable) or NotFound(process.name, word, (), path_variable, advice)
+    advice = (
+        f"install {word}, or write its path; a node of a package is run: {{package: …, executable:"
+        f" {word}}}"
+    )
+    return shutil.which(word, path=path_variable) or NotFound(
+        process.name, word, (), path_variable, advice
+    )
 
 
-def _in_package(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> str | NotFound:
+def _in_package(
+    process: PlanProcess, package: str, name: str, env: Mapping[str, str]
+) -> str | NotFound:
     prefixes = [prefix for prefix in env.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
     folders = [Path(prefix) / "lib" / package for prefix in prefixes]
     for folder in folders:
@@ -268,12 +320,18 @@ def _in_package(process: PlanProcess, package: str, name: str, env: Mapping[str,
     on_path = shutil.which(name, path=path_variable)
     if on_path:
         return on_path
-    notes = [_why_not(folder / name) for folder in folders] or ["AMENT_PREFIX_PATH names no folder"]
-    known = [file.name for folder in folders if folder.is_dir() for file in sorted(folder.iterdir())]
+    notes = [_why_not(folder / name) for folder in folders] or [
+        "AMENT_PREFIX_PATH names no folder"
+    ]
+    known = [
+        file.name for folder in folders if folder.is_dir() for file in sorted(folder.iterdir())
+    ]
     otherwise = "source the setup file of your ROS installation first"
     if prefixes:
         debian = f"ros-{env.get('ROS_DISTRO', 'jazzy')}-{package.replace('_', '-')}"
-        otherwise = f"install the package {package} (on Ubuntu probably: sudo apt install {debian})"
+        otherwise = (
+            f"install the package {package} (on Ubuntu probably: sudo apt install {debian})"
+        )
     advice = did_you_mean(name, known, "" if known else otherwise)
     return NotFound(process.name, f"{package}/{name}", tuple(notes), path_variable, advice)
 
@@ -305,7 +363,10 @@ def _launch_command(
     path = env.get("PATH", os.defpath)
     ros2 = shutil.which("ros2", path=path)
     if ros2 is None:
-        advice = "source the setup file of your ROS installation first; ros2 launch comes with the package ros2launch"
+        advice = (
+            "source the setup file of your ROS installation first; ros2 launch comes with the"
+            " package ros2launch"
+        )
         return NotFound(process.name, f"ros2 (for launch {package}/{name})", (), path, advice)
     file = _find_launch_file(process, package, name, env)
     if isinstance(file, NotFound):
@@ -327,7 +388,9 @@ def _launch_command(
     return (ros2, "launch", "--noninteractive", str(_WRAPPER)), more
 
 
-def _find_launch_file(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> Path | NotFound:
+def _find_launch_file(
+    process: PlanProcess, package: str, name: str, env: Mapping[str, str]
+) -> Path | NotFound:
     prefixes = [prefix for prefix in env.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
     shares = [Path(prefix) / "share" / package for prefix in prefixes]
     present = [share for share in shares if share.is_dir()]
@@ -336,8 +399,12 @@ def _find_launch_file(process: PlanProcess, package: str, name: str, env: Mappin
         found = direct or sorted(share.rglob(name))
         if found:
             return found[0]
-    known = sorted({file.name for share in present for kind in _KINDS for file in share.rglob(kind)})
-    notes = tuple(f"{share} {'has no ' + name if share in present else 'is not there'}" for share in shares)
+    known = sorted(
+        {file.name for share in present for kind in _KINDS for file in share.rglob(kind)}
+    )
+    notes = tuple(
+        f"{share} {'has no ' + name if share in present else 'is not there'}" for share in shares
+    )
     listed = f"it has {', '.join(known[:12])}" if known else f"install the package {package}"
     return NotFound(
         process.name,

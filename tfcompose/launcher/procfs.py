@@ -1,7 +1,8 @@
 """The kernel's processes: who descends from whom, what a run left behind, and what groups of them use.
 
-They are read from /proc, not with psutil: a process differs from a later one of the same number by when it began, in
-clock ticks since the machine's start, which holds in every process and whatever is done to the system's clock.
+They are read from /proc, not with psutil: a process differs from a later one of the same number by
+when it began, in clock ticks since the machine's start, which holds in every process and whatever
+is done to the system's clock.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.variables import LAUNCHER, PROCESS, RUN_ID
+from tfcompose.model.variables import LAUNCHER, PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -38,7 +39,12 @@ def _stat(pid: int | str) -> list[str]:
     Raises:
         OSError: if the process has ended.
     """
-    return (PROC / str(pid) / "stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+    return (
+        (PROC / str(pid) / "stat")
+        .read_text(encoding="utf-8", errors="replace")
+        .rpartition(")")[2]
+        .split()
+    )
 
 
 def began(pid: int | str) -> int:
@@ -76,16 +82,17 @@ def descendants(ancestor: int, but: int) -> dict[int, int]:
     return found
 
 
-# What a run left behind: processes with the run's id in their environment, and a launcher's descendants. Both find
-# also what left its group and session; the first also where the launcher was killed.
+# What a run left behind: processes with the run's id in their environment, and a launcher's
+# descendants. Both find also what left its group and session; the first also where the launcher
+# was killed.
 
 
 @dataclass(frozen=True, slots=True)
 class Leftover:
     """A process that a run started: its number, its run's id, its command, and when it began (clock ticks).
 
-    ``launcher`` is the number of the run's launcher if that one still runs: then nothing was left behind. ``process``
-    is the plan's process that started it, as far as its environment names one.
+    ``launcher`` is the number of the run's launcher if that one still runs: then nothing was left
+    behind. ``process`` is the plan's process that started it, as far as its environment names one.
     """
 
     pid: int
@@ -156,7 +163,14 @@ def _marked(pid: int, run: str) -> Leftover | None:
     env = environment_of(pid)
     if not env.get(RUN_ID, "").startswith(run):
         return None
-    return Leftover(pid, env[RUN_ID], _command(pid), began(pid), _launcher(env.get(LAUNCHER, "")), env.get(PROCESS, ""))
+    return Leftover(
+        pid,
+        env[RUN_ID],
+        _command(pid),
+        began(pid),
+        _launcher(env.get(LAUNCHER, "")),
+        env.get(PROCESS, ""),
+    )
 
 
 def _command(pid: int) -> str:
@@ -212,7 +226,8 @@ class UsageMeter:
     def usage(self, groups: Collection[int]) -> dict[int, tuple[float, int]]:
         """Return (cores, bytes) for each group that has processes; the memory is proportional.
 
-        The cores are those since the last call; a process that began since then counts from the next one on.
+        The cores are those since the last call; a process that began since then counts from the
+        next one on.
         """
         at, before = self._at, self._ticks
         members = self.begin(groups)

@@ -1,7 +1,7 @@
 """When a process may start and when it is ready: what it waits for, and what is reported of one that is late.
 
-A process waits for others, as the plan's ``after`` says, before it is started; and for its own gate to open before it
-counts as ready.
+A process waits for others, as the plan's ``after`` says, before it is started; and for its own
+gate to open before it counts as ready.
 """
 
 from __future__ import annotations
@@ -9,16 +9,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, cast
 
-from tfcompose.findings import Note, finding
-from tfcompose.ipc import AllReady, AllStarted, Gate, ProcessReady, StartRow
+from tfcompose.foundation.findings import Note, finding
+from tfcompose.foundation.text import listed
 from tfcompose.launcher.events import NotifyLate, Order
 from tfcompose.launcher.failures import waits_in_vain
-from tfcompose.text import listed
+from tfcompose.model.messages import AllReady, AllStarted, Gate, ProcessReady, StartRow
 
 if TYPE_CHECKING:
-    from tfcompose.findings import Finding
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.state import State, Tracked, Transition
-    from tfcompose.plan import LifecycleState, PlanProcess, ReadyKind, StartCondition
+    from tfcompose.model.plan import LifecycleState, PlanProcess, ReadyKind, StartCondition
 
 #: Gates that the guard watches.
 _GUARDED = ("edges", "topic", "service", "lifecycle")
@@ -31,7 +31,11 @@ _NAMED_AT_MOST = 4
 
 def unmet(state: State, one: Tracked) -> tuple[tuple[str, StartCondition], ...]:
     """Return the processes that this one still waits for, each with what it is to be."""
-    return tuple((name, what) for name, what in one.process.after.items() if not _is_met(state.tracked[name], what))
+    return tuple(
+        (name, what)
+        for name, what in one.process.after.items()
+        if not _is_met(state.tracked[name], what)
+    )
 
 
 def unmet_in_words(state: State, one: Tracked) -> str:
@@ -82,14 +86,18 @@ def order_gate(step: Transition, one: Tracked) -> None:
     process, kind = one.process, gate_of(one.process)
     ready = process.ready
     by_edges = kind == "edges" and ready is not None
-    if step.state.guard is None or not (process.lifecycle or by_edges or kind in ("topic", "service", "lifecycle")):
+    if step.state.guard is None or not (
+        process.lifecycle or by_edges or kind in ("topic", "service", "lifecycle")
+    ):
         return
     nodes, text = process.lifecycle, ready.text if ready else ""
     if kind == "lifecycle" and not nodes:
         nodes = dict.fromkeys(process.nodes, cast("LifecycleState", text))
     topic, service = (text if kind == name else "" for name in ("topic", "service"))
     writers = process.topics if by_edges else ()
-    gate = Gate(process.name, topic, service, dict(nodes), drive=bool(process.lifecycle), writers=writers)
+    gate = Gate(
+        process.name, topic, service, dict(nodes), drive=bool(process.lifecycle), writers=writers
+    )
     step.actions.append(Order(gate))
 
 
@@ -111,9 +119,16 @@ def check_gates(step: Transition) -> None:
         if one.ready or not _is_awaited(one):
             continue
         kind, ready = gate_of(one.process), one.process.ready
-        if one.state != "starting" and (kind == "started" or (kind in _GUARDED and step.state.guard is None)):
+        if one.state != "starting" and (
+            kind == "started" or (kind in _GUARDED and step.state.guard is None)
+        ):
             open_gate(step, name, "started")
-        elif kind == "time" and ready and one.state != "starting" and step.now >= one.began + ready.number:
+        elif (
+            kind == "time"
+            and ready
+            and one.state != "starting"
+            and step.now >= one.began + ready.number
+        ):
             open_gate(step, name, f"{ready.number:g} s have passed")
         elif not one.late and (due := late_at(step.state, one)) is not None and step.now >= due:
             step.track(name, replace(one, late=True))
@@ -127,7 +142,9 @@ def late_at(state: State, one: Tracked) -> float | None:
     if one.ready or one.late or not _is_awaited(one):
         return None
     ready = one.process.ready
-    if one.state != "starting" and (not has_own_gate(one.process) or (ready and ready.kind == "time")):
+    if one.state != "starting" and (
+        not has_own_gate(one.process) or (ready and ready.kind == "time")
+    ):
         return None
     timeout_s = ready.timeout_s if ready else None
     return one.began + (state.times.ready_s if timeout_s is None else timeout_s)
@@ -135,19 +152,28 @@ def late_at(state: State, one: Tracked) -> float | None:
 
 def _is_awaited(one: Tracked) -> bool:
     """Return whether it is expected to become ready by itself; of a component, whether its container was asked."""
-    return one.state in ("running", "expected") or (one.state == "starting" and one.process.component is not None)
+    return one.state in ("running", "expected") or (
+        one.state == "starting" and one.process.component is not None
+    )
 
 
 def opens_at(one: Tracked) -> float | None:
     """Return when a gate opens by itself."""
     ready = one.process.ready
-    waits = not one.ready and one.state in ("running", "expected") and ready and ready.kind == "time"
+    waits = (
+        not one.ready and one.state in ("running", "expected") and ready and ready.kind == "time"
+    )
     return one.began + ready.number if waits and ready else None
 
 
 def waits_for(state: State, one: Tracked) -> str:
     """Return what a process is still without, in words; "" if it is ready, or is not to run."""
-    if one.state == "stopped" and one.wanted and not one.failed and (others := unmet_in_words(state, one)):
+    if (
+        one.state == "stopped"
+        and one.wanted
+        and not one.failed
+        and (others := unmet_in_words(state, one))
+    ):
         return f"waits for {others}"
     if one.ready or not _is_awaited(one):
         return ""
@@ -155,7 +181,9 @@ def waits_for(state: State, one: Tracked) -> str:
         return f"{one.process.component.container} has not answered"
     ready = one.process.ready
     text = ready.text if ready else ""
-    missing = [edge.name for edge in state.plan.edges_of(one.process.name) if edge.child not in state.live]
+    missing = [
+        edge.name for edge in state.plan.edges_of(one.process.name) if edge.child not in state.live
+    ]
     return {
         "topic": f"nobody publishes {text}",
         "service": f"there is no service {text}",
@@ -192,11 +220,17 @@ def report_progress(step: Transition) -> None:
 
 def _report_started(step: Transition) -> None:
     state = step.state
-    if state.all_started or state.clear is None or any(one.state == "starting" for one in state.tracked.values()):
+    if (
+        state.all_started
+        or state.clear is None
+        or any(one.state == "starting" for one in state.tracked.values())
+    ):
         return
     step.update(all_started=True)
     waiting = tuple(
-        name for name, one in state.tracked.items() if one.state == "stopped" and one.wanted and not one.failed
+        name
+        for name, one in state.tracked.items()
+        if one.state == "stopped" and one.wanted and not one.failed
     )
     started = sum(one.order > 0 for one in state.tracked.values())
     step.notify(AllStarted(started, waiting, step.since_begin))

@@ -1,9 +1,9 @@
 """The runtime directory of a robot: a folder that only the user can open, with a lock, a control socket and the plan.
 
-A robot is one name in one ROS domain; a host's share of it has the host in its name.
-Its folder is in XDG_RUNTIME_DIR, or else in ``/run/user/UID``, or else in ``tfcompose-UID`` below the folder for
-temporary files. Logs outlive the run: they are in ROS's folder for logs (ROS_LOG_DIR, else ROS_HOME/log, else
-~/.ros/log), in ``tfcompose/ROBOT@DOMAIN``.
+A robot is one name in one ROS domain; a host's share of it has the host in its name. Its folder is
+in XDG_RUNTIME_DIR, or else in ``/run/user/UID``, or else in ``tfcompose-UID`` below the folder for
+temporary files. Logs outlive the run: they are in ROS's folder for logs (ROS_LOG_DIR, else
+ROS_HOME/log, else ~/.ros/log), in ``tfcompose/ROBOT@DOMAIN``.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.plan.codec import decode, encode
+from tfcompose.model.plan.codec import decode, encode
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.plan import Plan
+    from tfcompose.model.plan import Plan
 
-#: Where systemd makes a folder for each user who is logged in, also for services and cron, which lack the variable.
+#: Where systemd makes a folder for each user who is logged in, also for services and cron, which
+#: lack the variable.
 USERS = Path("/run/user")
 #: How the folder of a plan's copy begins.
 _PLAN = "plan-"
@@ -173,7 +174,11 @@ def runtime_dirs(env: Mapping[str, str]) -> list[RuntimeDir]:
         RuntimeDirError: if there is no folder that only this user can open.
     """
     base = _runtime_folder(env)
-    return [_dir(folder.name, base, env) for folder in sorted(base.iterdir()) if (folder / "lock").is_file()]
+    return [
+        _dir(folder.name, base, env)
+        for folder in sorted(base.iterdir())
+        if (folder / "lock").is_file()
+    ]
 
 
 def log_folder(env: Mapping[str, str]) -> Path:
@@ -198,7 +203,9 @@ def _runtime_folder(env: Mapping[str, str]) -> Path:
     except OSError as error:
         raise RuntimeDirError(f"{folder} cannot be made: {error.strerror}") from None
     if not _is_ours(folder):
-        raise RuntimeDirError(f"{folder} is not a folder that only this user can open; set XDG_RUNTIME_DIR to one")
+        raise RuntimeDirError(
+            f"{folder} is not a folder that only this user can open; set XDG_RUNTIME_DIR to one"
+        )
     return folder
 
 
@@ -207,4 +214,6 @@ def _is_ours(folder: Path) -> bool:
         found = folder.lstat()
     except OSError:
         return False
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+    return (
+        stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+    )

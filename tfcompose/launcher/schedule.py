@@ -6,10 +6,10 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Finding, finding
+from tfcompose.foundation.findings import Finding, finding
 
 if TYPE_CHECKING:
-    from tfcompose.plan import PlanProcess, Schedule, SchedulingPolicy
+    from tfcompose.model.plan import PlanProcess, Schedule, SchedulingPolicy
 
 _POLICIES: dict[SchedulingPolicy, int] = {
     "other": os.SCHED_OTHER,
@@ -42,9 +42,13 @@ def refused_schedule(process: PlanProcess) -> Finding | None:
             lacking = set(schedule.cpus) - thread.submit(_cpus_with, schedule).result()
     except PermissionError:
         message = (
-            f"this user may not start {process.name} with policy {schedule.policy} and priority {schedule.priority}"
+            f"this user may not start {process.name} with policy {schedule.policy} and priority"
+            f" {schedule.priority}"
         )
-        advice = "rtprio in /etc/security/limits.conf, LimitRTPRIO= in a systemd unit, or the capability CAP_SYS_NICE"
+        advice = (
+            "rtprio in /etc/security/limits.conf, LimitRTPRIO= in a systemd unit, or the"
+            " capability CAP_SYS_NICE"
+        )
         return finding("TF911", message, None, help=advice)
     except (OSError, ValueError, OverflowError):
         lacking = set(schedule.cpus)

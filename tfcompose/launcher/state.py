@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.ipc import (
+from tfcompose.launcher.events import Action, Finish, LoadComponent, Notify, Order, Start
+from tfcompose.model.messages import (
     Ended,
     FindingShown,
     Notice,
@@ -17,12 +18,11 @@ from tfcompose.ipc import (
     StateName,
     Stopping,
 )
-from tfcompose.launcher.events import Action, Finish, LoadComponent, Notify, Order, Start
-from tfcompose.variables import SETTLE
+from tfcompose.model.variables import SETTLE
 
 if TYPE_CHECKING:
-    from tfcompose.findings import Finding
-    from tfcompose.plan import Plan, PlanEdge, PlanProcess
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.plan import Plan, PlanEdge, PlanProcess
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,8 @@ class Times:
     """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
 
 
-#: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE ended.
+#: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE
+#: ended.
 UNREAD = 141
 
 
@@ -61,12 +62,13 @@ UNREAD = 141
 class Tracked:
     """One process. ``since`` is when it came into its state, or when it was sent its last signal.
 
-    ``order`` counts the starts of all processes, 0 for one that was never started; ``failures`` the short runs in a
-    row; ``restarts`` all starts but the first; ``level`` how often it was ordered to stop, each time more firmly.
-    ``leaving`` says what follows once it has stopped: "stop" and it stays so, "again" and it is started, "drop" and it
-    is forgotten. ``observed`` is what its gate found last, ``late`` whether that was reported. ``detail`` says why it
-    is in its state. ``failed`` is what was reported when the run went on without it: the finding and the end of its
-    log.
+    ``order`` counts the starts of all processes, 0 for one that was never started; ``failures``
+    the short runs in a row; ``restarts`` all starts but the first; ``level`` how often it was
+    ordered to stop, each time more firmly. ``leaving`` says what follows once it has stopped:
+    "stop" and it stays so, "again" and it is started, "drop" and it is forgotten. ``observed`` is
+    what its gate found last, ``late`` whether that was reported. ``detail`` says why it is in its
+    state. ``failed`` is what was reported when the run went on without it: the finding and the end
+    of its log.
     """
 
     process: PlanProcess
@@ -112,11 +114,12 @@ class Stop:
 class State:
     """Everything that is known about a running plan.
 
-    ``clear`` is when the guard reported that no edge of the plan is published yet. ``live`` holds the children of
-    the edges that were received, ``silent`` those that come no more. ``reported`` are the codes of the errors that were
-    shown, ``reminded_of`` the missing edges that were named last. ``replanned`` is when another plan came, if one did.
-    ``memory`` is what the guard wants the next one to know; ``unwatched`` is since when it is dead, if it is;
-    ``guard_alive`` when it last reported that it works, and ``guard_overdue`` since when that is missed.
+    ``clear`` is when the guard reported that no edge of the plan is published yet. ``live`` holds
+    the children of the edges that were received, ``silent`` those that come no more. ``reported``
+    are the codes of the errors that were shown, ``reminded_of`` the missing edges that were named
+    last. ``replanned`` is when another plan came, if one did. ``memory`` is what the guard wants
+    the next one to know; ``unwatched`` is since when it is dead, if it is; ``guard_alive`` when it
+    last reported that it works, and ``guard_overdue`` since when that is missed.
     """
 
     plan: Plan
@@ -145,7 +148,11 @@ class State:
     @property
     def missing(self) -> tuple[PlanEdge, ...]:
         """The edges that were not received yet; none where there is no guard."""
-        return () if self.guard is None else tuple(edge for edge in self.plan.edges if edge.child not in self.live)
+        return (
+            ()
+            if self.guard is None
+            else tuple(edge for edge in self.plan.edges if edge.child not in self.live)
+        )
 
     @property
     def awaited(self) -> tuple[PlanEdge, ...]:
@@ -171,7 +178,8 @@ def initial(plan: Plan, times: Times | None = None) -> State:
     processes = plan.processes
     guards = [process.name for process in processes if process.kind == "guard"]
     tracked = {
-        process.name: Tracked(process, "expected" if process.kind == "external" else "stopped") for process in processes
+        process.name: Tracked(process, "expected" if process.kind == "external" else "stopped")
+        for process in processes
     }
     times = times or Times()
     settle_s = sum(float(tracked[name].process.env.get(SETTLE, 0)) for name in guards)
@@ -210,11 +218,14 @@ class Transition:
         """Tell the person."""
         self.actions.append(Notify(notice))
 
-    def enter(self, name: str, state: StateName, detail: str = "", **changes: float | None) -> None:
+    def enter(
+        self, name: str, state: StateName, detail: str = "", **changes: float | None
+    ) -> None:
         """Put the process into the state, since now, and notify."""
         pid = changes.pop("pid", None)
         before = self.state.tracked[name]
-        one = replace(before, state=state, since=self.now, pid=pid, detail=detail, failed=(), **changes)  # type: ignore[arg-type]
+        entered = replace(before, state=state, since=self.now, detail=detail, failed=())
+        one = replace(entered, pid=pid, **changes)  # type: ignore[arg-type]
         self.track(name, one)
         self.notify(ProcessState(name, state, one.pid, detail))
 
@@ -225,7 +236,9 @@ class Transition:
         again = before.order > 0
         component = before.process.component
         began = self.now if component else before.began
-        self.enter(name, "starting", order=order, level=0, restarts=before.restarts + again, began=began)
+        self.enter(
+            name, "starting", order=order, level=0, restarts=before.restarts + again, began=began
+        )
         if again and before.process.owns and self.state.guard not in (None, name):
             self.actions.append(Order(Present(name)))
         self.actions.append(LoadComponent(name, order) if component else Start(name))
@@ -242,9 +255,14 @@ class Transition:
         if one.process.required is not False:
             self.fail(found)
         elif self.state.stop is None:
-            advice = f"the rest goes on without it: required is false; tfcompose start {name} tries again"
+            advice = (
+                f"the rest goes on without it: required is false; tfcompose start {name} tries"
+                " again"
+            )
             self.report(replace(found, severity="warning", help=advice))
-            self.track(name, replace(one, failed=(found.message, *(note.message for note in found.notes))))
+            self.track(
+                name, replace(one, failed=(found.message, *(note.message for note in found.notes)))
+            )
 
     def fail(self, found: Finding) -> None:
         """Report the finding and stop everything; once that is under way, further failures follow from it."""
@@ -267,6 +285,8 @@ class Transition:
         """End: nothing runs any more."""
         self.update(finished=True)
         failed = [one for one in self.state.tracked.values() if one.failed]
-        failed.sort(key=lambda one: (one.order == 0, one.since))  # what was not started waited for another
+        failed.sort(
+            key=lambda one: (one.order == 0, one.since)
+        )  # what was not started waited for another
         self.notify(Ended(exit_code, self.state.because or (failed[0].failed if failed else ())))
         self.actions.append(Finish(exit_code))

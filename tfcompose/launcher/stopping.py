@@ -1,7 +1,7 @@
 """How everything, or one process, is stopped, and what becomes of a process that ended.
 
-A process is first sent its own signal, then SIGTERM, then SIGKILL, each when the one before did not help. One that ends
-is started again after a while, is requested by name, or leaves the plan.
+A process is first sent its own signal, then SIGTERM, then SIGKILL, each when the one before did
+not help. One that ends is started again after a while, is requested by name, or leaves the plan.
 """
 
 from __future__ import annotations
@@ -10,21 +10,27 @@ from dataclasses import replace
 from signal import SIGKILL, SIGTERM, Signals
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import did_you_mean
-from tfcompose.ipc import Absent, DownRequest, Replanned
+from tfcompose.foundation.findings import did_you_mean
+from tfcompose.foundation.text import counted
 from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp, UnloadComponent
-from tfcompose.launcher.failures import ended_by_itself, guard_lost, how_ended, never_published, signal_name
+from tfcompose.launcher.failures import (
+    ended_by_itself,
+    guard_lost,
+    how_ended,
+    never_published,
+    signal_name,
+)
 from tfcompose.launcher.state import UNREAD, Stop, Tracked, by_owner
-from tfcompose.text import counted
+from tfcompose.model.messages import Absent, DownRequest, Replanned
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.findings import Finding
-    from tfcompose.ipc import ProcessRequest, StateName, Verb
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.events import Event, Exited, NewPlan
     from tfcompose.launcher.state import State, Times, Transition
-    from tfcompose.plan import PlanProcess
+    from tfcompose.model.messages import ProcessRequest, StateName, Verb
+    from tfcompose.model.plan import PlanProcess
 
 
 def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
@@ -61,13 +67,20 @@ def _take_end(step: Transition, event: Exited) -> None:
     process, ready = one.process, one.process.ready
     meant = int(ready.number) if ready and ready.kind == "exit" else 0
     done = event.returncode == meant and process.kind == "run"
-    if name != step.state.guard and (process.restart == "always" or (process.restart == "on-failure" and not done)):
+    if name != step.state.guard and (
+        process.restart == "always" or (process.restart == "on-failure" and not done)
+    ):
         _restart_after(step, one, event)
         return
     step.enter(name, "exited", how)
     # What others wait for has come, and does not go with the process.
     if done and ((before.ready and not process.owns) or (ready and ready.kind == "exit")):
-        step.track(name, replace(step.state.tracked[name], ready=True, ready_since=before.ready_since or step.now))
+        step.track(
+            name,
+            replace(
+                step.state.tracked[name], ready=True, ready_since=before.ready_since or step.now
+            ),
+        )
     early = name == step.state.guard and step.state.clear is None
     when = " before it reported whether the plan's edges are published already" if early else ""
     if not done or (process.required and not _is_to_end(step.state, process)):
@@ -78,7 +91,9 @@ def _take_end(step: Transition, event: Exited) -> None:
 def _is_to_end(state: State, process: PlanProcess) -> bool:
     """Return whether the process is there to end: it is ready then, or another one waits until it is done."""
     ends = process.ready is not None and process.ready.kind == "exit"
-    return ends or any(one.process.after.get(process.name) == "done" for one in state.tracked.values())
+    return ends or any(
+        one.process.after.get(process.name) == "done" for one in state.tracked.values()
+    )
 
 
 def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:
@@ -102,7 +117,9 @@ def lose_edges(step: Transition, one: Tracked) -> None:
         step.update(live=frozenset(), complete=not state.plan.edges, memory=memory)
     elif one.process.owns:
         live = state.live - {child for _, child in one.process.owns}
-        step.update(live=live, complete=False, reminded=None if state.reminded is None else step.now)
+        step.update(
+            live=live, complete=False, reminded=None if state.reminded is None else step.now
+        )
         if state.guard is not None:
             step.actions.append(Order(Absent(name)))
 
@@ -112,10 +129,16 @@ def lose_components(step: Transition, container: str) -> None:
     for one in step.state.components_of(container):
         if one.alive or one.state == "backoff":
             lose_edges(step, one)
-            if not one.process.owns and step.state.guard is not None:  # what was ordered holds for that container
+            if (
+                not one.process.owns and step.state.guard is not None
+            ):  # what was ordered holds for that container
                 step.actions.append(Order(Absent(one.process.name)))
             one = step.state.tracked[one.process.name]  # noqa: PLW2901 (the same, without its edges)
-            left(step, replace(one, leaving=one.leaving or ("again" if one.wanted else "stop")), f"with {container}")
+            left(
+                step,
+                replace(one, leaving=one.leaving or ("again" if one.wanted else "stop")),
+                f"with {container}",
+            )
 
 
 def left(step: Transition, one: Tracked, how: str) -> None:
@@ -124,9 +147,13 @@ def left(step: Transition, one: Tracked, how: str) -> None:
     step.track(name, one)
     step.enter(name, "stopped", how, level=0, failures=0)
     if one.leaving == "drop":
-        step.update(tracked={other: each for other, each in step.state.tracked.items() if other != name})
+        step.update(
+            tracked={other: each for other, each in step.state.tracked.items() if other != name}
+        )
     else:
-        step.track(name, replace(step.state.tracked[name], leaving="", wanted=one.leaving == "again"))
+        step.track(
+            name, replace(step.state.tracked[name], leaving="", wanted=one.leaving == "again")
+        )
 
 
 def _restart_after(step: Transition, one: Tracked, event: Exited) -> None:
@@ -138,7 +165,9 @@ def _restart_after(step: Transition, one: Tracked, event: Exited) -> None:
     )
 
 
-def schedule_restart(step: Transition, one: Tracked, how: str, failure: Callable[[str], Finding]) -> None:
+def schedule_restart(
+    step: Transition, one: Tracked, how: str, failure: Callable[[str], Finding]
+) -> None:
     """Have a process started again after a while, unless it was too often; ``failure`` makes the finding then."""
     name, times = one.process.name, step.state.times
     most = one.process.restart_limit
@@ -148,7 +177,9 @@ def schedule_restart(step: Transition, one: Tracked, how: str, failure: Callable
         step.fail_process(name, failure(f", after {counted(most, 'restart')}"))
         return
     delay = backoff_s(times, one.process, failures)
-    step.enter(name, "backoff", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)
+    step.enter(
+        name, "backoff", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures
+    )
 
 
 # Requests for one process.
@@ -165,10 +196,18 @@ def refusal(state: State, name: str, verb: Verb) -> str | None:
     if one.state == "expected":
         return f"{name} is external, and started and stopped elsewhere"
     if name == state.guard and verb != "restart":
-        return f"{name} watches the others and is not stopped alone; tfcompose up --guard off judges nobody"
+        return (
+            f"{name} watches the others and is not stopped alone; tfcompose up --guard off judges"
+            " nobody"
+        )
     if verb == "start" and one.alive and one.leaving != "stop":
         return f"{name} runs already, with pid {one.pid}"
-    if verb == "stop" and not one.alive and one.state != "backoff" and not (one.state == "stopped" and one.wanted):
+    if (
+        verb == "stop"
+        and not one.alive
+        and one.state != "backoff"
+        and not (one.state == "stopped" and one.wanted)
+    ):
         return f"{name} is not running"
     return None
 
@@ -180,7 +219,9 @@ def process_requested(step: Transition, request: ProcessRequest) -> None:
     one = step.state.tracked[request.name]
     stays = request.do == "stop"
     if one.alive:
-        step.track(request.name, replace(one, leaving="stop" if stays else "again", wanted=not stays))
+        step.track(
+            request.name, replace(one, leaving="stop" if stays else "again", wanted=not stays)
+        )
         return
     if one.state != "stopped":
         step.enter(request.name, "stopped", failures=0)
@@ -199,7 +240,9 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
     step.update(
         plan=plan,
         guard=guards[0] if guards else None,
-        tracked={process.name: _taken_over(before, process.name, event) for process in plan.processes},
+        tracked={
+            process.name: _taken_over(before, process.name, event) for process in plan.processes
+        },
         live=live,
         complete=len(live) == len(plan.edges),
         all_started=False,
@@ -341,9 +384,9 @@ def firmer_at(times: Times, one: Tracked) -> float | None:
 def _due_level(state: State, one: Tracked, now: float) -> int:
     """Return how many of its ``stop_signals`` the process should have been sent by now.
 
-    The first is due when nothing runs that waits for the process, or when it alone is to end; each further one a while
-    after the one before. A second signal to the launcher makes the second due at once, everywhere, and a third the
-    third.
+    The first is due when nothing runs that waits for the process, or when it alone is to end; each
+    further one a while after the one before. A second signal to the launcher makes the second due
+    at once, everywhere, and a third the third.
     """
     due = firmer_at(state.times, one)
     level = one.level + 1 if due is not None and now >= due else one.level
@@ -358,4 +401,7 @@ def _is_needed(state: State, one: Tracked) -> bool:
     others = [other for other in state.tracked.values() if other.alive and other is not one]
     if one.process.name == state.guard:
         return bool(others)
-    return any(one.process.name in other.process.after and other.process.name != state.guard for other in others)
+    return any(
+        one.process.name in other.process.after and other.process.name != state.guard
+        for other in others
+    )

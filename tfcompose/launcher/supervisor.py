@@ -1,8 +1,8 @@
 """Runs a plan: one loop that turns pipes, signals and time into the machine's events, and does what it decides.
 
-The launcher has one thread. Its children lead sessions of their own, so that a Ctrl-C in the terminal reaches the
-launcher alone. A process whose output comes faster than it can be passed on waits in its own pipe; nothing piles up
-here.
+The launcher has one thread. Its children lead sessions of their own, so that a Ctrl-C in the
+terminal reaches the launcher alone. A process whose output comes faster than it can be passed on
+waits in its own pipe; nothing piles up here.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, final
 
-from tfcompose.findings import Note
-from tfcompose.ipc import Ended, FindingShown, Load, NotLoaded, Unload
+from tfcompose.foundation.findings import Note
+from tfcompose.foundation.signals import take_interrupt
 from tfcompose.launcher.answers import answer
 from tfcompose.launcher.child import subreaper
 from tfcompose.launcher.children import Children, GuardPipes
@@ -45,10 +45,10 @@ from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.output import Notifier
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.state import initial
-from tfcompose.plan.codec import encode
-from tfcompose.plan.components import load_file
-from tfcompose.ros.environment import child_environment
-from tfcompose.signals import take_interrupt
+from tfcompose.model.messages import Ended, FindingShown, Load, NotLoaded, Unload
+from tfcompose.model.plan.codec import encode
+from tfcompose.model.plan.components import load_file
+from tfcompose.tf.ros.environment import child_environment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -56,15 +56,15 @@ if TYPE_CHECKING:
     from socket import socket
     from types import FrameType, TracebackType
 
-    from tfcompose.findings import Finding
-    from tfcompose.ipc import Notice, Request
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.answers import Answer, Outcome
     from tfcompose.launcher.child import Command
     from tfcompose.launcher.events import Action, Event
     from tfcompose.launcher.output import NonBlockingOutput
     from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.state import State, Times
-    from tfcompose.plan import Plan
+    from tfcompose.model.messages import Notice, Request
+    from tfcompose.model.plan import Plan
 
 #: The loop checks its children at least this often, whatever signals say; seconds.
 LONGEST_SLEEP_S = 1.0
@@ -79,8 +79,9 @@ _PREPARED = ("static", "joints", "simulate")
 class Session:
     """The plan's file, the run's id, the control socket, and an output that does not wait.
 
-    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With an id, what the run's
-    processes leave behind is ended with it, also what left their groups. ``refresh`` is called now and then.
+    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With an id,
+    what the run's processes leave behind is ended with it, also what left their groups.
+    ``refresh`` is called now and then.
     """
 
     plan_file: Path
@@ -104,10 +105,10 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
 ) -> int:
     """Run the plan until it ends, and return the exit code: 0 after a clean end, 1 after a failure or a finding.
 
-    SIGINT, SIGTERM and SIGHUP end it. ``report`` is given everything that a person should know, in order; an OSError
-    from it means that nobody reads it any more, and ends the plan. ``duration_s`` is how long to run after
-    the look before the start, in seconds. ``session`` is what the run has on this machine besides its processes. Must
-    be called in the main thread.
+    SIGINT, SIGTERM and SIGHUP end it. ``report`` is given everything that a person should know, in
+    order; an OSError from it means that nobody reads it any more, and ends the plan.
+    ``duration_s`` is how long to run after the look before the start, in seconds. ``session`` is
+    what the run has on this machine besides its processes. Must be called in the main thread.
     """
     state = initial(plan, times)
     processes = [one.process for one in state.tracked.values() if one.state != "expected"]
@@ -121,7 +122,9 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
         return 1
     with contextlib.ExitStack() as stack:
         decide = partial(answer, base=base, environment=environment)
-        supervisor = _Supervisor(state, commands, report, session or Session(plan_file), decide, stack)
+        supervisor = _Supervisor(
+            state, commands, report, session or Session(plan_file), decide, stack
+        )
         return supervisor.run(duration_s)
 
 
@@ -156,7 +159,9 @@ class _Supervisor:
         stack.callback(self._notifier.close)
         if session.run_id:
             stack.enter_context(subreaper())
-        self._children = Children(selector, session.run_id, self._handle, self._notify, self._writer)
+        self._children = Children(
+            selector, session.run_id, self._handle, self._notify, self._writer
+        )
         stack.callback(self._children.close)
 
     def run(self, duration_s: float | None) -> int:
@@ -185,7 +190,9 @@ class _Supervisor:
         """While the guard checks whether an edge is taken, have as many publishers load Python as there are cores."""
         if self._state.clear is not None or self._state.stop:
             return
-        own = [one.process for one in self._state.tracked.values() if one.process.kind in _PREPARED]
+        own = [
+            one.process for one in self._state.tracked.values() if one.process.kind in _PREPARED
+        ]
         for process in [process for process in own if not process.after][: os.cpu_count() or 1]:
             self._children.prepare(process, self._commands[process.name])
 
@@ -249,7 +256,9 @@ class _Supervisor:
         except OSError as error:
             self._events.append(StartFailed(name, str(error)))
             return
-        self._events.append(self._children.start(state.tracked[name].process, self._commands[name], guard))
+        self._events.append(
+            self._children.start(state.tracked[name].process, self._commands[name], guard)
+        )
 
     def _load(self, name: str, number: int, *, again: bool) -> None:
         """Write what the container is asked beside the plan, and have the guard ask it."""
@@ -277,7 +286,8 @@ class _Supervisor:
 class Signals:
     """Catches what ends a plan, and SIGCHLD so that it wakes the loop; puts everything back afterwards.
 
-    A SIGHUP that is ignored, as below ``nohup``, stays ignored. ``more`` are further signals to catch.
+    A SIGHUP that is ignored, as below ``nohup``, stays ignored. ``more`` are further signals to
+    catch.
     """
 
     def __init__(self, *more: signal.Signals) -> None:
@@ -299,14 +309,19 @@ class Signals:
             if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
                 continue
             handler = signal.signal(number, self._append)
-            self._stack.callback(signal.signal, number, signal.SIG_DFL if handler is None else handler)
+            self._stack.callback(
+                signal.signal, number, signal.SIG_DFL if handler is None else handler
+            )
         if take_interrupt():
             self._taken.append(signal.SIGINT)
             os.write(write_fd, b"\0")
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self._stack.close()
 

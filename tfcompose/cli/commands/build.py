@@ -1,7 +1,7 @@
 """Write the URDF, the plan and all other files, or none of them.
 
-Write plan.json, URDF and xacro files, tree.txt, tree.svg and the parameter files of drivers and nodes. If one of them
-cannot be written, none is.
+Write plan.json, URDF and xacro files, tree.txt, tree.svg and the parameter files of drivers and
+nodes. If one of them cannot be written, none is.
 """
 
 from __future__ import annotations

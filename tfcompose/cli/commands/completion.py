@@ -1,7 +1,8 @@
 """Print what completes commands in bash, zsh or fish.
 
-Print a script for the shell. It completes commands, options and their values, presets, codes, profiles, frames of the
-robot file, and robots and processes that run: eval "$(tfcompose completion bash)".
+Print a script for the shell. It completes commands, options and their values, presets, codes,
+profiles, frames of the robot file, and robots and processes that run: eval "$(tfcompose completion
+bash)".
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
 SCRIPTS = {
-    "bash": """\
+    "bash": (
+        """\
 _tfcompose() {
     local found
     COMPREPLY=()
@@ -25,8 +27,10 @@ _tfcompose() {
     [[ $found ]] && mapfile -t COMPREPLY <<< "$found"
 }
 complete -o default -F _tfcompose tfcompose
-""",
-    "zsh": """\
+"""
+    ),
+    "zsh": (
+        """\
 #compdef tfcompose
 _tfcompose() {
     local text files
@@ -38,8 +42,10 @@ _tfcompose() {
     [[ -n $files ]] && { compset -P '--*='; _files; }
 }
 compdef _tfcompose tfcompose
-""",
-    "fish": """\
+"""
+    ),
+    "fish": (
+        """\
 function __tfcompose
     set -l words (commandline -opc)
     set -l word (commandline -ct)
@@ -51,7 +57,8 @@ function __tfcompose
     end
 end
 complete -c tfcompose -f -a '(__tfcompose)'
-""",
+"""
+    ),
 }
 
 
@@ -66,8 +73,9 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print the script; exit code 2 for another shell.
 
-    With --at print what that word of a command line can be, with --line what its last one can be, behind its last
-    character of --breaks: bash replaces only that. Exit code 1 says that it can be a file as well.
+    With --at print what that word of a command line can be, with --line what its last one can be,
+    behind its last character of --breaks: bash replaces only that. Exit code 1 says that it can be
+    a file as well.
     """
     if arguments.at is not None or arguments.line is not None:
         from tfcompose.cli.completing import candidates, split_line

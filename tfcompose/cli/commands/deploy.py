@@ -1,8 +1,9 @@
 """Bring a robot to its computers, and start it there.
 
-Build the robot once, copy it to every computer under hosts: by ssh, start it there as a unit of systemd, and wait until
-every edge of every host is live; else bring every host back to the release before. What a host has already is not
-copied again: a second run changes nothing. tfcompose help hosts says more.
+Build the robot once, copy it to every computer under hosts: by ssh, start it there as a unit of
+systemd, and wait until every edge of every host is live; else bring every host back to the release
+before. What a host has already is not copied again: a second run changes nothing. tfcompose help
+hosts says more.
 """
 
 from __future__ import annotations
@@ -17,24 +18,40 @@ from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, pri
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.deploy.release import Release
-    from tfcompose.deploy.rollout import Rollout, Target
+    from tfcompose.tools.deploy.release import Release
+    from tfcompose.tools.deploy.rollout import Rollout, Target
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_file(parser)
     add_variant(parser)
-    parser.add_argument("--check", action="store_true", help="change nothing; exit 1 if something would change")
-    parser.add_argument("--diff", action="store_true", help="print how the files on the hosts differ")
-    parser.add_argument("--rollback", action="store_true", help="return to the release before the current one")
     parser.add_argument(
-        "--host", action="append", default=[], metavar="NAME", dest="hosts", help="only this host; repeatable"
+        "--check", action="store_true", help="change nothing; exit 1 if something would change"
     )
     parser.add_argument(
-        "--no-wait", dest="wait", action="store_false", help="keep the release without waiting for its edges"
+        "--diff", action="store_true", help="print how the files on the hosts differ"
     )
-    parser.add_argument("--wait", action="store_true", help="wait for the edges, which is the default")
+    parser.add_argument(
+        "--rollback", action="store_true", help="return to the release before the current one"
+    )
+    parser.add_argument(
+        "--host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        dest="hosts",
+        help="only this host; repeatable",
+    )
+    parser.add_argument(
+        "--no-wait",
+        dest="wait",
+        action="store_false",
+        help="keep the release without waiting for its edges",
+    )
+    parser.add_argument(
+        "--wait", action="store_true", help="wait for the edges, which is the default"
+    )
     parser.add_argument(
         "--timeout", type=positive, default=60.0, metavar="S",
         help="go back if not every edge is live S seconds after the start; default: 60",
@@ -44,9 +61,13 @@ def arguments(parser: ArgumentParser) -> None:
         help="refuse hosts whose clocks differ by more than S seconds; default: 0.1",
     )  # fmt: skip
     parser.add_argument(
-        "--wheels", metavar="FOLDER", help="install these wheels there, in a Python of the release's own"
+        "--wheels",
+        metavar="FOLDER",
+        help="install these wheels there, in a Python of the release's own",
     )
-    parser.add_argument("--system", action="store_true", help="units of the system, as root; default: of the user")
+    parser.add_argument(
+        "--system", action="store_true", help="units of the system, as root; default: of the user"
+    )
     parser.set_defaults(wait=True)
 
 
@@ -56,8 +77,8 @@ def run(arguments: Namespace) -> int:
 
     from tfcompose.cli.compiling import compiled_without_errors
     from tfcompose.cli.plans import in_folder, is_plan
-    from tfcompose.emit.plan import plan_of
-    from tfcompose.findings import RejectedError
+    from tfcompose.compiler.emit.plan import plan_of
+    from tfcompose.foundation.findings import RejectedError
 
     if find_spec("asyncssh") is None:
         fail("deploy needs the package asyncssh: pip install 'tfcompose[deploy]'", UNREADABLE)
@@ -69,8 +90,8 @@ def run(arguments: Namespace) -> int:
     robot, _ = compiled_without_errors(arguments.file, arguments)
     import asyncio
 
-    from tfcompose.deploy.release import packed
-    from tfcompose.deploy.rollout import target_of
+    from tfcompose.tools.deploy.release import packed
+    from tfcompose.tools.deploy.rollout import target_of
 
     try:
         places = {name: host.at for name, host in robot.hosts.items()}
@@ -85,9 +106,11 @@ def run(arguments: Namespace) -> int:
 
 
 async def _deploy(target: Target, release: Release | None, arguments: Namespace) -> int:
-    from tfcompose.deploy.rollout import reached
+    from tfcompose.tools.deploy.rollout import reached
 
-    async with reached(target, has_wheels=bool(release and release.has_wheels), report=_report) as rollout:
+    async with reached(
+        target, has_wheels=bool(release and release.has_wheels), report=_report
+    ) as rollout:
         if found := await rollout.examine():
             print_findings(found, sys.stderr)
             return FAILED
@@ -107,7 +130,9 @@ async def _deploy(target: Target, release: Release | None, arguments: Namespace)
         if not changes:
             return _unchanged(rollout)
         if arguments.check:
-            print("\n".join(f"{name}: {line}" for name, lines in changes.items() for line in lines))
+            print(
+                "\n".join(f"{name}: {line}" for name, lines in changes.items() for line in lines)
+            )
             return FAILED
         if release is not None:
             await rollout.send()

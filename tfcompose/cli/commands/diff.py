@@ -1,7 +1,7 @@
 """Show what moved or changed owner between two robot files.
 
-Print what moved from OLD to NEW, in millimetres and degrees, and which frames were added or removed, or got another
-parent or owner. Exit code 1 if anything differs.
+Print what moved from OLD to NEW, in millimetres and degrees, and which frames were added or
+removed, or got another parent or owner. Exit code 1 if anything differs.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import math
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_variant
-from tfcompose.geometry import angle_between, norm
+from tfcompose.foundation.geometry import angle_between, norm
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.model import Edge, Robot
+    from tfcompose.model.robot import Edge, Robot
 
 #: Below these, two poses are one: a micrometre and 1e-6 rad.
 MOVED_M = 1e-6
@@ -33,7 +33,9 @@ def run(arguments: Namespace) -> int:
     """Print the differences; exit code 0 without any, 1 with some."""
     from tfcompose.cli.compiling import compiled_robot
 
-    lines = differences(compiled_robot(arguments.old, arguments), compiled_robot(arguments.new, arguments))
+    lines = differences(
+        compiled_robot(arguments.old, arguments), compiled_robot(arguments.new, arguments)
+    )
     print("\n".join(lines) or "no difference between the two trees")
     return int(bool(lines))
 
@@ -42,7 +44,9 @@ def differences(old: Robot, new: Robot) -> list[str]:
     """Return a line for each frame that is not as it was, in the order of the new robot, what went at the end."""
     before = {edge.child: edge for edge in old.edges}
     lines = [
-        f"root   {frame} is new" for frame in new.frames if frame not in old.frames and new.parent_edge(frame) is None
+        f"root   {frame} is new"
+        for frame in new.frames
+        if frame not in old.frames and new.parent_edge(frame) is None
     ]
     for edge in new.edges:
         was = before.get(edge.child)

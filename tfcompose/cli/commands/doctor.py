@@ -1,10 +1,11 @@
 """Diagnose the running tree: what is wrong, and what to do.
 
-Listen to the running system for a few seconds and report what is wrong: disconnected trees, loops, two publishers of
-one edge, stamps that no lookup can match, low rates, frames that no listener receives, a silent /clock, missing joint
-states, settings that prevent discovery. Each finding names the node and the numbers. It also checks what to expect, if
-a robot file or a built plan is given, or a robot of tfcompose runs in this ROS domain. Ctrl-C ends it early and prints
-what was found.
+Listen to the running system for a few seconds and report what is wrong: disconnected trees, loops,
+two publishers of one edge, stamps that no lookup can match, low rates, frames that no listener
+receives, a silent /clock, missing joint states, settings that prevent discovery. Each finding
+names the node and the numbers. It also checks what to expect, if a robot file or a built plan is
+given, or a robot of tfcompose runs in this ROS domain. Ctrl-C ends it early and prints what was
+found.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, add_variant, namespace
 from tfcompose.cli.terminal import UNREADABLE, exit_code_of, fail, print_findings, printable
-from tfcompose.text import counted
+from tfcompose.foundation.text import counted
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.findings import Finding
-    from tfcompose.plan import Plan
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.plan import Plan
 
 #: So many trees are named by their roots.
 MOST_ROOTS = 6
@@ -30,19 +31,25 @@ MOST_ROOTS = 6
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "file", nargs="?", metavar="FILE|PLAN", help="expected tree; default: of the robot that runs in this ROS domain"
+        "file",
+        nargs="?",
+        metavar="FILE|PLAN",
+        help="expected tree; default: of the robot that runs in this ROS domain",
     )
     add_variant(parser)
     add_for(parser, "listen for S seconds; default: 5", 5.0)
-    parser.add_argument("--namespace", type=namespace, metavar="NS", help="use /NS/tf and /NS/tf_static")
+    parser.add_argument(
+        "--namespace", type=namespace, metavar="NS", help="use /NS/tf and /NS/tf_static"
+    )
     add_format(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Look and print the findings; exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use."""
-    from tfcompose.findings import finding
-    from tfcompose.plan import RosSettings
-    from tfcompose.ros.environment import (
+    from tfcompose.foundation.findings import finding
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.model.plan import RosSettings
+    from tfcompose.tf.ros.environment import (
         RosError,
         child_environment,
         no_ros,
@@ -50,7 +57,6 @@ def run(arguments: Namespace) -> int:
         other_middleware,
         ros_trouble,
     )
-    from tfcompose.signals import Stop
 
     missing = no_ros()
     if missing:
@@ -63,13 +69,15 @@ def run(arguments: Namespace) -> int:
     if trouble:
         return _print([trouble], arguments.format)
     from tfcompose.cli.live import check_early_end
-    from tfcompose.live.snapshot import observe
-    from tfcompose.plan.topics import namespace_options
-    from tfcompose.verdict.doctor import examine
+    from tfcompose.guard.verdict.doctor import examine
+    from tfcompose.model.plan.topics import namespace_options
+    from tfcompose.tf.live.snapshot import observe
 
     with Stop() as stop:
         try:
-            found = examine(observe(_expected(plan, arguments.namespace), arguments.duration, stop))
+            found = examine(
+                observe(_expected(plan, arguments.namespace), arguments.duration, stop)
+            )
         except RosError as error:
             return _print([finding("TF901", str(error), None)], arguments.format)
         if stop.requested:
@@ -78,7 +86,9 @@ def run(arguments: Namespace) -> int:
     code = _print(findings, arguments.format)
     if arguments.format == "text":
         observed = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"
-        observed += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
+        observed += (
+            f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
+        )
         print(f"looked for {found.seconds:.1f} s at {observed}: {_summary(findings)}")
         if found.edges and found.elsewhere:
             words = namespace_options(found.elsewhere)
@@ -89,7 +99,7 @@ def run(arguments: Namespace) -> int:
 def _print(found: list[Finding], form: str) -> int:
     """Print the findings and return the exit code."""
     if form == "json":
-        from tfcompose.render.formats import render_json
+        from tfcompose.compiler.render.formats import render_json
 
         sys.stdout.write(render_json(found))
     else:
@@ -121,10 +131,12 @@ def _plan(arguments: Namespace) -> Plan | None:
 
 def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
     """Return the topics to look at, each pair with the part of the plan that is expected there."""
-    from tfcompose.plan.topics import parts_of, topics_below
+    from tfcompose.model.plan.topics import parts_of, topics_below
 
     topics = topics_below(below or "")
     if plan is None:
         return {topics: None}
     parts = parts_of(plan)
-    return {topics: parts.get(topics, plan)} if below is not None else dict(parts) or {topics: plan}
+    return (
+        {topics: parts.get(topics, plan)} if below is not None else dict(parts) or {topics: plan}
+    )

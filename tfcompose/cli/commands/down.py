@@ -1,7 +1,7 @@
 """Stop a running robot.
 
-Stop everything in reverse order of the start, and wait until it has ended. --leftovers instead stops processes that an
-earlier run of the robot left behind.
+Stop everything in reverse order of the start, and wait until it has ended. --leftovers instead
+stops processes that an earlier run of the robot left behind.
 """
 
 from __future__ import annotations
@@ -20,9 +20,15 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
     parser.add_argument(
-        "--timeout", type=positive, default=60.0, metavar="S", help="wait at most S seconds; default: 60"
+        "--timeout",
+        type=positive,
+        default=60.0,
+        metavar="S",
+        help="wait at most S seconds; default: 60",
     )
-    parser.add_argument("--leftovers", action="store_true", help="stop processes that earlier runs left behind")
+    parser.add_argument(
+        "--leftovers", action="store_true", help="stop processes that earlier runs left behind"
+    )
     add_all_hosts(parser)
 
 
@@ -32,9 +38,11 @@ def run(arguments: Namespace) -> int:
         from tfcompose.cli.all_hosts import run_on_all_hosts
 
         leftovers = ["--leftovers"] if arguments.leftovers else []
-        return run_on_all_hosts(arguments, "down", "--timeout", f"{arguments.timeout:g}", *leftovers)
+        return run_on_all_hosts(
+            arguments, "down", "--timeout", f"{arguments.timeout:g}", *leftovers
+        )
     from tfcompose.cli.runs import chosen_run, notices, request
-    from tfcompose.ipc import Done, DownRequest, Ended
+    from tfcompose.model.messages import Done, DownRequest, Ended
 
     if arguments.leftovers:
         return _stop_leftovers(arguments.robot)
@@ -46,7 +54,10 @@ def run(arguments: Namespace) -> int:
             if isinstance(notice, Ended):
                 break
     except TimeoutError:
-        fail(f"{place.name} has not ended after {arguments.timeout:g} s; tfcompose ps lists what still runs")
+        fail(
+            f"{place.name} has not ended after {arguments.timeout:g} s; tfcompose ps lists what"
+            " still runs"
+        )
     except OSError:
         pass  # it has ended already
     print(f"{place.name} has ended")

@@ -1,8 +1,9 @@
 """Print the live pose of frame B in frame A.
 
-Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch yaw about fixed axes in
-radians and degrees. If there is none, say why and exit 1. Without --once it repeats until Ctrl-C. With --bag it reads a
-recording: with --once the first pose, with --at the one at that time.
+Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch yaw
+about fixed axes in radians and degrees. If there is none, say why and exit 1. Without --once it
+repeats until Ctrl-C. With --bag it reads a recording: with --once the first pose, with --at the
+one at that time.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from tfcompose.cli.terminal import INTERRUPTED, fail, reject
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.geometry import Pose
-    from tfcompose.live.pose_query import NoPose, OnPose, PoseQuery
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.tf.live.pose_query import NoPose, OnPose, PoseQuery
 
 #: A stamp that is older is taken to be of another clock than the wall's.
 _CLOCKS_AGREE_S = 1e6
@@ -33,15 +34,24 @@ def arguments(parser: ArgumentParser) -> None:
     add_frames(parser)
     parser.add_argument("--once", action="store_true", help="print one pose and exit")
     parser.add_argument(
-        "--timeout", type=positive, default=5.0, metavar="S", help="exit after S seconds without a new pose; default: 5"
+        "--timeout",
+        type=positive,
+        default=5.0,
+        metavar="S",
+        help="exit after S seconds without a new pose; default: 5",
     )
-    parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="poses per second; default: 1")
+    parser.add_argument(
+        "--rate", type=positive, default=1.0, metavar="HZ", help="poses per second; default: 1"
+    )
     parser.add_argument(
         "--at",
         type=_time,
         default=0,
         metavar="TIME",
-        help="the pose at this time: seconds since the epoch (once), or relative to the newest: -0.5",
+        help=(
+            "the pose at this time: seconds since the epoch (once), or relative to the newest:"
+            " -0.5"
+        ),
     )
     parser.add_argument(
         "--precision",
@@ -58,23 +68,31 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Echo until a signal comes; exit code 1 if there was no pose."""
     from tfcompose.cli.live import from_bag
-    from tfcompose.findings import finding
-    from tfcompose.live.pose_query import PoseQuery
-    from tfcompose.numbers import clean
-    from tfcompose.plan.topics import topics_below
-    from tfcompose.verdict.setup import elsewhere_help
+    from tfcompose.foundation.findings import finding
+    from tfcompose.foundation.numbers import clean
+    from tfcompose.guard.verdict.setup import elsewhere_help
+    from tfcompose.model.plan.topics import topics_below
+    from tfcompose.tf.live.pose_query import PoseQuery
 
     # tf2 takes a name with a slash before it for the name.
     arguments.a, arguments.b = (name.removeprefix("/") for name in (arguments.a, arguments.b))
     topics = topics_below(arguments.namespace)
-    query = PoseQuery(arguments.a, arguments.b, arguments.once, arguments.rate, arguments.timeout, topics, arguments.at)
+    query = PoseQuery(
+        arguments.a,
+        arguments.b,
+        arguments.once,
+        arguments.rate,
+        arguments.timeout,
+        topics,
+        arguments.at,
+    )
 
     def show(pose: Pose, stamp_ns: int | None) -> None:
         sys.stdout.write(_formatted(arguments, clean(pose), stamp_ns))
         sys.stdout.flush()
 
     if arguments.bag:
-        from tfcompose.bags import echo_bag
+        from tfcompose.tf.bags import echo_bag
 
         missed = from_bag(lambda: echo_bag(arguments.bag, query, show))
     else:
@@ -88,12 +106,12 @@ def run(arguments: Namespace) -> int:
 
 def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
     from tfcompose.cli.live import set_up_ros
-    from tfcompose.findings import finding
-    from tfcompose.ros.environment import RosError
-    from tfcompose.signals import Stop
+    from tfcompose.foundation.findings import finding
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.tf.ros.environment import RosError
 
     set_up_ros()
-    from tfcompose.live.echo import echo
+    from tfcompose.tf.live.echo import echo
 
     begun = time.monotonic()
     shown = False
@@ -109,12 +127,16 @@ def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
         except RosError as error:
             reject([finding("TF901", str(error), None)])
         if stop.requested and not shown and missed is None:
-            fail(f"ended by a signal after {time.monotonic() - begun:.1f} s, before there was a pose", INTERRUPTED)
+            fail(
+                f"ended by a signal after {time.monotonic() - begun:.1f} s, before there was a"
+                " pose",
+                INTERRUPTED,
+            )
     return missed
 
 
 def _formatted(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
-    from tfcompose.render.pose import pose_json, pose_text
+    from tfcompose.compiler.render.pose import pose_json, pose_text
 
     if arguments.format == "json":
         return pose_json(arguments.a, arguments.b, pose, stamp_ns=stamp_ns)

@@ -33,13 +33,15 @@ def run(arguments: Namespace) -> int:
         return run_on_all_hosts(arguments, "events", "--format", arguments.format)
     from tfcompose.cli.console import Console
     from tfcompose.cli.runs import chosen_run, notices
-    from tfcompose.ipc import Ended, notice_line
-    from tfcompose.plan import Plan, RosSettings
+    from tfcompose.model.messages import Ended, notice_line
+    from tfcompose.model.plan import Plan, RosSettings
 
     place = chosen_run(arguments.robot, "events")
     lines = _TimedLines()
     ended = False
-    console = Console(Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout))
+    console = Console(
+        Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout)
+    )
     try:
         for notice, at in notices(place, output=sys.stdout):
             ended = isinstance(notice, Ended)

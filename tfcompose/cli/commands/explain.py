@@ -1,7 +1,8 @@
 """Explain a code, or the chain between two frames.
 
-Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, given two frames of FILE, show
-the chain from A to B: each edge with its owner and pose, where each of its values comes from, and what it replaced.
+Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, given two
+frames of FILE, show the chain from A to B: each edge with its owner and pose, where each of its
+values comes from, and what it replaced.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Sequence
 
-    from tfcompose.load import Source
-    from tfcompose.model import Calibration, Edge, Robot
+    from tfcompose.model.robot import Calibration, Edge, Robot
+    from tfcompose.spec.load import Source
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    from tfcompose.catalogue import FAMILIES
+    from tfcompose.foundation.catalogue import FAMILIES
 
     parser.add_argument(
         "what",
@@ -45,7 +46,7 @@ def run(arguments: Namespace) -> int:
     """Print the page or the chain; exit code 1 if a frame is not there, 2 for wrong use."""
     match arguments.what:
         case [] if arguments.table:
-            from tfcompose.pages import table
+            from tfcompose.compiler.pages import table
 
             sys.stdout.write(table(None if arguments.table == "all" else arguments.table))
         case [word]:
@@ -67,9 +68,9 @@ def _explain_frames(file: str, a: str, b: str, arguments: Namespace) -> None:
 
 
 def _explain_code(word: str) -> None:
-    from tfcompose.catalogue import CATALOGUE, code_of, similar_words
-    from tfcompose.findings import did_you_mean
-    from tfcompose.pages import page
+    from tfcompose.compiler.pages import page
+    from tfcompose.foundation.catalogue import CATALOGUE, code_of, similar_words
+    from tfcompose.foundation.findings import did_you_mean
 
     code = code_of(word)
     if code is None:
@@ -89,8 +90,8 @@ def _explain_chain(robot: Robot, sources: Sequence[Source], a: str, b: str) -> N
 
 
 def _line(edge: Edge, sources: Sequence[Source]) -> str:
-    from tfcompose.provenance import values_of
-    from tfcompose.render.tree import edge_facts
+    from tfcompose.compiler.provenance import values_of
+    from tfcompose.compiler.render.tree import edge_facts
 
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""

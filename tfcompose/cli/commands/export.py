@@ -1,8 +1,9 @@
 """Export the plan for systemd, docker compose, Kubernetes or ros2 launch.
 
-Write a built plan, or a robot that is built first, for systemd (a unit per process and a target), docker compose (a
-service per process), Kubernetes (a ConfigMap and a workload per process, with a kustomization) or ros2 launch (a launch
-file with stock nodes for fixed edges and joints). What the other launcher cannot do is listed.
+Write a built plan, or a robot that is built first, for systemd (a unit per process and a target),
+docker compose (a service per process), Kubernetes (a ConfigMap and a workload per process, with a
+kustomization) or ros2 launch (a launch file with stock nodes for fixed edges and joints). What the
+other launcher cannot do is listed.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from tfcompose.cli.terminal import UNREADABLE, fail, reject
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.files import File
-    from tfcompose.plan import Plan
+    from tfcompose.model.files import File
+    from tfcompose.model.plan import Plan
 
 KINDS = ("systemd", "compose", "k8s", "launch")
-#: What ROS's setup files set, and what people set for ROS: units start without a shell that has it.
+#: What ROS's setup files set, and what people set for ROS: units start without a shell that has
+#: it.
 ROS_VARIABLES = (
     "AMENT_PREFIX_PATH", "CYCLONEDDS_URI", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE",
     "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DISTRO",
@@ -33,14 +35,18 @@ ROS_VARIABLES = (
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("kind", choices=KINDS, help="the launcher to export to")
-    parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml")
+    parser.add_argument(
+        "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
+    )
     add_variant(parser)
     parser.add_argument(
         "-o", "--output", metavar="DIR",
         help="where to build FILE; the export is a folder in it; default: build/ROBOT, or PLAN's folder",
     )  # fmt: skip
     parser.add_argument(
-        "--host", metavar="NAME", help="export only this host's share; '': processes without a host; default: all"
+        "--host",
+        metavar="NAME",
+        help="export only this host's share; '': processes without a host; default: all",
     )
     parser.add_argument(
         "--at", metavar="DIR",
@@ -64,12 +70,21 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Write the export; exit code as for ``build``."""
-    from tfcompose.cli.plans import PLAN, built_plan, host_share, in_folder, is_plan, refuse_variant
+    from tfcompose.cli.plans import (
+        PLAN,
+        built_plan,
+        host_share,
+        in_folder,
+        is_plan,
+        refuse_variant,
+    )
     from tfcompose.launcher.fence import not_remapped
 
     arguments.file = in_folder(arguments.file)
     if arguments.kind == "k8s" and not arguments.image:
-        fail("name the image of the pods, with ROS 2 Jazzy and tfcompose: --image NAME", UNREADABLE)
+        fail(
+            "name the image of the pods, with ROS 2 Jazzy and tfcompose: --image NAME", UNREADABLE
+        )
     if is_plan(arguments.file):
         refuse_variant(arguments)
         file = Path(arguments.file)
@@ -81,7 +96,10 @@ def run(arguments: Namespace) -> int:
     if arguments.host is not None:
         plan = host_share(plan, arguments.host or None, "")
     if plan.guard.mode == "strict" and arguments.kind == "launch":
-        fail("a strict plan needs a guard, and a launch file has none: export with --set guard.mode=watch")
+        fail(
+            "a strict plan needs a guard, and a launch file has none: export with --set"
+            " guard.mode=watch"
+        )
     if plan.guard.mode == "strict" and (missed := not_remapped(plan)):
         reject(missed)
     _write(plan, file, arguments)
@@ -90,7 +108,7 @@ def run(arguments: Namespace) -> int:
 
 def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
     from tfcompose.cli.writing import write_all
-    from tfcompose.findings import RejectedError
+    from tfcompose.foundation.findings import RejectedError
 
     folder = Path(arguments.output or file.parent) / arguments.kind
     try:
@@ -102,20 +120,26 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
         fail(f"nothing was written to {folder}: {error.strerror}", UNREADABLE)
     print(f"wrote {folder}: {', '.join(one.path for one in files)}")
     if plan.host is None:
-        differences += [f"{one.name} runs on {one.host}, and is here too: --host" for one in plan.started if one.host]
+        differences += [
+            f"{one.name} runs on {one.host}, and is here too: --host"
+            for one in plan.started
+            if one.host
+        ]
     for line in differences:
         print(f"differs from tfcompose up: {line}")
 
 
-def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:
+def _exported(
+    plan: Plan, file: Path, folder: Path, arguments: Namespace
+) -> tuple[tuple[File, ...], list[str]]:
     """Return the files, and what is not as with ``up``."""
-    from tfcompose.export.supervisors import Machine
+    from tfcompose.tools.exporters.supervisors import Machine
 
     relative = Path(os.path.relpath(file.parent, folder)).as_posix()
     if arguments.kind == "launch":
         from tfcompose.cli.plans import is_plan
         from tfcompose.cli.reading import read_text
-        from tfcompose.export.launch import launch
+        from tfcompose.tools.exporters.launch import launch
 
         urdf = read_text(str(file.parent / "robot.urdf"))
         if is_plan(arguments.file):
@@ -126,31 +150,37 @@ def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tup
         files, gaps = launch(plan, Machine(relative), urdf, values)
         return (*files, *further), [*gaps, *fixed]
     if arguments.kind == "compose":
-        from tfcompose.export.supervisors import compose
+        from tfcompose.tools.exporters.supervisors import compose
 
         return compose(plan, Machine(relative, image=arguments.image))
     if arguments.kind == "k8s":
         return _for_kubernetes(plan, file.parent, arguments)
-    from tfcompose.export.supervisors import systemd
+    from tfcompose.tools.exporters.supervisors import systemd
 
     host = plan.hosts.get(plan.host or "")
     setup = tuple(arguments.setup) or (host.setup if host else ())
     python = arguments.python or (host.python if host else None) or sys.executable
-    own = {} if setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
+    own = (
+        {} if setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
+    )
     at = Path(arguments.at or file.parent).absolute().as_posix()
     return systemd(plan, Machine(at, python, setup, own))
 
 
-def _for_kubernetes(plan: Plan, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:
+def _for_kubernetes(
+    plan: Plan, folder: Path, arguments: Namespace
+) -> tuple[tuple[File, ...], list[str]]:
     """Return the manifests, with the files of the built folder that the pods read."""
     from tfcompose.cli.reading import read_text
-    from tfcompose.export.kubernetes import MOST_BYTES, Cluster, files_of, kubernetes
+    from tfcompose.tools.exporters.kubernetes import MOST_BYTES, Cluster, files_of, kubernetes
 
     paths = dict.fromkeys(path for process in plan.started for path in files_of(plan, process))
     texts = {path: read_text(str(folder / path)) for path in paths}
     size = sum(len(text.encode()) for text in texts.values())
     if size > MOST_BYTES and not arguments.at:
         fail(
-            f"a ConfigMap takes 1 MB, and the plan has {size / 1e6:.1f}: copy it to each node, add --at DIR", UNREADABLE
+            f"a ConfigMap takes 1 MB, and the plan has {size / 1e6:.1f}: copy it to each node, add"
+            " --at DIR",
+            UNREADABLE,
         )
     return kubernetes(plan, Cluster(arguments.image, arguments.at or ""), texts)

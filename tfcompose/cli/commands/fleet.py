@@ -1,10 +1,11 @@
 """Share edges between robots over Zenoh, and look poses up between them.
 
-What a robot shares, and where its Zenoh router is, stands in fleet.yaml, which can be named anywhere; default:
-fleet.yaml. `fleet lint` checks the file. `fleet share ROBOT` runs on the robot and sends its edges; it is the only one
-that needs ROS. `fleet ps` lists the robots and how old what they share is, `fleet echo A B` prints the pose of frame B
-in frame A, such as r1/base_link r2/base_link, and `fleet doctor` says what is wrong. `fleet ps` and `fleet doctor` exit
-with 1 where a robot is not live.
+What a robot shares, and where its Zenoh router is, stands in fleet.yaml, which can be named
+anywhere; default: fleet.yaml. `fleet lint` checks the file. `fleet share ROBOT` runs on the robot
+and sends its edges; it is the only one that needs ROS. `fleet ps` lists the robots and how old
+what they share is, `fleet echo A B` prints the pose of frame B in frame A, such as r1/base_link
+r2/base_link, and `fleet doctor` says what is wrong. `fleet ps` and `fleet doctor` exit with 1
+where a robot is not live.
 """
 
 from __future__ import annotations
@@ -15,14 +16,23 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, positive
-from tfcompose.cli.terminal import FAILED, INTERRUPTED, UNREADABLE, exit_code_of, fail, print_findings, reject, warn
+from tfcompose.cli.terminal import (
+    FAILED,
+    INTERRUPTED,
+    UNREADABLE,
+    exit_code_of,
+    fail,
+    print_findings,
+    reject,
+    warn,
+)
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.findings import Finding
-    from tfcompose.fleet.observe import FleetObserver, RobotStatus
-    from tfcompose.language.fleet import FleetSpec
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.spec.language.fleet import FleetSpec
+    from tfcompose.tools.fleet.observe import FleetObserver, RobotStatus
 
 #: What can be done, with the names that it takes.
 _ACTIONS = {"lint": (), "share": ("ROBOT",), "ps": (), "echo": ("A", "B"), "doctor": ()}
@@ -37,13 +47,29 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("action", choices=_ACTIONS, help="what to do, as above")
     parser.add_argument(
-        "words", nargs="*", default=[], metavar="NAME|FILE", help="ROBOT for share, A and B for echo; fleet.yaml"
+        "words",
+        nargs="*",
+        default=[],
+        metavar="NAME|FILE",
+        help="ROBOT for share, A and B for echo; fleet.yaml",
     )
-    add_for(parser, "ps and doctor: listen for S seconds; default: until all is known, at most 3; echo: end after S")
-    parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="echo: poses per second; default: 1")
+    add_for(
+        parser,
+        "ps and doctor: listen for S seconds; default: until all is known, at most 3; echo: end"
+        " after S",
+    )
+    parser.add_argument(
+        "--rate",
+        type=positive,
+        default=1.0,
+        metavar="HZ",
+        help="echo: poses per second; default: 1",
+    )
     parser.add_argument("--once", action="store_true", help="echo: print one pose and exit")
     parser.add_argument(
-        "--namespace", metavar="NAME", help="share: the namespace of the robot's /tf; default: that of fleet.yaml"
+        "--namespace",
+        metavar="NAME",
+        help="share: the namespace of the robot's /tf; default: that of fleet.yaml",
     )
     add_format(parser)
 
@@ -63,7 +89,7 @@ def run(arguments: Namespace) -> int:
     refuse_without_zenoh()
     if arguments.action == "share":
         return _share(spec, names[0], arguments.namespace)
-    from tfcompose.fleet.observe import FleetObserver
+    from tfcompose.tools.fleet.observe import FleetObserver
 
     observer = FleetObserver(spec)
     try:
@@ -82,7 +108,7 @@ def refuse_without_zenoh() -> None:
     Raises:
         SystemExit: after saying so.
     """
-    from tfcompose.findings import finding
+    from tfcompose.foundation.findings import finding
 
     if find_spec("zenoh") is None:
         help_ = "pip install 'tfcompose[fleet]'"
@@ -92,10 +118,10 @@ def refuse_without_zenoh() -> None:
 def _read(file: str) -> tuple[FleetSpec | None, list[Finding]]:
     """Return the fleet of a file, None where it has errors, and all findings."""
     from tfcompose.cli.reading import read_text
-    from tfcompose.findings import RejectedError
-    from tfcompose.fleet.check import check_fleet
-    from tfcompose.language.validate import validate_fleet
-    from tfcompose.load import load
+    from tfcompose.foundation.findings import RejectedError
+    from tfcompose.spec.language.validate import validate_fleet
+    from tfcompose.spec.load import load
+    from tfcompose.tools.fleet.check import check_fleet
 
     try:
         source = load(read_text(file), file)
@@ -113,21 +139,27 @@ def _lint_code(found: list[Finding]) -> int:
 
 def _share(spec: FleetSpec, robot: str, namespace: str | None) -> int:
     from tfcompose.cli.live import set_up_ros
-    from tfcompose.findings import did_you_mean, finding
-    from tfcompose.process import ready, say
-    from tfcompose.ros.environment import RosError
-    from tfcompose.signals import Stop
+    from tfcompose.foundation.findings import did_you_mean, finding
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.tf.process import ready, say
+    from tfcompose.tf.ros.environment import RosError
 
     if robot not in spec.robots:
         advice = did_you_mean(robot, spec.robots, f"there is {', '.join(spec.robots)}")
         fail(f"no robot {robot} in the fleet {spec.name}; {advice}", UNREADABLE)
     set_up_ros()
-    from tfcompose.fleet.robot import share  # rclpy reads the environment when it is loaded
+    from tfcompose.tools.fleet.robot import share  # rclpy reads the environment when it is loaded
 
     with Stop() as stop:
         try:
             ready()
-            share(spec, robot, spec.robots[robot].namespace if namespace is None else namespace, stop, say)
+            share(
+                spec,
+                robot,
+                spec.robots[robot].namespace if namespace is None else namespace,
+                stop,
+                say,
+            )
         except RosError as error:
             reject([finding("TF901", str(error), None)])
     return 0
@@ -141,12 +173,15 @@ def _report(observer: FleetObserver, arguments: Namespace) -> int:
     if arguments.action == "doctor":
         found = list(observer.findings())
         if arguments.format == "json":
-            from tfcompose.render.formats import render_json
+            from tfcompose.compiler.render.formats import render_json
 
             sys.stdout.write(render_json(found))
         else:
             print_findings(found, sys.stdout)
-            print(f"looked at {len(observer.fleet.robots)} robots: {len(found) or 'nothing is'} wrong")
+            print(
+                f"looked at {len(observer.fleet.robots)} robots: {len(found) or 'nothing is'}"
+                " wrong"
+            )
         return exit_code_of(found) if found else 0
     robots = observer.status()
     if arguments.format == "json":
@@ -169,10 +204,10 @@ def _row(one: RobotStatus) -> tuple[str, ...]:
 
 def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespace) -> int:
     """Print poses until a signal comes; a link that is stale is named instead, once, and so is its return."""
-    from tfcompose.fleet.observe import StaleError
-    from tfcompose.numbers import clean
-    from tfcompose.render.pose import pose_json, pose_text
-    from tfcompose.tf2 import TransformException
+    from tfcompose.compiler.render.pose import pose_json, pose_text
+    from tfcompose.foundation.numbers import clean
+    from tfcompose.tf.tf2 import TransformException
+    from tfcompose.tools.fleet.observe import StaleError
 
     begun = time.monotonic()
     shown = False
@@ -192,7 +227,9 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
                 due, shown = now + 1 / arguments.rate, True
                 age_s = None if stamp_ns is None else (time.time_ns() - stamp_ns) / 1e9
                 if arguments.format == "json":
-                    sys.stdout.write(pose_json(target, source, clean(pose), stamp_ns=stamp_ns, age_s=age_s))
+                    sys.stdout.write(
+                        pose_json(target, source, clean(pose), stamp_ns=stamp_ns, age_s=age_s)
+                    )
                 else:
                     when = ", fixed" if age_s is None else f", {age_s:.2f} s ago"
                     sys.stdout.write(pose_text(target, source, clean(pose), when))

@@ -1,8 +1,9 @@
 """Draw the tree as SVG, PDF, PNG, DOT or Mermaid.
 
-Draw the tree: frames coloured by owner, fixed and moving edges, each sensor in a box. The suffix of the file selects
-the format: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or --bag, draw the published tree, coloured
-by publisher, with second parents and loops as they are, and with FILE also what is missing.
+Draw the tree: frames coloured by owner, fixed and moving edges, each sensor in a box. The suffix
+of the file selects the format: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or
+--bag, draw the published tree, coloured by publisher, with second parents and loops as they are,
+and with FILE also what is missing.
 """
 
 from __future__ import annotations
@@ -11,19 +12,26 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_namespace, add_variant, settle_duration
+from tfcompose.cli.options import (
+    DEFAULT_FILE,
+    add_bag,
+    add_for,
+    add_namespace,
+    add_variant,
+    settle_duration,
+)
 from tfcompose.cli.terminal import UNREADABLE, fail, printable
-from tfcompose.geometry import Pose, norm, normalised
+from tfcompose.foundation.geometry import Pose, norm, normalised
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Sequence
 
-    from tfcompose.draw import Arrow, Graph
-    from tfcompose.draw.arrange import Direction
-    from tfcompose.draw.graph import Kind
-    from tfcompose.live.edges import EdgeState, TreeObserver
-    from tfcompose.plan import Plan
+    from tfcompose.compiler.draw import Arrow, Graph
+    from tfcompose.compiler.draw.arrange import Direction
+    from tfcompose.compiler.draw.graph import Kind
+    from tfcompose.model.plan import Plan
+    from tfcompose.tf.live.edges import EdgeState, TreeObserver
 
 FORMATS = (".svg", ".pdf", ".png", ".dot", ".gv", ".mmd")
 FORMAT_NAMES = "svg, pdf, png, dot or mmd"
@@ -31,7 +39,9 @@ FORMAT_NAMES = "svg, pdf, png, dot or mmd"
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag")
+    parser.add_argument(
+        "file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag"
+    )
     add_variant(parser)
     parser.add_argument(
         "-o",
@@ -41,13 +51,17 @@ def arguments(parser: ArgumentParser) -> None:
         help=f"a file ending in {FORMAT_NAMES}; default: tree.svg",
     )
     parser.add_argument(
-        "--live", action="store_true", help="draw the tree that is published now, with FILE also what is missing"
+        "--live",
+        action="store_true",
+        help="draw the tree that is published now, with FILE also what is missing",
     )
     add_bag(parser, "draw the tree of a recording")
     add_for(parser, "with --live: observe for S seconds; default: 3")
     add_namespace(parser, "use /NS/tf and /NS/tf_static, without FILE")
     parser.add_argument(
-        "--poses", action="store_true", help="show each frame's pose in its parent, in metres and degrees"
+        "--poses",
+        action="store_true",
+        help="show each frame's pose in its parent, in metres and degrees",
     )
     parser.add_argument(
         "--direction", choices=("auto", "right", "down", "columns"), default="auto",
@@ -69,14 +83,14 @@ def run(arguments: Namespace) -> int:
         graph = _published_graph(arguments)
     else:
         from tfcompose.cli.compiling import compiled_robot
-        from tfcompose.render.tree import graph_of
+        from tfcompose.compiler.render.tree import graph_of
 
         robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments)
         graph = graph_of(robot.with_final_names(), poses=arguments.poses)
     from tfcompose.cli.writing import replace_file
 
     if arguments.collapse:
-        from tfcompose.draw.graph import collapsed
+        from tfcompose.compiler.draw.graph import collapsed
 
         graph = collapsed(graph)
     try:
@@ -95,7 +109,11 @@ def _check_output(path: Path) -> None:
     """
     ending = path.suffix.lower()
     if ending not in FORMATS:
-        what = f"{path.suffix} is not a format that graph writes" if ending else f"{path} has no suffix"
+        what = (
+            f"{path.suffix} is not a format that graph writes"
+            if ending
+            else f"{path} has no suffix"
+        )
         fail(f"{what}; -o takes a file ending in {FORMAT_NAMES}", UNREADABLE)
     if not path.parent.is_dir():
         fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
@@ -107,25 +125,25 @@ def _check_output(path: Path) -> None:
 def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
     """Return the graph as a file with this ending; only what it needs is loaded."""
     if ending == ".mmd":
-        from tfcompose.draw.markup import mermaid
+        from tfcompose.compiler.draw.markup import mermaid
 
         return mermaid(graph, is_down=direction == "down").encode()
     if ending in {".dot", ".gv"}:
-        from tfcompose.draw.markup import dot
+        from tfcompose.compiler.draw.markup import dot
 
         return dot(graph, is_down=direction == "down").encode()
-    from tfcompose.draw.picture import draw
+    from tfcompose.compiler.draw.picture import draw
 
     drawing = draw(graph, direction)
     if ending == ".pdf":
-        from tfcompose.draw.pdf import pdf
+        from tfcompose.compiler.draw.pdf import pdf
 
         return pdf(drawing)
     if ending == ".png":
-        from tfcompose.draw.png import png
+        from tfcompose.compiler.draw.png import png
 
         return png(drawing)
-    from tfcompose.draw.svg import svg
+    from tfcompose.compiler.draw.svg import svg
 
     return svg(drawing).encode()
 
@@ -133,14 +151,19 @@ def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
 def _published_graph(arguments: Namespace) -> Graph:
     """Return the published tree as a graph."""
     from tfcompose.cli.live import observe, observed_topics, read_bag
-    from tfcompose.live.edges import SETTLE_S, TreeObserver
+    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 
     plan, pairs = observed_topics(arguments)
     observers = {pair: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
     if arguments.bag:
         read_bag(arguments.bag, observers)
     else:
-        observe("tfcompose_graph", observers, ros=plan.ros if plan else None, duration_s=arguments.duration)
+        observe(
+            "tfcompose_graph",
+            observers,
+            ros=plan.ros if plan else None,
+            duration_s=arguments.duration,
+        )
     title = arguments.bag or (plan.robot if plan else pairs[0][0])
     return graph_of_observers(list(observers.values()), title, plan, poses=arguments.poses)
 
@@ -152,18 +175,20 @@ def graph_of_observers(
 
     What the plan expects and nobody publishes is said to be missing.
     """
-    from tfcompose.draw import Arrow, Graph
+    from tfcompose.compiler.draw import Arrow, Graph
 
     edges = [one for observer in observers for one in observer.edges(observer.until_ns)]
     children = {one.stream.child for one in edges}
     missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
     arrows = [_arrow(one, poses=poses) for one in edges]
-    arrows += [Arrow(edge.parent, edge.child, edge.kind, edge.node, "missing", "") for edge in missing]
+    arrows += [
+        Arrow(edge.parent, edge.child, edge.kind, edge.node, "missing", "") for edge in missing
+    ]
     return Graph(printable(title), (), tuple(arrows))
 
 
 def _arrow(one: EdgeState, *, poses: bool) -> Arrow:
-    from tfcompose.draw import Arrow
+    from tfcompose.compiler.draw import Arrow
 
     stream = one.stream
     rate = "" if stream.static or one.timing.rate is None else f"{one.timing.rate:.1f} Hz"
@@ -174,7 +199,7 @@ def _arrow(one: EdgeState, *, poses: bool) -> Arrow:
 
 
 def _pose(pose: Pose) -> str:
-    from tfcompose.render.tree import short_pose
+    from tfcompose.compiler.render.tree import short_pose
 
     length = norm(pose.quat_xyzw)
     sound = length > 0 and length < float("inf")

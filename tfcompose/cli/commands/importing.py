@@ -1,9 +1,9 @@
 """Write a robot file from URDF, launch files, scripts or a running robot.
 
-A URDF or xacro file: building the result gives the same URDF, and chains of frames that match a preset become sensors.
-A launch file or a shell script: processes, and frames of static transforms. A running tree, a recording: frames with
-their owners. Clearpath's robot.yaml and Autoware's calibrations. What a robot file cannot say is a TODO comment with
-its file and line, and a finding.
+A URDF or xacro file: building the result gives the same URDF, and chains of frames that match a
+preset become sensors. A launch file or a shell script: processes, and frames of static transforms.
+A running tree, a recording: frames with their owners. Clearpath's robot.yaml and Autoware's
+calibrations. What a robot file cannot say is a TODO comment with its file and line, and a finding.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, rej
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.compile import Compiled
-    from tfcompose.files import Target
-    from tfcompose.findings import Finding
-    from tfcompose.importing.draft import Draft
-    from tfcompose.load import Source
-    from tfcompose.urdf.lint import Document
-    from tfcompose.urdf.packages import Packages
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.compiler.urdf.lint import Document
+    from tfcompose.compiler.urdf.packages import Packages
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.files import Target
+    from tfcompose.spec.load import Source
+    from tfcompose.tools.importers.draft import Draft
 
 _LAUNCH = (".py", ".xml", ".launch", ".yaml", ".yml")
 _ENDINGS = frozenset({".urdf", ".xacro", ".sh", ".bash", ".txt", "", *_LAUNCH})
@@ -46,29 +46,44 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="*",
         default=[],
         metavar="NAME:=VALUE",
-        help="an argument of the xacro or launch file; of individual_params, vehicle_id and sensor_model",
+        help=(
+            "an argument of the xacro or launch file; of individual_params, vehicle_id and"
+            " sensor_model"
+        ),
     )
     parser.add_argument("--live", action="store_true", help="import the running tree")
     add_bag(parser, "import a recording")
     add_for(parser, "with --live, observe for S seconds; default: 10")
-    parser.add_argument("--namespace", type=namespace, default="", help="of the topics tf and tf_static")
-    parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file here; default: print it")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", help="of the topics tf and tf_static"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="write the robot file here; default: print it"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
     parser.add_argument("--robot", metavar="NAME", help="the robot's name; default: the source's")
     parser.add_argument(
         "--package", action="append", default=[], metavar="NAME=FOLDER", dest="packages",
         help="folder of a package that is not installed; repeatable",
     )  # fmt: skip
-    parser.add_argument("--no-sensors", action="store_true", help="keep frames as frames, do not match presets")
     parser.add_argument(
-        "--all-branches", action="store_true", help="of a launch file, take what conditions leave out, too"
+        "--no-sensors", action="store_true", help="keep frames as frames, do not match presets"
     )
-    parser.add_argument("--keep-going", action="store_true", help="write as much as possible of a source with errors")
+    parser.add_argument(
+        "--all-branches",
+        action="store_true",
+        help="of a launch file, take what conditions leave out, too",
+    )
+    parser.add_argument(
+        "--keep-going",
+        action="store_true",
+        help="write as much as possible of a source with errors",
+    )
 
 
 def run(arguments: Namespace) -> int:
     """Import; exit code 0, 1 with errors in the source, 2 after wrong use or where something cannot be read."""
-    from tfcompose.findings import RejectedError
+    from tfcompose.foundation.findings import RejectedError
 
     _check_use(arguments)
     try:
@@ -84,7 +99,7 @@ def run(arguments: Namespace) -> int:
 def _import_urdf(arguments: Namespace) -> int:
     from dataclasses import replace
 
-    from tfcompose.urdf.lint import read_urdf
+    from tfcompose.compiler.urdf.lint import read_urdf
 
     _refuse_more(arguments)
     packages = pairs(arguments.packages, "=")
@@ -96,8 +111,13 @@ def _import_urdf(arguments: Namespace) -> int:
         fail("nothing was written; --keep-going writes as much as possible")
     text, more_errors = _robot_file(document, arguments, known.local | packages)
     if more_errors and not arguments.keep_going:
-        print_findings([replace(one, span=None) for one in more_errors], sys.stderr)  # places in what is not written
-        fail("nothing was written: a robot file cannot express all of the source; --keep-going writes it anyway")
+        print_findings(
+            [replace(one, span=None) for one in more_errors], sys.stderr
+        )  # places in what is not written
+        fail(
+            "nothing was written: a robot file cannot express all of the source; --keep-going"
+            " writes it anyway"
+        )
     _write(text, arguments.output)
     return FAILED if errors or more_errors else 0
 
@@ -107,8 +127,8 @@ def _import_bringup(arguments: Namespace) -> int:
     from tempfile import NamedTemporaryFile
 
     from tfcompose.cli.reading import STDIN, read_text
-    from tfcompose.importing.draft import Draft, robot_name
-    from tfcompose.importing.shell import add_script
+    from tfcompose.tools.importers.draft import Draft, robot_name
+    from tfcompose.tools.importers.shell import add_script
 
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
@@ -134,18 +154,24 @@ def _import_bringup(arguments: Namespace) -> int:
 
 def _refuse_more(arguments: Namespace) -> None:
     if arguments.more:
-        fail(f"{arguments.more[0]} is not NAME:=VALUE, and only calibrations can be several files", UNREADABLE)
+        fail(
+            f"{arguments.more[0]} is not NAME:=VALUE, and only calibrations can be several files",
+            UNREADABLE,
+        )
 
 
 def _refuse_given(arguments: Namespace) -> None:
     if arguments.given:
-        fail(f"{next(iter(arguments.given))}:=…: only xacro and launch files take arguments", UNREADABLE)
+        fail(
+            f"{next(iter(arguments.given))}:=…: only xacro and launch files take arguments",
+            UNREADABLE,
+        )
 
 
 def _kit(file: str) -> Source | None:
     """Return a YAML file that is no launch file, or None."""
     from tfcompose.cli.reading import read_text
-    from tfcompose.load import load
+    from tfcompose.spec.load import load
 
     source = load(read_text(file), file) if file.endswith((".yaml", ".yml")) else None
     return source if source and "launch" not in source.data else None
@@ -153,8 +179,8 @@ def _kit(file: str) -> Source | None:
 
 def _add_kits(draft: Draft, first: Source, arguments: Namespace) -> None:
     from tfcompose.cli.reading import read_text
-    from tfcompose.importing.kits import add_kit
-    from tfcompose.load import load
+    from tfcompose.spec.load import load
+    from tfcompose.tools.importers.kits import add_kit
 
     _refuse_given(arguments)
     target = _target(arguments)
@@ -166,25 +192,35 @@ def _add_kits(draft: Draft, first: Source, arguments: Namespace) -> None:
 
 def _add_vehicles(draft: Draft, arguments: Namespace) -> None:
     from tfcompose.cli.reading import read_text
-    from tfcompose.importing.kits import add_vehicles
-    from tfcompose.load import load
+    from tfcompose.spec.load import load
+    from tfcompose.tools.importers.kits import add_vehicles
 
     _refuse_more(arguments)
     for name in arguments.given.keys() - {"vehicle_id", "sensor_model"}:
-        fail(f"{name}:=…: a folder of Autoware's individual_params takes vehicle_id and sensor_model", UNREADABLE)
+        fail(
+            f"{name}:=…: a folder of Autoware's individual_params takes vehicle_id and"
+            " sensor_model",
+            UNREADABLE,
+        )
     folder = Path(arguments.file)
-    add_vehicles(draft, folder, _target(arguments), arguments.given, lambda file: load(read_text(file), file))
+    add_vehicles(
+        draft,
+        folder,
+        _target(arguments),
+        arguments.given,
+        lambda file: load(read_text(file), file),
+    )
 
 
 def _import_observed(arguments: Namespace) -> int:
     """Import what is published, or was recorded."""
     from tfcompose.cli.compiling import library
     from tfcompose.cli.live import observe, read_bag
-    from tfcompose.importing.draft import Draft, robot_name
-    from tfcompose.importing.observed import Observed
-    from tfcompose.live.edges import SETTLE_S, TreeObserver
-    from tfcompose.plan.topics import topics_below
-    from tfcompose.ros.processes import words_of
+    from tfcompose.model.plan.topics import topics_below
+    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+    from tfcompose.tf.ros.processes import words_of
+    from tfcompose.tools.importers.draft import Draft, robot_name
+    from tfcompose.tools.importers.observed import Observed
 
     observer = TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S)
     topics = topics_below(arguments.namespace)
@@ -207,7 +243,11 @@ def _import_observed(arguments: Namespace) -> int:
 
 def _with_root(text: str) -> str:
     """Return lines of a launch file in XML as one: from its first line on, elements without ``<launch>`` around."""
-    return f"<launch>{text}</launch>" if re.match(r"\s*<(node|include|arg|group|param|remap)\b", text) else text
+    return (
+        f"<launch>{text}</launch>"
+        if re.match(r"\s*<(node|include|arg|group|param|remap)\b", text)
+        else text
+    )
 
 
 def _ending_of(text: str) -> str:
@@ -226,8 +266,8 @@ def _ending_of(text: str) -> str:
 def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") -> None:
     from tfcompose.cli.compiling import library
     from tfcompose.cli.reading import read_text
-    from tfcompose.importing.descriptions import Workshop, add_descriptions
-    from tfcompose.importing.launch import Launch, add_launch
+    from tfcompose.tools.importers.descriptions import Workshop, add_descriptions
+    from tfcompose.tools.importers.launch import Launch, add_launch
 
     _refuse_more(arguments)
     read_text(file)  # refuses what is no text
@@ -245,7 +285,7 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
     """Write a draft, with what ``lint`` finds in it; return the exit code."""
     from dataclasses import replace
 
-    from tfcompose.importing.draft import text_with_findings
+    from tfcompose.tools.importers.draft import text_with_findings
 
     if draft.is_empty():
         print_findings(draft.found, sys.stderr)
@@ -253,18 +293,26 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
     text, compiled = text_with_findings(draft, lambda text: _lint(text, arguments))
     _write(text, arguments.output)
     print_findings(draft.found, sys.stderr)
-    found = compiled.found if arguments.output else [replace(one, span=None, notes=()) for one in compiled.found]
+    found = (
+        compiled.found
+        if arguments.output
+        else [replace(one, span=None, notes=()) for one in compiled.found]
+    )
     print_findings(list(dict.fromkeys(found)), sys.stderr)
     return FAILED if compiled.errors else 0
 
 
 def _known_packages(packages: dict[str, str]) -> Packages:
     from tfcompose.cli.compiling import disk
-    from tfcompose.findings import Span
-    from tfcompose.urdf.packages import Packages
+    from tfcompose.compiler.urdf.packages import Packages
+    from tfcompose.foundation.findings import Span
 
-    named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
-    return Packages(disk(), named, advice="--package {name}=FOLDER, or source the workspace's setup file")
+    named = {
+        name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()
+    }
+    return Packages(
+        disk(), named, advice="--package {name}=FOLDER, or source the workspace's setup file"
+    )
 
 
 def _check_use(arguments: Namespace) -> None:
@@ -279,31 +327,45 @@ def _check_use(arguments: Namespace) -> None:
     if not arguments.file:
         _refuse_given(arguments)
     if arguments.file and Path(arguments.file).suffix not in _ENDINGS:
-        fail(f"{arguments.file}: only URDF, xacro, launch and YAML files and shell scripts can be imported", UNREADABLE)
+        fail(
+            f"{arguments.file}: only URDF, xacro, launch and YAML files and shell scripts can be"
+            " imported",
+            UNREADABLE,
+        )
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
-        fail(f"--robot {arguments.robot}: use lower case letters, digits and _, beginning with a letter", UNREADABLE)
+        fail(
+            f"--robot {arguments.robot}: use lower case letters, digits and _, beginning with a"
+            " letter",
+            UNREADABLE,
+        )
     if arguments.output and Path(arguments.output).exists() and not arguments.force:
         fail(f"{arguments.output} exists already; --force overwrites it", UNREADABLE)
 
 
 def _target(arguments: Namespace) -> Target:
-    from tfcompose.files import Target
+    from tfcompose.model.files import Target
 
-    return Target("as-written", posixpath.dirname(arguments.output or "") or ".", Path.cwd().as_posix())
+    return Target(
+        "as-written", posixpath.dirname(arguments.output or "") or ".", Path.cwd().as_posix()
+    )
 
 
 def _lint(text: str, arguments: Namespace) -> Compiled:
     from tfcompose.cli.compiling import disk, library
     from tfcompose.cli.reading import read_text
-    from tfcompose.compile import compile_robot
+    from tfcompose.compiler.compile import compile_robot
 
-    return compile_robot(text, arguments.output or "robot.yaml", library(), read=read_text, disk=disk())
+    return compile_robot(
+        text, arguments.output or "robot.yaml", library(), read=read_text, disk=disk()
+    )
 
 
-def _robot_file(document: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
+def _robot_file(
+    document: Document, arguments: Namespace, packages: dict[str, str]
+) -> tuple[str, list[Finding]]:
     """Return the robot file, and the errors that it has where the source has none."""
     from tfcompose.cli.compiling import library
-    from tfcompose.importing.robot_file import imported, with_findings
+    from tfcompose.tools.importers.robot_file import imported, with_findings
 
     presets = None if arguments.no_sensors else library()
     robot = imported(document, _target(arguments), arguments.robot or "", packages, presets)

@@ -1,7 +1,7 @@
 """Write a robot file to begin with.
 
-Write a small, commented robot file that lints and starts at once, and print the next commands. Nothing that is there is
-overwritten.
+Write a small, commented robot file that lints and starts at once, and print the next commands.
+Nothing that is there is overwritten.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tfcompose.cli.terminal import UNREADABLE, fail
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-FOLDER = Path(__file__).parents[2] / "templates"
+FOLDER = Path(__file__).parents[2] / "data" / "templates"
 #: By template: what it is, and the files that it is made of besides the first.
 TEMPLATES = {
     "diffbot": ("a base with two driven wheels, a laser and a depth camera", ()),
@@ -29,11 +29,17 @@ SCHEMA = "robot.schema.json"
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("template", nargs="?", choices=tuple(TEMPLATES), default="diffbot", help="default: diffbot")
-    parser.add_argument("--name", metavar="NAME", help="the robot's name; default: the template's")
-    parser.add_argument("-o", "--output", metavar="FILE", default=DEFAULT_FILE, help=f"default: {DEFAULT_FILE}")
     parser.add_argument(
-        "--schema", action="store_true", help=f"also write {SCHEMA}, with which editors complete and check the file"
+        "template", nargs="?", choices=tuple(TEMPLATES), default="diffbot", help="default: diffbot"
+    )
+    parser.add_argument("--name", metavar="NAME", help="the robot's name; default: the template's")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", default=DEFAULT_FILE, help=f"default: {DEFAULT_FILE}"
+    )
+    parser.add_argument(
+        "--schema",
+        action="store_true",
+        help=f"also write {SCHEMA}, with which editors complete and check the file",
     )
     parser.add_argument("--list", action="store_true", help="list the templates and exit")
 
@@ -45,9 +51,17 @@ def run(arguments: Namespace) -> int:
         print(*(f"{name:<{width}}  {about}" for name, (about, _) in TEMPLATES.items()), sep="\n")
         return 0
     if arguments.name is not None and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", arguments.name):
-        fail(f"{arguments.name} is not a robot's name: a letter, then letters, digits and _", UNREADABLE)
+        fail(
+            f"{arguments.name} is not a robot's name: a letter, then letters, digits and _",
+            UNREADABLE,
+        )
     output = Path(arguments.output)
-    files = _files(arguments.template, arguments.name or arguments.template, output, with_schema=arguments.schema)
+    files = _files(
+        arguments.template,
+        arguments.name or arguments.template,
+        output,
+        with_schema=arguments.schema,
+    )
     there = [str(path) for path in files if path.exists() or path.is_symlink()]
     if there:
         fail(f"nothing was written: {', '.join(there)} exists; -o FILE names another", UNREADABLE)

@@ -1,7 +1,7 @@
 """Check robot files and report every problem; needs no ROS.
 
-Report every problem in robot files, with its place. Each file is checked alone and with each of its profiles, and alone
-in the combinations of values that its args can have.
+Report every problem in robot files, with its place. Each file is checked alone and with each of
+its profiles, and alone in the combinations of values that its args can have.
 """
 
 from __future__ import annotations
@@ -16,30 +16,41 @@ from typing import TYPE_CHECKING
 
 from tfcompose import __version__
 from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
-from tfcompose.cli.terminal import UNREADABLE, can_redraw, exit_code_of, fail, has_reader, print_findings, warn
+from tfcompose.cli.terminal import (
+    UNREADABLE,
+    can_redraw,
+    exit_code_of,
+    fail,
+    has_reader,
+    print_findings,
+    warn,
+)
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Callable, Mapping, Sequence
 
     from tfcompose.cli.fixing import Fixer
-    from tfcompose.compile import Compiled
-    from tfcompose.findings import Finding
-    from tfcompose.language import Given
-    from tfcompose.load import Source
-    from tfcompose.resolve import Library
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.compiler.resolve import Library
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.spec.language import Given
+    from tfcompose.spec.load import Source
 
     _Stamp = tuple[int, int] | None
 
-#: What a robot file has at the begin of a line: its first key, or, with that misspelt, two others of its keys.
+#: What a robot file has at the begin of a line: its first key, or, with that misspelt, two others
+#: of its keys.
 _ROBOT = re.compile(
-    rb"^tfcompose\s*:|\A(?=[\s\S]*^robot\s*:)(?=[\s\S]*^(?:links|joints|frames|sensors|parts)\s*:)", re.MULTILINE
+    rb"^tfcompose\s*:|\A(?=[\s\S]*^robot\s*:)(?=[\s\S]*^(?:links|joints|frames|sensors|parts)\s*:)",
+    re.MULTILINE,
 )
 
 URDF_ENDINGS = (".urdf", ".xacro")
 #: How often --watch checks the files, in seconds.
 CHECK_EVERY_S = 0.3
-#: For how long a file is judged in combinations of its arguments, in seconds; the first is always judged.
+#: For how long a file is judged in combinations of its arguments, in seconds; the first is always
+#: judged.
 JUDGE_FOR_S = 60.0
 #: Moves the cursor home and clears the screen (ECMA-48).
 CLEAR = "\033[H\033[2J"
@@ -52,7 +63,10 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="*",
         metavar="FILE",
         default=[],
-        help="robot files, folders of them, .urdf and .xacro files, or - for standard input; default: robot.yaml",
+        help=(
+            "robot files, folders of them, .urdf and .xacro files, or - for standard input;"
+            " default: robot.yaml"
+        ),
     )
     parser.add_argument(
         "--urdf", action="append", default=[], metavar="FILE", dest="urdfs",
@@ -60,22 +74,43 @@ def arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add_variant(parser, "check only this combination")
     add_format(parser, "json", "sarif", "github", "junit")
-    parser.add_argument("--fix", action="store_true", help="apply unambiguous fixes to the named files")
     parser.add_argument(
-        "--diff", action="store_true", help="print what --fix would change, and write nothing; exit code 1 if anything"
+        "--fix", action="store_true", help="apply unambiguous fixes to the named files"
     )
     parser.add_argument(
-        "--fail-on", choices=("error", "warning"), default="error", help="lowest severity that exits 1; default: error"
+        "--diff",
+        action="store_true",
+        help="print what --fix would change, and write nothing; exit code 1 if anything",
+    )
+    parser.add_argument(
+        "--fail-on",
+        choices=("error", "warning"),
+        default="error",
+        help="lowest severity that exits 1; default: error",
     )
     parser.add_argument(
         "--select", action="extend", type=codes, default=[], metavar="CODES",
         help="report only these codes, or codes that begin so: TF401,TF7; what prevents a build is always reported",
     )  # fmt: skip
     parser.add_argument(
-        "--ignore", action="extend", type=codes, default=[], metavar="CODES", help="do not report these codes"
+        "--ignore",
+        action="extend",
+        type=codes,
+        default=[],
+        metavar="CODES",
+        help="do not report these codes",
     )
-    parser.add_argument("--skip-foreign", action="store_true", help="skip named YAML files that are not robot files")
-    parser.add_argument("-w", "--watch", action="store_true", help="check again whenever a file changes, until Ctrl-C")
+    parser.add_argument(
+        "--skip-foreign",
+        action="store_true",
+        help="skip named YAML files that are not robot files",
+    )
+    parser.add_argument(
+        "-w",
+        "--watch",
+        action="store_true",
+        help="check again whenever a file changes, until Ctrl-C",
+    )
 
 
 def codes(text: str) -> list[str]:
@@ -84,15 +119,19 @@ def codes(text: str) -> list[str]:
     Raises:
         ArgumentTypeError: if there is no such code, or none that may be silenced.
     """
-    from tfcompose.catalogue import CATALOGUE
+    from tfcompose.foundation.catalogue import CATALOGUE
 
     beginnings = [one.strip() for one in text.split(",")]
     for one in beginnings:
         named = [code for code in CATALOGUE.values() if one and code.code.startswith(one)]
         if not named:
-            raise ArgumentTypeError(f"there is no code {one}; tfcompose explain --table lists them")
+            raise ArgumentTypeError(
+                f"there is no code {one}; tfcompose explain --table lists them"
+            )
         if not any(code.can_be_allowed for code in named):
-            raise ArgumentTypeError(f"{one} is reported always: without it a robot cannot be read or built")
+            raise ArgumentTypeError(
+                f"{one} is reported always: without it a robot cannot be read or built"
+            )
     return beginnings
 
 
@@ -113,7 +152,9 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
 
     presets = library()
     files = _files(arguments)
-    urdfs = dict.fromkeys([*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))])
+    urdfs = dict.fromkeys(
+        [*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))]
+    )
     robots = [file for file in files if file not in urdfs]
 
     arguments.is_one = len(files) + len(arguments.urdfs) == 1
@@ -165,7 +206,9 @@ def _watch(arguments: Namespace) -> int:
 
 def _stamps(arguments: Namespace) -> dict[str, _Stamp]:
     """Return the stamps of the files that are named."""
-    return {file: _stamp(file) for file in (*_files(arguments), *arguments.urdfs, *arguments.overlays)}
+    return {
+        file: _stamp(file) for file in (*_files(arguments), *arguments.urdfs, *arguments.overlays)
+    }
 
 
 def _stamp(file: str) -> _Stamp:
@@ -183,12 +226,14 @@ def _files(arguments: Namespace) -> list[str]:
     files = dict.fromkeys(file for name in names for file in robots_in(name))
     if not arguments.skip_foreign:
         return list(files)
-    return [file for file in files if not file.endswith((".yaml", ".yml")) or _is_robot(Path(file))]
+    return [
+        file for file in files if not file.endswith((".yaml", ".yml")) or _is_robot(Path(file))
+    ]
 
 
 def _selected(found: list[Finding], arguments: Namespace) -> list[Finding]:
     """Return the findings that --select and --ignore leave."""
-    from tfcompose.catalogue import CATALOGUE
+    from tfcompose.foundation.catalogue import CATALOGUE
 
     select, ignore = tuple(arguments.select), tuple(arguments.ignore)
     return [
@@ -207,15 +252,15 @@ def _failing(arguments: Namespace) -> frozenset[str]:
 def _lint_urdf(file: str, given: Mapping[str, str]) -> list[Finding]:
     """Return what is wrong with a URDF or xacro file, of which these arguments are given."""
     from tfcompose.cli.compiling import disk
-    from tfcompose.urdf.lint import lint_urdf
-    from tfcompose.urdf.packages import Packages
+    from tfcompose.compiler.urdf.lint import lint_urdf
+    from tfcompose.compiler.urdf.packages import Packages
 
     return lint_urdf(file, Packages(disk(), advice="source the workspace's setup file"), given)
 
 
 def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
     """Fix the files, or print the difference, and return what remains in each; a file that cannot be written, alone."""
-    from tfcompose.findings import Span, finding
+    from tfcompose.foundation.findings import Span, finding
 
     found = {file: fixer.fix(file) for file in fixer.files}
     if arguments.diff:
@@ -258,44 +303,48 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
     """Print the findings of each file; beside a difference, to stderr."""
     form, found = arguments.format, [one for case in cases.values() for one in case]
     if form == "text":
-        from tfcompose.render.text import summary
+        from tfcompose.compiler.render.text import summary
 
         stream = sys.stderr if arguments.diff else sys.stdout
         print_findings(found, stream)
         stream.write(summary(found, files, warnings_fail=arguments.fail_on == "warning"))
     elif form == "json":
-        from tfcompose.render.formats import render_json
+        from tfcompose.compiler.render.formats import render_json
 
         sys.stdout.write(render_json(found))
     elif form == "github":
-        from tfcompose.render.formats import render_github
+        from tfcompose.compiler.render.formats import render_github
 
         sys.stdout.write(render_github(found))
     elif form == "junit":
-        from tfcompose.render.formats import render_junit
+        from tfcompose.compiler.render.formats import render_junit
 
         rows = [("lint", file, tuple(case)) for file, case in cases.items()]
         sys.stdout.write(render_junit("tfcompose", rows, failing=_failing(arguments), seconds=0.0))
     else:
-        from tfcompose.pages import page
-        from tfcompose.render.formats import render_sarif
+        from tfcompose.compiler.pages import page
+        from tfcompose.compiler.render.formats import render_sarif
 
-        sys.stdout.write(render_sarif(found, __version__, {one.code: page(one.code) for one in found}))
+        sys.stdout.write(
+            render_sarif(found, __version__, {one.code: page(one.code) for one in found})
+        )
 
 
-def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]) -> list[Finding]:
+def lint_file(
+    file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]
+) -> list[Finding]:
     """Return the findings of one file: alone and with each of its profiles, or with what is asked for only.
 
     Alone it is judged in each combination of its arguments' values.
     """
     from dataclasses import replace
 
-    from tfcompose.check import unused_allows
     from tfcompose.cli.compiling import disk, given_by, overlays_of
-    from tfcompose.compile import compile_source
-    from tfcompose.findings import Note, RejectedError
-    from tfcompose.language import profiles_in, with_includes
-    from tfcompose.load import load
+    from tfcompose.compiler.check import unused_allows
+    from tfcompose.compiler.compile import compile_source
+    from tfcompose.foundation.findings import Note, RejectedError
+    from tfcompose.spec.language import profiles_in, with_includes
+    from tfcompose.spec.load import load
 
     try:
         source = with_includes(load(read(file), file), read)
@@ -348,11 +397,13 @@ def _judged(
     from dataclasses import replace
 
     from tfcompose.cli.combinations import combinations, merged
-    from tfcompose.findings import RejectedError, Span
-    from tfcompose.language import GivenArg, alternatives_of, composed
+    from tfcompose.foundation.findings import RejectedError, Span
+    from tfcompose.spec.language import GivenArg, alternatives_of, composed
 
     try:
-        alternatives, first = alternatives_of(composed(source, arguments.profiles, overlays, given), given, source)
+        alternatives, first = alternatives_of(
+            composed(source, arguments.profiles, overlays, given), given, source
+        )
     except RejectedError as error:
         return list(error.findings), []
     judged = []
@@ -360,8 +411,13 @@ def _judged(
     every = combinations(alternatives, first)
     for index, one in enumerate(every):
         if time.monotonic() - begin > JUDGE_FOR_S:
-            warn(f"{source.file}: judged in {index} of {len(every)} combinations of its args, within {JUDGE_FOR_S:g} s")
+            warn(
+                f"{source.file}: judged in {index} of {len(every)} combinations of its args,"
+                f" within {JUDGE_FOR_S:g} s"
+            )
             break
         args = {name: GivenArg(value, Span(f"{name}:={value}")) for name, value in one.items()}
-        judged.append((one, compiled(replace(given, args={**given.args, **args}), arguments.profiles)))
+        judged.append(
+            (one, compiled(replace(given, args={**given.args, **args}), arguments.profiles))
+        )
     return merged([(one, case.found) for one, case in judged]), [case for _, case in judged]

@@ -1,7 +1,7 @@
 """Print the logs of a robot's processes, also after it has ended.
 
-Print the logs of a running or ended robot, oldest line first. Logs are kept on disk and rotated. Lines of the launcher
-itself are those of tfcompose.
+Print the logs of a running or ended robot, oldest line first. Logs are kept on disk and rotated.
+Lines of the launcher itself are those of tfcompose.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_all_hosts, add_robot, count, on_all_hosts
 from tfcompose.cli.terminal import coloured, fail, has_reader
-from tfcompose.render.text import PLAIN
+from tfcompose.compiler.render.text import PLAIN
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -29,12 +29,19 @@ READ_EVERY_S = 0.2
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("name", nargs="*", metavar="NAME", help="only these processes; default: all")
     parser.add_argument(
-        "-f", "--follow", action="store_true", help="print new lines as they come, until the robot ends"
+        "name", nargs="*", metavar="NAME", help="only these processes; default: all"
+    )
+    parser.add_argument(
+        "-f",
+        "--follow",
+        action="store_true",
+        help="print new lines as they come, until the robot ends",
     )
     parser.add_argument("-n", "--lines", type=count, metavar="N", help="only the last N lines")
-    parser.add_argument("-t", "--times", action="store_true", help="print the time before each line")
+    parser.add_argument(
+        "-t", "--times", action="store_true", help="print the time before each line"
+    )
     add_robot(parser)
     add_all_hosts(parser)
 
@@ -44,10 +51,14 @@ def run(arguments: Namespace) -> int:
     if on_all_hosts(arguments):
         from tfcompose.cli.all_hosts import run_on_all_hosts
 
-        options = [option for option, given in (("--follow", arguments.follow), ("--times", arguments.times)) if given]
+        options = [
+            option
+            for option, given in (("--follow", arguments.follow), ("--times", arguments.times))
+            if given
+        ]
         options += [] if arguments.lines is None else ["--lines", str(arguments.lines)]
         return run_on_all_hosts(arguments, "logs", *options, processes=arguments.name)
-    from tfcompose.findings import did_you_mean
+    from tfcompose.foundation.findings import did_you_mean
     from tfcompose.launcher.output import Follower, logged, read_logs
 
     place = _place(arguments.robot, shlex.join(["logs", *arguments.name]))
@@ -94,7 +105,8 @@ class _Printer:
         colours = COLOURS if coloured(sys.stdout) else ("",)
         ends = PLAIN if coloured(sys.stdout) else ""
         self._prefixes = {
-            name: f"{colours[index % len(colours)]}{prefix_of(name, width)}{ends}" for index, name in enumerate(names)
+            name: f"{colours[index % len(colours)]}{prefix_of(name, width)}{ends}"
+            for index, name in enumerate(names)
         }
         self._times = times
 

@@ -1,7 +1,8 @@
 """Explain a topic or a command, or write the whole documentation as one HTML file.
 
-Print the page of a topic, such as language or guard; the options of a command, with its page; or what a key of a robot
-file means: help sensors, help sensors.place. Without a word, list commands and topics.
+Print the page of a topic, such as language or guard; the options of a command, with its page; or
+what a key of a robot file means: help sensors, help sensors.place. Without a word, list commands
+and topics.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("word", nargs="?", metavar="TOPIC|COMMAND|KEY", help="what to explain")
-    parser.add_argument("--html", metavar="FILE", help="write all topics and commands to FILE, as one page")
+    parser.add_argument(
+        "--html", metavar="FILE", help="write all topics and commands to FILE, as one page"
+    )
 
 
 def run(arguments: Namespace) -> int:
@@ -28,23 +31,28 @@ def run(arguments: Namespace) -> int:
 
     from tfcompose.cli.documentation import TOPICS, for_terminal, html, page
     from tfcompose.cli.terminal import table_width
-    from tfcompose.findings import did_you_mean
+    from tfcompose.foundation.findings import did_you_mean
 
     if arguments.html:
         try:
             Path(arguments.html).write_text(html(arguments.commands), "utf-8")
         except ModuleNotFoundError:
-            fail("--html needs the package markdown-it-py: pip install 'tfcompose[docs]'", UNREADABLE)
+            fail(
+                "--html needs the package markdown-it-py: pip install 'tfcompose[docs]'",
+                UNREADABLE,
+            )
         except OSError as error:
             fail(f"{arguments.html} cannot be written: {error.strerror}", UNREADABLE)
         print(f"wrote {arguments.html}")
         return 0
     text = page(arguments.word, arguments.commands)
     if text is None:
-        from tfcompose.language.reference import keys
+        from tfcompose.spec.language.reference import keys
 
         known = [*TOPICS, *arguments.commands, *keys()]
-        advice = did_you_mean(arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(TOPICS)}")
+        advice = did_you_mean(
+            arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(TOPICS)}"
+        )
         fail(f"no topic, command or key {arguments.word}; {advice}", UNREADABLE)
     columns = table_width(sys.stdout)
     pydoc.pager(text if columns is None else for_terminal(text, columns))

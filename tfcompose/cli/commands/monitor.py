@@ -1,10 +1,11 @@
 """Show who publishes each live edge, how often, how evenly and how late.
 
-Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the standard deviation of the
-time between messages), longest gap, age of the newest stamp, and delay (arrival minus stamp), over the last 5 to 10 s,
-or over everything with --for or --bag. On a terminal the table refreshes in place until Ctrl-C; into a pipe each table
-follows the last. With A and B only the edges between them are shown, in their order, and the net delay: how old the
-newest pose of B in A is.
+Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the
+standard deviation of the time between messages), longest gap, age of the newest stamp, and delay
+(arrival minus stamp), over the last 5 to 10 s, or over everything with --for or --bag. On a
+terminal the table refreshes in place until Ctrl-C; into a pipe each table follows the last. With A
+and B only the edges between them are shown, in their order, and the net delay: how old the newest
+pose of B in A is.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.cli.tables import LiveLines
-    from tfcompose.live.edges import TreeObserver
+    from tfcompose.tf.live.edges import TreeObserver
 
 #: Of the running tree the last 5 to 10 s are shown.
 WINDOW_S = 5.0
@@ -28,13 +29,19 @@ WINDOW_S = 5.0
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("a", nargs="?", metavar="A", help="with B: only the edges between the frames A and B")
+    parser.add_argument(
+        "a", nargs="?", metavar="A", help="with B: only the edges between the frames A and B"
+    )
     parser.add_argument("b", nargs="?", metavar="B", help="the frame at the other end")
     add_for(parser, "print one table of S seconds and exit; default: until Ctrl-C")
     add_bag(parser)
     add_namespace(parser)
     parser.add_argument(
-        "--every", type=positive, default=1.0, metavar="S", help="print a table every S seconds; default: 1"
+        "--every",
+        type=positive,
+        default=1.0,
+        metavar="S",
+        help="print a table every S seconds; default: 1",
     )
     add_format(parser, text="json: one object per table; default: text")
 
@@ -43,8 +50,8 @@ def run(arguments: Namespace) -> int:
     """Monitor until a signal comes; exit code 1 if no TF came, or no chain from A to B is there, 2 for a bad bag."""
     from tfcompose.cli.live import observe, read_bag
     from tfcompose.cli.tables import LiveLines
-    from tfcompose.live.edges import SETTLE_S, TreeObserver
-    from tfcompose.plan.topics import topics_below
+    from tfcompose.model.plan.topics import topics_below
+    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 
     if arguments.bag and arguments.duration:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
@@ -59,9 +66,17 @@ def run(arguments: Namespace) -> int:
     if arguments.bag:
         read_bag(arguments.bag, {topics: observer})
         return _show(arguments, observer, None)
-    lines = LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
+    lines = (
+        LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
+    )
     show = None if arguments.duration and not lines else partial(_show, arguments, observer, lines)
-    observe("tfcompose_monitor", {topics: observer}, duration_s=arguments.duration, every_s=arguments.every, show=show)
+    observe(
+        "tfcompose_monitor",
+        {topics: observer},
+        duration_s=arguments.duration,
+        every_s=arguments.every,
+        show=show,
+    )
     return _show(arguments, observer, lines) if arguments.duration else 0
 
 
@@ -72,14 +87,18 @@ def _namespace_here() -> str:
         SystemExit: after naming the namespaces, if it has several and none of them is global.
     """
     from tfcompose.cli.runs import run_of_domain
-    from tfcompose.plan.topics import GLOBAL, namespace_options, parts_of
+    from tfcompose.model.plan.topics import GLOBAL, namespace_options, parts_of
 
     running = run_of_domain()
     pairs = list(parts_of(running[1])) if running else []
     if running is None or not pairs or GLOBAL in pairs:
         return ""
     if len(pairs) > 1:
-        fail(f"{running[0].name} has several trees: {namespace_options(moving for moving, _ in pairs)}", UNREADABLE)
+        fail(
+            f"{running[0].name} has several trees:"
+            f" {namespace_options(moving for moving, _ in pairs)}",
+            UNREADABLE,
+        )
     warn(f"{running[0].name} runs here, on {pairs[0][0]}")
     return pairs[0][0].rpartition("/")[0]
 
@@ -88,18 +107,22 @@ def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None) 
     """Print one table; return 1 if there is no chain between the two frames."""
     from tfcompose.cli.edge_table import chain_line, lines_of, objects_of
     from tfcompose.cli.live import names_of
-    from tfcompose.live.chain import chain_between
-    from tfcompose.plan.topics import topics_below
+    from tfcompose.model.plan.topics import topics_below
+    from tfcompose.tf.live.chain import chain_between
 
     now_ns = observer.until_ns
-    edges = sorted(observer.edges(now_ns), key=lambda state: state.stream.static)  # what moves first
+    edges = sorted(
+        observer.edges(now_ns), key=lambda state: state.stream.static
+    )  # what moves first
     chain = chain_between(edges, *arguments.frames) if arguments.frames else None
     shown = edges if chain is None else () if isinstance(chain, str) else chain.all_edges
     if arguments.format == "json":
         sys.stdout.write(objects_of(shown, observer, now_ns, chain))
         sys.stdout.flush()
         return int(isinstance(chain, str))
-    lines = lines_of(shown, observer, now_ns, table_width(sys.stdout), coloured=coloured(sys.stdout))
+    lines = lines_of(
+        shown, observer, now_ns, table_width(sys.stdout), coloured=coloured(sys.stdout)
+    )
     if chain is not None:
         lines[0] = chain_line(chain, *arguments.frames)
     if not observer.received_any:

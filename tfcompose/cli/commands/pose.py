@@ -1,6 +1,7 @@
 """Print the pose of frame B in frame A, from the robot file alone.
 
-Print the pose of B in A from the robot file alone. Moving frames are taken at their nominal pose, joints at 0.
+Print the pose of B in A from the robot file alone. Moving frames are taken at their nominal pose,
+joints at 0.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_file, add_format, add_frames, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail
-from tfcompose.geometry import Pose
+from tfcompose.foundation.geometry import Pose
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.model import Edge
+    from tfcompose.model.robot import Edge
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -30,12 +31,14 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print the pose; exit code 1 if a frame is not there, or only a driver knows where it is."""
     from tfcompose.cli.compiling import compiled_robot, edges_between
-    from tfcompose.numbers import clean
-    from tfcompose.render.pose import pose_json, pose_text
+    from tfcompose.compiler.render.pose import pose_json, pose_text
+    from tfcompose.foundation.numbers import clean
 
     if arguments.a.endswith((".yaml", ".yml")):
         fail("pose takes [FILE] A B: a second frame is missing", UNREADABLE)
-    rising, falling = edges_between(compiled_robot(arguments.file, arguments), arguments.a, arguments.b)
+    rising, falling = edges_between(
+        compiled_robot(arguments.file, arguments), arguments.a, arguments.b
+    )
     unknown = next((edge for edge in [*rising, *reversed(falling)] if not edge.pose_known), None)
     if unknown:
         fail(
@@ -46,7 +49,9 @@ def run(arguments: Namespace) -> int:
     if arguments.format == "json":
         sys.stdout.write(pose_json(arguments.a, arguments.b, pose))
     else:
-        sys.stdout.write(pose_text(arguments.a, arguments.b, pose) + _moving([*rising, *reversed(falling)]))
+        sys.stdout.write(
+            pose_text(arguments.a, arguments.b, pose) + _moving([*rising, *reversed(falling)])
+        )
     return 0
 
 
@@ -60,5 +65,9 @@ def _moving(edges: list[Edge]) -> str:
     joints = [edge.joint_name for edge in edges if edge.kind == "joint"]
     others = [edge.name for edge in edges if edge.kind == "dynamic"]
     parts = [f"{'joints' if joints[1:] else 'joint'} {', '.join(joints)} at 0"] if joints else []
-    parts += [f"{', '.join(others)} at {'their nominal poses' if others[1:] else 'its nominal pose'}"] if others else []
+    parts += (
+        [f"{', '.join(others)} at {'their nominal poses' if others[1:] else 'its nominal pose'}"]
+        if others
+        else []
+    )
     return f"  with       {' and '.join(parts)}\n" if parts else ""

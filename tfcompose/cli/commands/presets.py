@@ -1,8 +1,9 @@
 """List the known sensors and nodes, or show one in full.
 
-List the presets of sensors by vendor, and of nodes that publish TF by package; or show one. Of a sensor: its frames
-with their values, which of them its driver publishes and the switch for that, the frame of each message. Of a node:
-which edges it publishes, the parameters that name their frames, and its switch. And where the figures are from.
+List the presets of sensors by vendor, and of nodes that publish TF by package; or show one. Of a
+sensor: its frames with their values, which of them its driver publishes and the switch for that,
+the frame of each message. Of a node: which edges it publishes, the parameters that name their
+frames, and its switch. And where the figures are from.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import print_findings, table_width, warn
-from tfcompose.text import counted
+from tfcompose.foundation.text import counted
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.language.preset import PresetSpec
-    from tfcompose.resolve import Library
+    from tfcompose.compiler.resolve import Library
+    from tfcompose.spec.language.preset import PresetSpec
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -28,10 +29,17 @@ def arguments(parser: ArgumentParser) -> None:
         "name",
         nargs="?",
         metavar="NAME",
-        help="a preset; or a vendor, package, kind, part of a name or a word of what it is, to list only those",
+        help=(
+            "a preset; or a vendor, package, kind, part of a name or a word of what it is, to list"
+            " only those"
+        ),
     )
     parser.add_argument(
-        "--preset-path", action="append", default=[], metavar="DIR", help="search this folder first; repeatable"
+        "--preset-path",
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="search this folder first; repeatable",
     )
     parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
 
@@ -40,8 +48,8 @@ def run(arguments: Namespace) -> int:
     """Print the list or the page; exit code 1 if there is no such preset, or one that is wrong."""
     from tfcompose.cli import preset_page
     from tfcompose.cli.compiling import library
-    from tfcompose.findings import RejectedError
-    from tfcompose.resolve.presets import node_preset_names
+    from tfcompose.compiler.resolve.presets import node_preset_names
+    from tfcompose.foundation.findings import RejectedError
 
     known = library().over(arguments.preset_path)
     name = arguments.name
@@ -62,18 +70,26 @@ def _show(facts: dict[str, Any], form: str) -> int:
     text_of = preset_page.node_text if facts["kind"] == "node" else preset_page.text
     columns = table_width(sys.stdout)
     text = text_of(facts, columns and columns - 1)
-    sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else text)
+    sys.stdout.write(
+        json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else text
+    )
     return 0
 
 
 def _list(only: str | None, known: Library, form: str) -> int:
     from tfcompose.cli import preset_page
     from tfcompose.cli.tables import shortened
-    from tfcompose.findings import did_you_mean
+    from tfcompose.foundation.findings import did_you_mean
 
     presets = {name: known.get(name) for name in known.names}
     rows: list[dict[str, str]] = [
-        {"name": name, "vendor": preset.vendor, "model": preset.model, "kind": preset.kind, "about": preset.about}
+        {
+            "name": name,
+            "vendor": preset.vendor,
+            "model": preset.model,
+            "kind": preset.kind,
+            "about": preset.about,
+        }
         | _likeness(preset, known)
         for name, preset in presets.items()
     ]
@@ -82,9 +98,14 @@ def _list(only: str | None, known: Library, form: str) -> int:
     wanted = {only, *_KINDS.get(only or "", ())}
     exact = [row for row in rows if not only or not wanted.isdisjoint(_words(row))]
     partly = [row for row in rows if only and any(only.lower() in word for word in _words(row))]
-    rows = exact or partly or [row for row in rows if only and only.lower() in row["about"].lower()]
+    rows = (
+        exact or partly or [row for row in rows if only and only.lower() in row["about"].lower()]
+    )
     if not rows:
-        warn(f"no preset, vendor or kind {only}; {did_you_mean(only or '', words, 'tfcompose presets lists them')}")
+        warn(
+            f"no preset, vendor or kind {only};"
+            f" {did_you_mean(only or '', words, 'tfcompose presets lists them')}"
+        )
         return 1
     if form == "json":
         sys.stdout.write(json.dumps(rows, indent=2, ensure_ascii=False) + "\n")
@@ -96,7 +117,10 @@ def _list(only: str | None, known: Library, form: str) -> int:
         lines = [f"  {row['name']:<{width}}  {row['kind']:<10}  {_about(row)}" for row in group]
         lines = [shortened(line, columns - 1, at_end=True) for line in lines] if columns else lines
         blocks.append("\n".join([vendor, *lines]))
-    sys.stdout.write("\n\n".join(blocks) + f"\n\n{counted(len(rows), 'preset')}; tfcompose presets NAME shows one\n")
+    sys.stdout.write(
+        "\n\n".join(blocks)
+        + f"\n\n{counted(len(rows), 'preset')}; tfcompose presets NAME shows one\n"
+    )
     return 0
 
 
@@ -105,12 +129,22 @@ def _likeness(preset: PresetSpec, known: Library) -> dict[str, str]:
     if not preset.extends or "/_" in preset.extends:
         return {}
     other = known.get(preset.extends)
-    same = (preset.mount, preset.frames, preset.options) == (other.mount, other.frames, other.options)
+    same = (preset.mount, preset.frames, preset.options) == (
+        other.mount,
+        other.frames,
+        other.options,
+    )
     return {"same_as" if same else "made_from": preset.extends}
 
 
 def _about(row: dict[str, str]) -> str:
-    like = f" (= {row['same_as']})" if "same_as" in row else f" (from {row['made_from']})" if "made_from" in row else ""
+    like = (
+        f" (= {row['same_as']})"
+        if "same_as" in row
+        else f" (from {row['made_from']})"
+        if "made_from" in row
+        else ""
+    )
     return f"{row['model']}: {row['about']}{like}"
 
 

@@ -1,7 +1,7 @@
 """List the processes of running robots.
 
-Show state, PID, uptime, restarts, CPU and memory (PSS of the process group) of each process, and how many of its edges
-are live.
+Show state, PID, uptime, restarts, CPU and memory (PSS of the process group) of each process, and
+how many of its edges are live.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.cli.process_table import Usage
-    from tfcompose.ipc import RobotStatus
+    from tfcompose.model.messages import RobotStatus
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -37,27 +37,46 @@ def run(arguments: Namespace) -> int:
     from tfcompose.launcher.procfs import usage_of
 
     robots, code = _robots(arguments.robot)
-    used = usage_of([process.pid for status in robots.values() for process in status.processes if process.pid])
+    used = usage_of(
+        [process.pid for status in robots.values() for process in status.processes if process.pid]
+    )
     if arguments.format == "json":
-        print(json.dumps([_as_json(name, status, used) for name, status in robots.items()], indent=1))
+        print(
+            json.dumps([_as_json(name, status, used) for name, status in robots.items()], indent=1)
+        )
         return code if robots else FAILED
     if not robots and not code:
-        fail("no robot is running" if arguments.robot is None else f"{arguments.robot} is not running")
+        fail(
+            "no robot is running"
+            if arguments.robot is None
+            else f"{arguments.robot} is not running"
+        )
     for name, status in robots.items():
-        state = "stopping" if status.stopping else "tree complete" if status.complete else "tree not complete"
+        state = (
+            "stopping"
+            if status.stopping
+            else "tree complete"
+            if status.complete
+            else "tree not complete"
+        )
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
         print(f"{name}: {state}, launcher {status.launcher}, since {uptime(status.uptime)}")
         rows = [HEAD, *(row(process, used) for process in status.processes)]
-        print(*TABLE.lines(rows, table_width(sys.stdout), coloured=coloured(sys.stdout), indent="  "), sep="\n")
+        print(
+            *TABLE.lines(
+                rows, table_width(sys.stdout), coloured=coloured(sys.stdout), indent="  "
+            ),
+            sep="\n",
+        )
     return code
 
 
 def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
     """Return those that answer, by their names, and the exit code: 1 after saying who does not."""
     from tfcompose.cli.runs import is_meant, request, running
-    from tfcompose.ipc import RobotStatus, StatusRequest
     from tfcompose.launcher.runtime_dir import RuntimeDirError
+    from tfcompose.model.messages import RobotStatus, StatusRequest
 
     try:
         places = [place for place, _ in running() if name is None or is_meant(place, name)]
@@ -69,7 +88,7 @@ def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
 
 
 def _as_json(name: str, status: RobotStatus, used: Usage) -> dict[str, Any]:
-    from tfcompose.plan.codec import encode
+    from tfcompose.model.plan.codec import encode
 
     data: dict[str, Any] = {"name": name} | encode(status)
     for process in data["processes"]:

@@ -1,7 +1,8 @@
 """Print the language as JSON Schema, or as a reference.
 
-Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors and nodes, of
-plan.json, or of a fleet. With --reference print every key of the language as Markdown instead.
+Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors
+and nodes, of plan.json, or of a fleet. With --reference print every key of the language as
+Markdown instead.
 """
 
 from __future__ import annotations
@@ -15,13 +16,22 @@ from tfcompose.cli.terminal import UNREADABLE, fail
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-_WITHOUT_REFERENCE = {"overlay": "an overlay has the keys of a robot file", "plan": "plan.json is written by build"}
+_WITHOUT_REFERENCE = {
+    "overlay": "an overlay has the keys of a robot file",
+    "plan": "plan.json is written by build",
+}
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("language", nargs="?", choices=LANGUAGES, default="robot", help="default: robot")
-    parser.add_argument("--reference", action="store_true", help="every key with its type, unit, default and example")
+    parser.add_argument(
+        "language", nargs="?", choices=LANGUAGES, default="robot", help="default: robot"
+    )
+    parser.add_argument(
+        "--reference",
+        action="store_true",
+        help="every key with its type, unit, default and example",
+    )
 
 
 def run(arguments: Namespace) -> int:
@@ -31,7 +41,7 @@ def run(arguments: Namespace) -> int:
         return 0
     if arguments.language in _WITHOUT_REFERENCE:
         fail(f"there is no reference: {_WITHOUT_REFERENCE[arguments.language]}", UNREADABLE)
-    from tfcompose.language.reference import reference
+    from tfcompose.spec.language.reference import reference
 
     sys.stdout.write(reference(arguments.language))
     return 0

@@ -9,7 +9,7 @@ from tfcompose.cli.options import add_processes
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.ipc import Verb
+    from tfcompose.model.messages import Verb
 
 
 class ProcessCommand:

@@ -1,8 +1,9 @@
 """Print the tree with kinds, owners and poses, or as it is published.
 
-Print each frame with the kind, owner, rate and pose of its edge. With --live or --bag, print the published tree: each
-frame with the kind, the publishing node, rate and age of the newest stamp, and with FILE also the owner and whether the
-frame is expected, unexpected or missing. Disconnected trees follow each other.
+Print each frame with the kind, owner, rate and pose of its edge. With --live or --bag, print the
+published tree: each frame with the kind, the publishing node, rate and age of the newest stamp,
+and with FILE also the owner and whether the frame is expected, unexpected or missing. Disconnected
+trees follow each other.
 """
 
 from __future__ import annotations
@@ -21,15 +22,15 @@ from tfcompose.cli.options import (
     settle_duration,
 )
 from tfcompose.cli.terminal import coloured, printable, table_width
-from tfcompose.render.text import PLAIN, RED, YELLOW
+from tfcompose.compiler.render.text import PLAIN, RED, YELLOW
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Iterator, Sequence
 
-    from tfcompose.live.edges import Branch, Tree
-    from tfcompose.model import Robot
-    from tfcompose.plan import Plan, PlanEdge
+    from tfcompose.model.plan import Plan, PlanEdge
+    from tfcompose.model.robot import Robot
+    from tfcompose.tf.live.edges import Branch, Tree
 
     Topics = tuple[str, str]
 
@@ -39,7 +40,9 @@ REMARK = 5
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag")
+    parser.add_argument(
+        "file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag"
+    )
     add_variant(parser)
     parser.add_argument("--live", action="store_true", help="print the tree that is published now")
     add_bag(parser, "print the tree of a recording")
@@ -55,11 +58,15 @@ def run(arguments: Namespace) -> int:
         _print_published(arguments)
         return 0
     from tfcompose.cli.compiling import compiled_robot
-    from tfcompose.render.tree import tree
+    from tfcompose.compiler.render.tree import tree
 
     robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments).with_final_names()
     columns = table_width(sys.stdout)
-    text = _fitted(tree(robot, columns and columns - 1)) if arguments.format == "text" else _planned_json(robot)
+    text = (
+        _fitted(tree(robot, columns and columns - 1))
+        if arguments.format == "text"
+        else _planned_json(robot)
+    )
     sys.stdout.write(text)
     return 0
 
@@ -76,18 +83,29 @@ def _fitted(text: str) -> str:
 
 def _planned_json(robot: Robot) -> str:
     """Return one line of JSON, in the shape of --live: the trees with their roots, and what the robot says of edges."""
-    from tfcompose.emit.plan import plan_of
-    from tfcompose.live.edges import forest
+    from tfcompose.compiler.emit.plan import plan_of
+    from tfcompose.tf.live.edges import forest
 
     trees = [
-        _tree_object(tree, [_planned_edge(branch.planned) for branch in tree.branches if branch.planned is not None])
+        _tree_object(
+            tree,
+            [
+                _planned_edge(branch.planned)
+                for branch in tree.branches
+                if branch.planned is not None
+            ],
+        )
         for tree in forest((), {edge.child: edge for edge in plan_of(robot).edges})
     ]
     return json.dumps({"robot": robot.name, "trees": trees}, ensure_ascii=False) + "\n"
 
 
 def _tree_object(tree: Tree, edges: list[dict[str, Any]]) -> dict[str, Any]:
-    return {"root": None if tree.loop else tree.branches[0].frame, "loop": list(tree.loop), "edges": edges}
+    return {
+        "root": None if tree.loop else tree.branches[0].frame,
+        "loop": list(tree.loop),
+        "edges": edges,
+    }
 
 
 def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
@@ -106,8 +124,8 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
 def _print_published(arguments: Namespace) -> None:
     from tfcompose.cli.edge_table import not_kept
     from tfcompose.cli.live import observe, observed_topics, read_bag
-    from tfcompose.live.edges import SETTLE_S, TreeObserver, forest
-    from tfcompose.plan.topics import parts_of
+    from tfcompose.model.plan.topics import parts_of
+    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver, forest
 
     plan, pairs = observed_topics(arguments)
     parts = parts_of(plan) if plan else {}
@@ -115,7 +133,12 @@ def _print_published(arguments: Namespace) -> None:
     if arguments.bag:
         read_bag(arguments.bag, observers)
     else:
-        observe("tfcompose_tree", observers, ros=plan.ros if plan else None, duration_s=arguments.duration)
+        observe(
+            "tfcompose_tree",
+            observers,
+            ros=plan.ros if plan else None,
+            duration_s=arguments.duration,
+        )
     for pair, observer in observers.items():
         planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
         trees = forest(observer.edges(observer.until_ns), planned)
@@ -139,19 +162,29 @@ def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
         lines = iter(_wrapped(branches, rows, columns - 1))
     parts = []
     for tree in trees:
-        loop = [f"a loop, which breaks tf2 lookups: {printable(' → '.join(tree.loop))}"] if tree.loop else []
+        loop = (
+            [f"a loop, which breaks tf2 lookups: {printable(' → '.join(tree.loop))}"]
+            if tree.loop
+            else []
+        )
         parts.append("\n".join([*loop, *(next(lines) for _ in tree.branches)]))
     head = [f"{len(trees)} disconnected trees:"] if len(trees) > 1 else []
     return "\n\n".join([*head, *parts]) + "\n"
 
 
-def _wrapped(branches: Sequence[Branch], rows: Sequence[tuple[str, ...]], columns: int) -> Iterator[str]:
+def _wrapped(
+    branches: Sequence[Branch], rows: Sequence[tuple[str, ...]], columns: int
+) -> Iterator[str]:
     """Yield the rows without their columns; what does not fit in a line goes on below."""
     from tfcompose.cli.tables import shortened
-    from tfcompose.render.tree import wrapped
+    from tfcompose.compiler.render.tree import wrapped
 
     drawing = [
-        (branch.indent, row[0].removeprefix(branch.indent), [fact for fact in row[1:] if fact not in {"", "static"}])
+        (
+            branch.indent,
+            row[0].removeprefix(branch.indent),
+            [fact for fact in row[1:] if fact not in {"", "static"}],
+        )
         for branch, row in zip(branches, rows, strict=True)
     ]
     for row, lines in zip(rows, wrapped(drawing, columns), strict=True):
@@ -179,18 +212,32 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
         return (name, planned.kind, "", "", "", f"missing: owner {planned.owner} ({planned.node})")
     one = branch.observed[0]
     others = [
-        f"also {printable(other.name)} from {printable(other.publisher) or 'unknown'}" for other in branch.observed[1:]
+        f"also {printable(other.name)} from {printable(other.publisher) or 'unknown'}"
+        for other in branch.observed[1:]
     ]
     remarks = [_status(branch, plan)] if plan else []
-    rate = "" if one.stream.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
+    rate = (
+        ""
+        if one.stream.static
+        else f"{one.timing.rate:.1f} Hz"
+        if one.timing.rate is not None
+        else "–"
+    )
     age = "" if one.data_age_s is None else duration(one.data_age_s)
     kind = "static" if one.stream.static else "dynamic"
-    return (name, kind, printable(_owner(branch, plan)) or "–", rate, age, "; ".join([*remarks, *others]))
+    return (
+        name,
+        kind,
+        printable(_owner(branch, plan)) or "–",
+        rate,
+        age,
+        "; ".join([*remarks, *others]),
+    )
 
 
 def _owner(branch: Branch, plan: Plan | None) -> str:
     """Return who publishes the frame: the owner with its node where it is the owner, else the node."""
-    from tfcompose.verdict.ownership import may_be_owners, relays_of
+    from tfcompose.guard.verdict.ownership import may_be_owners, relays_of
 
     planned, one = branch.planned, branch.observed[0]
     if plan is None or planned is None or not may_be_owners(planned, one.nodes, relays_of(plan)):
@@ -200,7 +247,7 @@ def _owner(branch: Branch, plan: Plan | None) -> str:
 
 
 def _status(branch: Branch, plan: Plan) -> str:
-    from tfcompose.verdict.ownership import code_of, may_be_owners, relays_of
+    from tfcompose.guard.verdict.ownership import code_of, may_be_owners, relays_of
 
     planned, one = branch.planned, branch.observed[0] if branch.observed else None
     if one is None:
@@ -209,7 +256,13 @@ def _status(branch: Branch, plan: Plan) -> str:
         allowed = plan.may_be_undeclared(one.stream.parent, one.stream.child)
         return "allowed" if allowed else "unexpected"
     owner = not one.nodes or may_be_owners(planned, one.nodes, relays_of(plan))
-    code = code_of(planned, one.stream.parent, static=one.stream.static, owner=owner, sure=len(one.nodes) < 2)  # noqa: PLR2004 (one, or a recording)
+    code = code_of(
+        planned,
+        one.stream.parent,
+        static=one.stream.static,
+        owner=owner,
+        sure=len(one.nodes) < 2,  # noqa: PLR2004
+    )
     match code:
         case "TF802":
             return f"expected in {planned.parent}"
@@ -225,7 +278,14 @@ def _published_json(pair: Topics, trees: list[Tree], *, plan: Plan | None) -> st
     data = {
         "topics": list(pair),
         "trees": [
-            _tree_object(tree, [_edge_object(branch, plan) for branch in tree.branches if branch.parent is not None])
+            _tree_object(
+                tree,
+                [
+                    _edge_object(branch, plan)
+                    for branch in tree.branches
+                    if branch.parent is not None
+                ],
+            )
             for tree in trees
         ],
     }
@@ -235,7 +295,11 @@ def _published_json(pair: Topics, trees: list[Tree], *, plan: Plan | None) -> st
 def _edge_object(branch: Branch, plan: Plan | None) -> dict[str, Any]:
     from tfcompose.cli.edge_table import object_of
 
-    status = {"status": _status(branch, plan), "owner": branch.planned and branch.planned.owner} if plan else {}
+    status = (
+        {"status": _status(branch, plan), "owner": branch.planned and branch.planned.owner}
+        if plan
+        else {}
+    )
     return {
         "parent": branch.parent,
         "child": branch.frame,

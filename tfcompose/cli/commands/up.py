@@ -1,10 +1,11 @@
 """Start a robot, or a built plan, and guard its TF tree.
 
-Build a robot and start it, or start a built plan. On a terminal, show a live view of processes, edges and findings; ?
-lists its keys. Elsewhere, or with --no-live, print which edges are live, who owns them, and when the tree is complete,
-with the lines of each process. Ctrl-C, SIGTERM and SIGHUP end everything, with exit code 0; before anything is started,
-with that of the signal, such as 130 for Ctrl-C. If a node already publishes an edge, refuse and name it. If the robot
-runs already, restart only what differs in the new plan.
+Build a robot and start it, or start a built plan. On a terminal, show a live view of processes,
+edges and findings; ? lists its keys. Elsewhere, or with --no-live, print which edges are live, who
+owns them, and when the tree is complete, with the lines of each process. Ctrl-C, SIGTERM and
+SIGHUP end everything, with exit code 0; before anything is started, with that of the signal, such
+as 130 for Ctrl-C. If a node already publishes an edge, refuse and name it. If the robot runs
+already, restart only what differs in the new plan.
 """
 
 from __future__ import annotations
@@ -20,18 +21,27 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml")
-    add_variant(parser)
-    parser.add_argument("-o", "--output", metavar="DIR", help="where to build; default: build/ROBOT")
     parser.add_argument(
-        "-d", "--detach", action="store_true", help="run in the background; see tfcompose ps, logs and down"
+        "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
+    )
+    add_variant(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", help="where to build; default: build/ROBOT"
+    )
+    parser.add_argument(
+        "-d",
+        "--detach",
+        action="store_true",
+        help="run in the background; see tfcompose ps, logs and down",
     )
     parser.add_argument(
         "--wait", action="store_true",
         help="run in the background, and return once every process is ready and every edge live",
     )  # fmt: skip
     parser.add_argument(
-        "--update", action="store_true", help="bring the robot that runs to this plan, and start none if it does not"
+        "--update",
+        action="store_true",
+        help="bring the robot that runs to this plan, and start none if it does not",
     )
     parser.add_argument(
         "--build-dir",
@@ -50,7 +60,9 @@ def arguments(parser: ArgumentParser) -> None:
         "--no-live", dest="live", action="store_false",
         help="print lines, as into a pipe, instead of the live view of a terminal",
     )  # fmt: skip
-    parser.add_argument("--dry-run", action="store_true", help="print what would be started and exit")
+    parser.add_argument(
+        "--dry-run", action="store_true", help="print what would be started and exit"
+    )
     parser.add_argument(
         "--guard", choices=("off", "watch", "strict"),
         help="off: report live edges, no checks; strict: hold back what a process does not own; default: the file's",
@@ -79,7 +91,7 @@ def run(arguments: Namespace) -> int:
 
         return dry_run(arguments)
     from tfcompose.cli.terminal import reject
-    from tfcompose.ros.environment import no_ros
+    from tfcompose.tf.ros.environment import no_ros
 
     if missing := no_ros():
         reject([missing])

@@ -1,9 +1,10 @@
 """Show a robot in the browser, and edit its mounts.
 
-Show the robot of FILE (a robot, or a built plan.json) in 3-D in the browser: bodies, frames, owners, joints. With
---edit mounts are dragged, or their poses typed, and saved where the values stand in the file. With --live frames are
-where they are published: what differs from the robot has a ghost where it should be, edges that are silent or sent by
-somebody else are red. With --bag they are where they were recorded, at the time of a slider.
+Show the robot of FILE (a robot, or a built plan.json) in 3-D in the browser: bodies, frames,
+owners, joints. With --edit mounts are dragged, or their poses typed, and saved where the values
+stand in the file. With --live frames are where they are published: what differs from the robot has
+a ghost where it should be, edges that are silent or sent by somebody else are red. With --bag they
+are where they were recorded, at the time of a slider.
 """
 
 from __future__ import annotations
@@ -13,18 +14,25 @@ from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, TOLERANCE, add_bag, add_tolerance, add_variant, tolerance
+from tfcompose.cli.options import (
+    DEFAULT_FILE,
+    TOLERANCE,
+    add_bag,
+    add_tolerance,
+    add_variant,
+    tolerance,
+)
 from tfcompose.cli.terminal import UNREADABLE, fail, warn
-from tfcompose.signals import take_interrupt
+from tfcompose.foundation.signals import take_interrupt
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Sequence
 
     from tfcompose.cli.bag_view import BagView
-    from tfcompose.geometry import Offset
-    from tfcompose.view.reload import Files
-    from tfcompose.view.session import Session
+    from tfcompose.foundation.geometry import Offset
+    from tfcompose.tools.view.reload import Files
+    from tfcompose.tools.view.session import Session
 
 _HOST, _PORT = "127.0.0.1", 8080
 _LOOPBACK = frozenset({_HOST, "localhost", "::1"})
@@ -36,12 +44,19 @@ _LAST_PORT = 65_535
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "file", nargs="?", metavar="FILE|PLAN", help="default: robot.yaml; with --live the robot that runs here, if any"
+        "file",
+        nargs="?",
+        metavar="FILE|PLAN",
+        help="default: robot.yaml; with --live the robot that runs here, if any",
     )
     add_variant(parser)
-    parser.add_argument("--live", action="store_true", help="show the running tree, and what is wrong with it")
     parser.add_argument(
-        "--joints", action="store_true", help="with --live: sliders publish /joint_states, if nobody else does"
+        "--live", action="store_true", help="show the running tree, and what is wrong with it"
+    )
+    parser.add_argument(
+        "--joints",
+        action="store_true",
+        help="with --live: sliders publish /joint_states, if nobody else does",
     )
     add_bag(parser)
     parser.add_argument(
@@ -50,8 +65,12 @@ def arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add_tolerance(parser)
     parser.set_defaults(tolerance=None)
-    parser.add_argument("--edit", action="store_true", help="move mounts, and save them in the file")
-    parser.add_argument("--html", metavar="FILE", help="write one HTML file that needs nothing else, and end")
+    parser.add_argument(
+        "--edit", action="store_true", help="move mounts, and save them in the file"
+    )
+    parser.add_argument(
+        "--html", metavar="FILE", help="write one HTML file that needs nothing else, and end"
+    )
     parser.add_argument(
         "--host", default=_HOST, metavar="ADDRESS",
         help=f"listen there; elsewhere than on this machine only who has the token is let in (default: {_HOST})",
@@ -63,7 +82,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Serve the view until Ctrl-C, or write it; exit code 1 if the file gives no robot, 2 if it cannot be shown."""
     try:
-        from tfcompose.view.reload import Files
+        from tfcompose.tools.view.reload import Files
     except ImportError as error:
         fail(f"{error.name} is not installed: pip install 'tfcompose[view]'", UNREADABLE)
     from tfcompose.cli.reading import read_text
@@ -73,7 +92,8 @@ def run(arguments: Namespace) -> int:
         fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
     if arguments.joints and not arguments.live:
         fail(
-            "--joints publishes for a running robot: give --live, too; without it sliders move what is shown",
+            "--joints publishes for a running robot: give --live, too; without it sliders move"
+            " what is shown",
             UNREADABLE,
         )
     if (arguments.live or arguments.bag) and (arguments.html or arguments.edit):
@@ -100,8 +120,8 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     """Show the session in the browser until Ctrl-C; return the exit code."""
     import secrets
 
-    from tfcompose.view.reload import ReloadedPanel, Watcher
-    from tfcompose.view.server import started, stop
+    from tfcompose.tools.view.reload import ReloadedPanel, Watcher
+    from tfcompose.tools.view.server import started, stop
 
     bag = _bag_view(session, arguments) if arguments.bag else None
     if arguments.live:
@@ -110,7 +130,9 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
 
         set_up_ros(plan_of_session(session).ros)
     token = "" if arguments.host in _LOOPBACK else secrets.token_urlsafe(16)
-    server = started(arguments.host, _free(arguments.host, arguments.port), session.robot.name, token)
+    server = started(
+        arguments.host, _free(arguments.host, arguments.port), session.robot.name, token
+    )
     shown = None
     try:
         joints = arguments.joints or not (arguments.live or arguments.bag)
@@ -122,7 +144,9 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
             if arguments.live:
                 from tfcompose.cli.live_view import follow
 
-                return follow(server, shown, watcher.changed, _tolerance(arguments), joints=arguments.joints)
+                return follow(
+                    server, shown, watcher.changed, _tolerance(arguments), joints=arguments.joints
+                )
             while True:
                 watcher.changed.wait()
                 watcher.changed.clear()
@@ -147,10 +171,10 @@ def _bag_view(session: Session, arguments: Namespace) -> BagView:
 def _write(session: Session, path: Path) -> None:
     """Write the scene as one file; ends where it cannot be written."""
     from tfcompose.cli.writing import replace_file
-    from tfcompose.view.kinematics import poses_in_roots
-    from tfcompose.view.page import page_of
-    from tfcompose.view.scene import RobotScene
-    from tfcompose.view.server import started, stop
+    from tfcompose.tools.view.kinematics import poses_in_roots
+    from tfcompose.tools.view.page import page_of
+    from tfcompose.tools.view.scene import RobotScene
+    from tfcompose.tools.view.server import started, stop
 
     robot, poses = session.robot, poses_in_roots(session.robot, {})
     server = started(_HOST, 0, robot.name)
@@ -169,7 +193,13 @@ def _write(session: Session, path: Path) -> None:
 
 def _running_plan(arguments: Namespace) -> str | None:
     """Return the plan that the robot runs with that is in this ROS domain; None if there is none, or none is meant."""
-    if not arguments.live or arguments.profiles or arguments.overlays or arguments.settings or arguments.given:
+    if (
+        not arguments.live
+        or arguments.profiles
+        or arguments.overlays
+        or arguments.settings
+        or arguments.given
+    ):
         return None
     from tfcompose.cli.runs import plan_file, run_of_domain
 
@@ -191,12 +221,20 @@ def _check_output(path: Path, files: Sequence[str]) -> None:
 def _free(host: str, port: int) -> int:
     """Return the port; ends with the next free one named where it is taken."""
     if not 0 <= port <= _LAST_PORT:
-        fail(f"there is no port {port}: --port takes 0 to {_LAST_PORT}, 0 for any that is free", UNREADABLE)
+        fail(
+            f"there is no port {port}: --port takes 0 to {_LAST_PORT}, 0 for any that is free",
+            UNREADABLE,
+        )
     if trouble := _trouble(host, 0):
         fail(f"--host {host} is no address of this machine: {trouble}", UNREADABLE)
-    following = next((other for other in range(port, _LAST_PORT + 1) if not _trouble(host, other)), None)
+    following = next(
+        (other for other in range(port, _LAST_PORT + 1) if not _trouble(host, other)), None
+    )
     if following != port:
-        fail(f"port {port} is taken" + (f"; --port {following} is free" if following else ""), UNREADABLE)
+        fail(
+            f"port {port} is taken" + (f"; --port {following} is free" if following else ""),
+            UNREADABLE,
+        )
     return port
 
 

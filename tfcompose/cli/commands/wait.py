@@ -1,7 +1,7 @@
 """Wait until a running robot has ended, or is ready.
 
-Wait until the robot has ended, and return its exit code. With --ready, wait instead until every process is ready and
-every edge live, and report what is missing after the timeout.
+Wait until the robot has ended, and return its exit code. With --ready, wait instead until every
+process is ready and every edge live, and report what is missing after the timeout.
 """
 
 from __future__ import annotations
@@ -18,14 +18,18 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
-    parser.add_argument("--ready", action="store_true", help="wait until every process is ready and every edge live")
+    parser.add_argument(
+        "--ready",
+        action="store_true",
+        help="wait until every process is ready and every edge live",
+    )
     parser.add_argument("--timeout", type=positive, metavar="S", help="exit 1 after S seconds")
 
 
 def run(arguments: Namespace) -> int:
     """Wait; exit code of the robot, or 0 when it is ready; 1 when the time is over or none runs."""
     from tfcompose.cli.runs import chosen_run, notices, wait_until_ready
-    from tfcompose.ipc import Ended
+    from tfcompose.model.messages import Ended
 
     place = chosen_run(arguments.robot, "wait")
     if arguments.ready:

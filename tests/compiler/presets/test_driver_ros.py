@@ -1,0 +1,265 @@
+"""A driver that publishes as realsense2_camera does, started by ``tfcompose up`` as its preset says, and guarded."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.support import processes
+from tests.support.waiting import TIMEOUT_S, until
+
+pytestmark = pytest.mark.ros
+
+#: What it does by its parameters is from realsense2_camera's tfs.cpp: each enabled stream below
+#: the link, its optical frame below that; streams of index 1 once more, as aligned depth; imu
+#: below gyro with unite_imu_method. Like tf2's static broadcaster it keeps one transform a child,
+#: the one that it was given last. Its values are a unit's own.
+STAND_IN = """
+import os, signal, sys, threading, time
+import rclpy
+from rclpy.node import Node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.node import TFPublisher
+rclpy.init(args=sys.argv)
+node = Node("camera", automatically_declare_parameters_from_overrides=True)
+parameters = {name: node.get_parameter(name).value for name in node._parameters}
+streams = {"depth": True, "color": True, "infra1": False, "infra2": False, "gyro": False, "accel": False}
+streams = {name: parameters.get("enable_" + name, default) for name, default in streams.items()}
+streams |= {name: True for name in os.environ.get("STAND_IN_ALSO", "").split()}
+prefix = parameters.get("tf_prefix", "") + parameters.get("camera_name", "camera") + "_"
+base = prefix + parameters.get("base_frame_id", "link")
+kept = {}
+off = dict(word.split(":") for word in os.environ.get("STAND_IN_OFF", "").split())
+places = {"color": (0.0, 0.015, 0.0), "infra2": (0.0, -0.05, 0.0)}
+places |= dict.fromkeys(["gyro", "accel"], (-0.01174, -0.00552, 0.0051))
+def send(parent, child, xyz=(0.0, 0.0, 0.0), optical=False):
+    turn = (-0.5, 0.5, -0.5, 0.5) if optical else (0.0, 0.0, 0.0, 1.0)
+    xyz = (xyz[0], xyz[1] + float(off.get(child.removeprefix(prefix), 0.0)), xyz[2])
+    kept[child] = Transform(time.time_ns(), parent, child, xyz, turn)
+for name in (stream for stream, enabled in streams.items() if enabled):
+    frame, optical = f"{prefix}{name}_frame", f"{prefix}{name}_optical_frame"
+    x, y, z = places.get(name, (0.0, 0.0, 0.0))
+    own = (x + 0.0004, y - 0.0012, z + 0.0003) if name != "depth" else (x, y, z)
+    send(base, frame, own)
+    send(frame, optical, optical=True)
+    if name == "infra1":
+        aligned = f"{prefix}aligned_depth_to_{name}_frame"
+        send(base, aligned, own)
+        send(aligned, optical, optical=True)
+if streams["gyro"] and parameters.get("unite_imu_method", 0) > 0:
+    send(f"{prefix}gyro_frame", f"{prefix}imu_frame")
+    send(f"{prefix}imu_frame", f"{prefix}imu_optical_frame", optical=True)
+if parameters.get("publish_tf", True) or os.environ.get("STAND_IN_IGNORES"):
+    publisher = TFPublisher(node, static=True)
+    publisher.publish(encode(list(kept.values())))
+if "STAND_IN_FORCES" in os.environ:
+    node.set_parameters([rclpy.Parameter("publish_tf", value=os.environ["STAND_IN_FORCES"] == "true")])
+if "STAND_IN_LACKS" in os.environ:
+    node.undeclare_parameter(os.environ["STAND_IN_LACKS"])
+print("stand-in:", node.get_fully_qualified_name(), parameters.get("serial_no"), len(kept), flush=True)
+def spin():
+    try:
+        rclpy.spin(node)
+    except Exception:
+        pass
+if "STAND_IN_SLEEPS" not in os.environ:
+    threading.Thread(target=spin, daemon=True).start()
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+try:
+    while True:
+        time.sleep(0.05)
+except KeyboardInterrupt:
+    pass
+node.destroy_node()
+rclpy.try_shutdown()
+"""
+ROVER = """
+tfcompose: 1
+robot: rover
+ros: {discovery: localhost}
+links: {base_link: {}}
+sensors:
+  front: {preset: realsense/d435i, parent: base_link, options: {%s}
+"""
+EVERYTHING = 'streams: [depth, color, infra1, infra2], imu: true, serial: "0042"'
+
+
+@dataclass
+class Up:
+    """A launcher that runs, and what it has printed so far."""
+
+    popen: subprocess.Popen[str]
+    output: Path
+
+    @property
+    def text(self) -> str:
+        return self.output.read_text(
+            encoding="utf-8", errors="replace"
+        )  # its end may be half a character yet
+
+    def says(self, *words: str) -> None:
+        """Wait until it has said all of that: the lines of a finding come one after the other."""
+        until(lambda: all(word in self.text for word in words) or self.popen.poll() is not None)
+        for word in words:
+            assert word in self.text, self.text
+
+    def ended(self) -> list[str]:
+        """Wait until it has ended, and return the codes of what was found."""
+        self.popen.wait(TIMEOUT_S)
+        return re.findall(r"\[(TF\d{3})\]", self.text)
+
+
+@pytest.fixture
+def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
+    """Build and run this robot with the stand-in as its installed driver."""
+    assert domain
+    program = tmp_path / "ros" / "lib" / "realsense2_camera" / "realsense2_camera_node"
+    program.parent.mkdir(parents=True)
+    program.write_text(f"#!{sys.executable}\n{STAND_IN}", encoding="utf-8")
+    program.chmod(0o755)
+    running: list[Up] = []
+
+    def run(text: str, *words: str, **environment: str) -> Up:
+        (tmp_path / "rover.yaml").write_text(text, encoding="utf-8")
+        output = tmp_path / "output.txt"
+        prefixes = os.pathsep.join(
+            filter(None, [str(tmp_path / "ros"), os.environ.get("AMENT_PREFIX_PATH")])
+        )
+        with output.open("wb") as out:
+            popen = processes.start(
+                [sys.executable, "-m", "tfcompose", "up", "rover.yaml", *words],
+                stdout=out,
+                stderr=out,
+                cwd=tmp_path,
+                env=os.environ | {"AMENT_PREFIX_PATH": prefixes} | environment,
+            )
+        running.append(Up(popen, output))
+        return running[-1]
+
+    yield run
+    for one in running:
+        below = (
+            psutil.Process(one.popen.pid).children(recursive=True)
+            if one.popen.poll() is None
+            else []
+        )
+        if one.popen.poll() is None:
+            one.popen.send_signal(2)
+            try:
+                one.popen.wait(TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                one.popen.kill()
+                one.popen.wait()
+        assert not psutil.wait_procs(below, TIMEOUT_S)[1]
+
+
+@pytest.mark.parametrize(
+    ("options", "environment"),
+    [
+        (f"{EVERYTHING}}}, tf: driver", {}),
+        ("streams: [depth]}, tf: driver", {}),
+        ("streams: [infra1, infra2]}, tf: driver", {}),
+        ("imu: true, unite_imu: false}, tf: driver", {}),
+        (f"{EVERYTHING}}}, tf: tfcompose", {}),
+        (f"{EVERYTHING}}}, tf: driver", {"STAND_IN_SLEEPS": "1"}),
+    ],
+    ids=["all", "depth", "infra", "imu", "switched off", "answers nothing"],
+)
+def test_a_driver_that_does_as_its_preset_says_is_let_alone(
+    up: Callable[..., Up], options: str, environment: dict[str, str]
+) -> None:
+    robot = up(ROVER % options, "--for", "5", **environment)
+    assert robot.ended() == []
+    assert "tree complete" in robot.text
+    if "STAND_IN_SLEEPS" not in environment:
+        assert f"stand-in: /front/front{' 0042' if 'serial' in options else ''}" in robot.text
+
+
+@pytest.mark.parametrize(
+    ("options", "environment", "code", "names"),
+    [
+        (f"{EVERYTHING}}}, tf: tfcompose", {"STAND_IN_IGNORES": "1"}, "TF801", ("publish_tf: false", "front (realse")),
+        ("streams: [depth]}, tf: driver", {"STAND_IN_ALSO": "infra1"}, "TF803", ("front_infra1", "sensors.front")),
+        (  # an infra2 that is 4.5 cm further to the right is that of a D455
+            f"{EVERYTHING}}}, tf: driver",
+            {"STAND_IN_OFF": "infra2_frame:-0.045"},
+            "TF828",
+            (
+                "front_infra2_frame", "front_link", " 46.", "xyz 0.0004 -0.0962 0.0003 m", "xyz 0 -0.05 0 m",
+                "sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962, 0.0003]",
+            ),
+        ),
+        (
+            "streams: [depth]}, tf: driver",
+            {"STAND_IN_OFF": "depth_optical_frame:0.002"},
+            "TF828",
+            ("front_depth_optical_frame", "front_depth_frame", " 2 mm"),
+        ),
+        (
+            f"{EVERYTHING}}}, tf: tfcompose",
+            {"STAND_IN_FORCES": "true"},
+            "TF829",
+            ("publish_tf: true", "publish_tf: false", "front (realsense/d435i)"),
+        ),
+        (f"{EVERYTHING}}}, tf: driver", {"STAND_IN_LACKS": "publish_tf"}, "TF829", ("publish_tf",)),
+    ],
+    ids=["ignores its switch", "another stream", "a nominal frame", "an exact frame", "forces", "lacks"],
+)  # fmt: skip
+def test_a_driver_that_does_otherwise_is_named_once(
+    up: Callable[..., Up],
+    options: str,
+    environment: dict[str, str],
+    code: str,
+    names: tuple[str, ...],
+) -> None:
+    robot = up(ROVER % options, **environment)
+    robot.says(code, "/front/front", *names)
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ended().count(code) == 1
+
+
+def test_a_frame_whose_pose_only_the_driver_knows_is_owned_and_may_be_anywhere(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    text = (ROVER % "streams: [depth, color]}, tf: driver").replace("d435i", "d457")
+    robot = up(text, STAND_IN_OFF="color_frame:0.4")
+    robot.says("tree complete")
+    verified = processes.run(
+        [sys.executable, "-m", "tfcompose", "verify", "rover.yaml"], cwd=tmp_path
+    )
+    assert (verified.returncode, re.findall(r"TF\d{3}", verified.stdout + verified.stderr)) == (
+        0,
+        [],
+    ), verified.stdout
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ended() == []
+
+
+def test_two_cameras_of_one_kind_get_names_and_serial_numbers_by_two_lines(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    line = (
+        "  %s: {preset: realsense/d435i, parent: base_link, xyz: [%s, 0, 0], options: {serial:"
+        ' "%s"}}\n'
+    )
+    head = (
+        "tfcompose: 1\nrobot: rover\nros: {discovery: localhost}\nlinks: {base_link:"
+        " {}}\nsensors:\n"
+    )
+    robot = up(head + line % ("left", 0.1, "0001") + line % ("right", 0.2, "0002"), "--for", "5")
+    assert robot.ended() == []
+    assert all(
+        output in robot.text
+        for output in ("stand-in: /left/left 0001", "stand-in: /right/right 0002")
+    )
+    plan = json.loads(next(tmp_path.rglob("plan.json")).read_text("utf-8"))
+    assert {edge["child"].partition("_")[0] for edge in plan["edges"]} == {"left", "right"}

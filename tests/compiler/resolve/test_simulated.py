@@ -1,0 +1,125 @@
+"""Stand-ins for joint states: positions, sweeps, and what is refused."""
+
+import math
+
+import pytest
+
+from tests.support.findings import words
+from tfcompose.cli.compiling import library
+from tfcompose.compiler.compile import Compiled, compile_robot
+from tfcompose.compiler.emit import emit
+from tfcompose.model.plan import Simulation, Sweep
+from tfcompose.model.plan.file import read_plan
+
+ARM = """
+tfcompose: 1
+robot: arm
+links: {base_link: {}, a: {}, b: {}, c: {}, d: {}}
+joints:
+  turn: {type: continuous, parent: base_link, child: a}
+  lift: {type: prismatic, parent: a, child: b, limit: {lower: 0.1, upper: 0.5, velocity: 0.05, effort: 1}}
+  bend: {type: revolute, parent: b, child: c, limit: {lower: -90 deg, upper: 30 deg, velocity: 2, effort: 1}}
+  follow: {type: revolute, parent: c, child: d, limit: {lower: -1, upper: 1, velocity: 2, effort: 1}, %s}
+processes: {states: {simulate: {joints: %s}}}
+"""
+ROTATION = Sweep(6.0)
+LIFT = Sweep(math.pi * 0.4 / 0.05, 0.1, 0.5)
+BEND = Sweep(6.0, -math.pi / 2, math.pi / 6)
+
+
+def compiled(joints: str) -> Compiled:
+    return compile_robot(ARM % ("mimic: {joint: bend}", joints), "arm.yaml", library())
+
+
+def simulation(joints: str) -> Simulation | None:
+    done = compiled(joints)
+    assert not done.errors, done.errors
+    assert done.robot
+    text = next(file.text for file in emit(done.robot) if file.path == "plan.json")
+    return read_plan(text, "plan.json").process("states").simulate
+
+
+def approx(sweeps: dict[str, Sweep]) -> object:
+    return {
+        n: (pytest.approx(s.period_s), pytest.approx(s.lower), pytest.approx(s.upper))
+        for n, s in sweeps.items()
+    }
+
+
+def tuples(sweeps: dict[str, Sweep]) -> object:
+    return {name: (sweep.period_s, sweep.lower, sweep.upper) for name, sweep in sweeps.items()}
+
+
+@pytest.mark.parametrize(
+    ("source_text", "joints", "sweeps"),
+    [
+        ("zero", {"turn": 0.0, "lift": 0.3, "bend": 0.0}, {}),
+        ("{lift: 20 cm}", {"turn": 0.0, "lift": 0.2, "bend": 0.0}, {}),
+        (
+            "sweep",
+            {"turn": 0.0, "lift": 0.3, "bend": 0.0},
+            {"turn": ROTATION, "lift": LIFT, "bend": BEND},
+        ),
+        (
+            "{turn: 90 deg, bend: sweep}",
+            {"turn": math.pi / 2, "lift": 0.3, "bend": 0.0},
+            {"bend": BEND},
+        ),
+    ],
+)
+def test_every_joint_with_a_position_of_its_own_is_simulated_within_its_limits_and_its_speed(
+    source_text: str, joints: dict[str, float], sweeps: dict[str, Sweep]
+) -> None:
+    """A joint that mimics one is left out; where 0 is beyond the limits the middle counts, as elsewhere in ROS."""
+    found = simulation(source_text)
+    assert found
+    assert found.joints == pytest.approx(joints)
+    assert tuples(found.sweep) == approx(sweeps)
+
+
+UNLIMITED = """
+tfcompose: 1
+robot: arm
+rules: {TF704: off}
+links: {base_link: {}, a: {}, b: {}, c: {}}
+joints:
+  bend: {type: revolute, parent: base_link, child: a}
+  half: {type: revolute, parent: a, child: b, limit: {lower: -1, velocity: 0.1, effort: 1}}
+  lift: {type: prismatic, parent: b, child: c}
+processes: {states: {simulate: {joints: %s}}}
+"""
+
+
+def test_without_limits_a_rotation_sweeps_all_round_and_a_slide_stays() -> None:
+    done = compile_robot(UNLIMITED % "sweep", "arm.yaml", library())
+    assert not done.errors
+    assert done.robot
+    text = next(file.text for file in emit(done.robot) if file.path == "plan.json")
+    found = read_plan(text, "plan.json").process("states").simulate
+    assert found
+    assert found.joints == {"bend": 0.0, "half": 0.0, "lift": 0.0}
+    sweeps = {"bend": Sweep(6.0, -math.pi, math.pi), "half": Sweep(math.pi / 0.1, -1.0, 0.0)}
+    assert tuples(found.sweep) == approx(sweeps)
+
+
+def test_a_slide_without_limits_cannot_sweep() -> None:
+    (found,) = compile_robot(UNLIMITED % "{lift: sweep}", "arm.yaml", library()).errors
+    assert found.code == "TF106"
+    assert "lift" in words(found)
+
+
+@pytest.mark.parametrize(
+    ("source_text", "code", "words"),
+    [
+        ("swep", "TF106", "sweep"),
+        ("{bend: swep}", "TF106", "sweep"),
+        ("{bend: 3 kg}", "TF104", ""),
+        ("{bent: sweep}", "TF703", "bend"),
+        ("{follow: sweep}", "TF703", "bend"),
+        ("[1, 2]", "TF103", ""),
+    ],
+)
+def test_what_is_not_understood_is_refused_once(source_text: str, code: str, words: str) -> None:
+    (found,) = compiled(source_text).errors
+    assert found.code == code
+    assert words in (found.help or "")

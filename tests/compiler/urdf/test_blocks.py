@@ -1,0 +1,186 @@
+"""What stands beside links and joints: hardware as ros2_control reads it, raw blocks as they were written."""
+
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from tfcompose.cli.compiling import library
+from tfcompose.compiler.compile import compile_robot
+from tfcompose.compiler.emit import emit
+
+HEAD = """tfcompose: 1
+robot: r
+links: {base_link: {}, wheel: {}}
+joints: {wheel_joint: {type: continuous, parent: base_link, child: wheel}}
+"""
+
+
+def urdfs(text: str) -> list[ET.Element]:
+    compiled = compile_robot(HEAD + text, "r.yaml", library())
+    assert not compiled.errors, compiled.errors
+    assert compiled.robot
+    files = {file.path: file.text for file in emit(compiled.robot)}
+    return [ET.fromstring(files[name]) for name in ("robot.full.urdf", "robot.urdf")]  # noqa: S314 (we wrote it)
+
+
+HARDWARE = """
+ros2_control:
+  base:
+    plugin: mock_components/GenericSystem
+    rw_rate: 100
+    is_async: true
+    params: {device: "/dev/tty & co", loop: true, gain: 0.50, count: 3, "a<b": "${2 * 3}"}
+    joints:
+      wheel_joint:
+        command: {velocity: {min: -1, max: 1}}
+        state: [position, velocity]
+        params: {encoder: 4096}
+    sensors: {force: {state: [force.x], params: {frame_id: wheel}}}
+    gpios: {lamp: {command: {digital: {data_type: bool, size: 4, initial_value: false}}}}
+"""
+
+EXPECTED = """<ros2_control name="base" type="system" rw_rate="100" is_async="true">
+<hardware><plugin>mock_components/GenericSystem</plugin><param name="device">/dev/tty &amp; co</param>
+<param name="loop">true</param><param name="gain">0.5</param><param name="count">3</param>
+<param name="a&lt;b">6</param></hardware>
+<joint name="wheel_joint"><command_interface name="velocity"><param name="min">-1</param><param name="max">1</param>
+</command_interface><state_interface name="position"/><state_interface name="velocity"/>
+<param name="encoder">4096</param></joint>
+<sensor name="force"><state_interface name="force.x"/><param name="frame_id">wheel</param></sensor>
+<gpio name="lamp"><command_interface name="digital" data_type="bool" size="4">
+<param name="initial_value">false</param></command_interface></gpio></ros2_control>"""
+
+
+def test_a_rate_of_zero_is_that_of_all_as_ros2_control_reads_it() -> None:
+    """Source: ros2_control's component_parser, which takes 0 for the controller manager's rate."""
+    for tree in urdfs(HARDWARE.replace("rw_rate: 100", "rw_rate: 0")):
+        assert [one.get("rw_rate") for one in tree.iter("ros2_control")] == ["0"]
+
+
+def same(one: ET.Element, other: ET.Element) -> bool:
+    texts = [(element.text or "").strip() for element in (one, other)]
+    return (
+        (one.tag, one.attrib, texts[0], len(one)) == (other.tag, other.attrib, texts[1], len(other))
+        and all(same(*pair) for pair in zip(one, other, strict=True))
+    )  # fmt: skip
+
+
+def test_hardware_is_emitted_as_ros2_control_reads_it() -> None:
+    for urdf in urdfs(HARDWARE):
+        (found,) = urdf.findall("ros2_control")
+        assert same(found, ET.fromstring(EXPECTED)), ET.tostring(found)  # noqa: S314 (as above)
+
+
+def test_the_joints_that_there_are_are_named_in_the_files_order_and_not_all_of_a_hundred() -> None:
+    names = [f"j{number}" for number in range(100)]
+    joints = "".join(
+        f"  {one}: {{type: continuous, parent: base_link, child: {one}_link}}\n" for one in names
+    )
+    links = "".join(f"  {one}_link: {{}}\n" for one in names)
+    control = "ros2_control: {h: {plugin: a/B, joints: {gripper: {state: [position]}}}}\n"
+    text = f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{links}joints:\n{joints}{control}"
+    (found,) = compile_robot(text, "r.yaml", library()).errors
+    assert found.help.endswith(" j0, j1, j2, j3, j4, j5, j6, j7 and 92 more")
+
+
+def test_a_raw_block_is_emitted_as_it_stands_in_both_files() -> None:
+    block = '<gazebo reference="wheel">\n  <mu1>1.2</mu1> <!-- worn: 0.9 -->\n</gazebo>\n<gazebo/>'
+    text = "vars: {mu: 1.2}\nxml:\n  wheels: |\n" + "\n".join(
+        f"      {line}" for line in block.replace("1.2", "${mu}").splitlines()
+    )
+    for urdf in urdfs(text):
+        assert [one.get("reference") for one in urdf.findall("gazebo")] == ["wheel", None]
+        assert urdf.findtext("gazebo/mu1") == "1.2"
+    compiled = compile_robot(HEAD + text, "r.yaml", library())
+    assert compiled.robot
+    full = next(file.text for file in emit(compiled.robot) if file.path == "robot.full.urdf")
+    assert "<!-- worn: 0.9 -->" in full
+
+
+def test_one_block_needs_no_name_and_keeps_its_lines() -> None:
+    for urdf in urdfs("xml: |\n  <gazebo reference='wheel'/>\n"):
+        assert [one.get("reference") for one in urdf.findall("gazebo")] == ["wheel"]
+    compiled = compile_robot(
+        HEAD + "xml: |\n  <gazebo/>\n  <gazebo reference='x'/>\n", "r.yaml", library()
+    )
+    assert [
+        (one.code, one.span and (one.span.line, one.span.column)) for one in compiled.errors
+    ] == [("TF203", (7, 22))]
+
+
+def test_an_overlay_takes_hardware_and_blocks_away() -> None:
+    text = (
+        HARDWARE
+        + "xml: {a: <gazebo/>}\nprofiles: {bare: {ros2_control: {base: null}, xml: {a: null}}}\n"
+    )
+    compiled = compile_robot(HEAD + text, "r.yaml", library(), ["bare"])
+    assert not compiled.errors
+    assert compiled.robot
+    assert (compiled.robot.hardware, compiled.robot.blocks) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("source_text", "place"),
+    [
+        ("|\n    <gazebo reference='x'/>\n", (7, 24)),
+        ("|\n\n    <gazebo\n     reference='x'/>\n", (9, 17)),
+        (">\n    <gazebo reference='x'/>\n", (7, 24)),
+        ("<gazebo reference='x'/>\n", (6, 11)),
+        ("\"<gazebo reference='x'/>\\n<gazebo/>\"\n", (6, 11)),
+    ],
+)
+def test_a_finding_in_a_block_has_the_line_of_the_robot_file(
+    source_text: str, place: tuple[int, int]
+) -> None:
+    compiled = compile_robot(HEAD + f"xml:\n  wheels: {source_text}", "r.yaml", library())
+    (found,) = compiled.errors
+    assert found.span
+    assert (found.code, found.span.line, found.span.column) == ("TF203", *place)
+
+
+def test_a_block_cannot_bring_entities_or_end_the_robot() -> None:
+    for evil in ("</robot><robot>", "<!DOCTYPE a [<!ENTITY b 'c'>]>", "]]>", "<a", "&nope;"):
+        compiled = compile_robot(HEAD + f"xml:\n  a: |\n    {evil}\n", "r.yaml", library())
+        assert {one.code for one in compiled.errors} <= {"TF018", "TF719"}, evil
+        assert compiled.errors, evil
+
+
+def test_two_parts_of_a_kind_have_hardware_blocks_and_colours_of_their_own() -> None:
+    arm = """tfcompose: 1
+robot: arm
+links: {foot: {}, hand: {visual: {sphere: {radius: 1}, material: {name: paint, rgba: [%s, 0, 0, 1]}}}}
+joints: {wrist: {type: continuous, parent: foot, child: hand}, lid: {type: floating, parent: foot, child: a, owner: x}}
+frames: {a: {}}
+ros2_control: {motors: {plugin: x/Y, joints: {wrist: {command: [effort]}}}}
+xml: {g: '<gazebo reference="hand"><frame>foot</frame><word>footed</word></gazebo>'}
+processes: {x: {external: true}}
+"""
+    texts = {"red.yaml": arm % 1, "dark.yaml": arm % 0.2}
+    holder = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nparts:\n" + "".join(
+        f"  {side}: {{spec: {file}, prefix: {side}_, parent: base_link}}\n"
+        for side, file in (("left", "red.yaml"), ("right", "dark.yaml"))
+    )
+    compiled = compile_robot(holder, "r.yaml", library(), read=texts.__getitem__)
+    assert not compiled.found, compiled.found
+    assert compiled.robot
+    urdf = ET.fromstring(next(f.text for f in emit(compiled.robot) if f.path == "robot.full.urdf"))  # noqa: S314 (ours)
+    names = [one.get("name") for one in urdf.findall("ros2_control")]
+    assert names == ["left_motors", "right_motors"]
+    assert [one.get("name") for one in urdf.findall("ros2_control/joint")] == [
+        "left_wrist",
+        "right_wrist",
+    ]
+    assert [one.get("reference") for one in urdf.findall("gazebo")] == ["left_hand", "right_hand"]
+    assert [one.findtext("frame") for one in urdf.findall("gazebo")] == ["left_foot", "right_foot"]
+    assert {one.findtext("word") for one in urdf.findall("gazebo")} == {"footed"}
+    assert {one.get("name") for one in urdf.iter("material")} == {"left_paint", "right_paint"}
+    kinds = {str(one.get("name")): one.get("type") for one in urdf.findall("joint")}
+    assert kinds["left_lid"] == kinds["right_lid"] == "floating"
+
+
+def test_a_prefix_is_declared_by_any_element_around_it() -> None:
+    inner = '<gazebo><a xmlns:x="u"><x:b x:c="1"/></a></gazebo>'
+    assert not compile_robot(HEAD + f"xml:\n  a: '{inner}'\n", "r.yaml", library()).errors
+    neighbour = '<gazebo><a xmlns:x="u"/><x:b/></gazebo>'
+    (found,) = compile_robot(HEAD + f"xml:\n  a: '{neighbour}'\n", "r.yaml", library()).errors
+    assert found.code == "TF719"

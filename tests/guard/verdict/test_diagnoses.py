@@ -1,0 +1,484 @@
+"""The doctor's diagnoses over histories: what is found, and when nothing is. How it is worded: tests/golden/scenes."""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.support.findings import expect
+from tests.support.tree_history import (
+    BEGUN_NS,
+    END_NS,
+    SECOND_NS,
+    SECONDS,
+    TreeHistory,
+    late,
+    row,
+    since_start,
+    sound_plan,
+    sound_tree,
+)
+from tfcompose.foundation.findings import Finding
+from tfcompose.foundation.text import duration
+from tfcompose.guard.verdict.doctor import diagnose
+from tfcompose.guard.verdict.setup import settings_apart
+from tfcompose.model.plan import EdgePattern, GuardPolicy, PlanProcess
+from tfcompose.tf.live.state import RosProcess, StampedData, Topic, TreeState
+from tfcompose.tf.ros.environment import RANGE
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+
+
+def codes(state: TreeState) -> set[str]:
+    return {found.code for found in diagnose(state)}
+
+
+def only(state: TreeState) -> Finding:
+    (found,) = diagnose(state)
+    return found
+
+
+def data(frame: str, delay_s: float, topic: str = "/scan") -> tuple[StampedData]:
+    return (StampedData(topic, frame, ("/lidar",), (delay_s,) * 5),)
+
+
+def stamped(seconds: float, edge: str = "odom base_link") -> TreeHistory:
+    """Return the tree of one edge that is so late."""
+    return TreeHistory().moving(edge, stamp=late(seconds))
+
+
+def handed_over(alternation_hz: float) -> TreeHistory:
+    """Return a tree in which one node hands a cup to and fro so often."""
+    history = TreeHistory().moving("world tool0", hz=60).moving("world table", hz=60)
+    return history.moving(
+        "_ cup",
+        b"x",
+        hz=20,
+        parents=lambda tick: ("table", "tool0")[int(tick / 20 * alternation_hz) % 2],
+    )
+
+
+def now_and_then(*at_s: float) -> TreeHistory:
+    """Return the tree of an edge that comes at these times."""
+    history = TreeHistory()
+    for now in (BEGUN_NS + int(each * SECOND_NS) for each in at_s):
+        history.takes(row("odom base_link", now), at_ns=now)
+    return history
+
+
+def in_a_simulation(speed: float) -> TreeState:
+    """Return the tree of an edge at 10 Hz, where simulated time goes so fast."""
+    history = TreeHistory().moving(
+        "odom base_link",
+        hz=10.0,
+        stamp=lambda now: 100 * SECOND_NS + int((now - BEGUN_NS) * speed),
+    )
+    return history.observed(clock_ns=int((100 + SECONDS * speed) * SECOND_NS), clock_moves=True)
+
+
+def played(stamp_ns: int, edge_s: float) -> TreeState:
+    """Return a tree whose edge is so late, and data with this stamp."""
+    delay_s = (END_NS - stamp_ns) / 1e9
+    scan = StampedData("/scan", "laser", ("/player",), (delay_s,) * 5, stamp_ns, END_NS)
+    return stamped(edge_s).fixed("base_link laser").observed(stamped=(scan,))
+
+
+SIMULATED = TreeHistory().moving("odom base_link", stamp=since_start).fixed("base_link laser")
+DAY_S = 86_400
+
+CASES: dict[str, tuple[TreeState, set[str]]] = {
+    "a sound robot": (sound_tree().observed(), set()),
+    "a sound robot with its plan": (sound_tree().observed(plan=sound_plan()), set()),
+    "odometry a little ahead": (stamped(-0.1).observed(), set()),
+    "a localizer that dates forward": (stamped(-1.0, "robot1/map robot1/odom").observed(), set()),
+    "a localizer far ahead": (stamped(-2.0, "map odom").observed(), {"TF835"}),
+    "late": (sound_tree().moving("base_link arm", b"x", stamp=late(0.4)).observed(), {"TF833"}),
+    "late because clocks differ": (
+        sound_tree().moving("base_link arm", b"x", stamp=late(0.4)).observed(skews_s={b"x": -0.4}),
+        {"TF834"},
+    ),
+    "messages a little under way": (sound_tree().observed(skews_s={b"d": -0.2}), set()),
+    "handed over now and then": (handed_over(0.7).observed(), set()),
+    "handed over seldom": (handed_over(0.3).observed(), set()),
+    "jumping to and fro": (handed_over(20.0).observed(), {"TF802"}),
+    "a parent now and then, of one node": (
+        TreeHistory()
+        .moving("_ base_link", b"x", parents=lambda tick: "odom" if tick % 15 else "map")
+        .observed(),
+        {"TF802"},
+    ),
+    "slash dropped": (
+        TreeHistory()
+        .moving("/odom /base_link")
+        .moving("odom base_link", b"x")
+        .fixed("base_link laser")
+        .observed(),
+        {"TF501", "TF822"},
+    ),
+    "slash in itself": (TreeHistory().fixed("/base_link base_link").observed(), {"TF821"}),
+    "data and tree of one old recording": (played(END_NS - DAY_S * SECOND_NS, DAY_S), {"TF825"}),
+    "a slow simulation": (in_a_simulation(0.4), set()),
+    "a simulation as fast as the day": (in_a_simulation(1.0), {"TF838"}),
+    "a timer of the least rate": (
+        TreeHistory().moving("odom base_link", hz=19.4).observed(),
+        set(),
+    ),
+    "too rarely": (TreeHistory().moving("odom base_link", hz=15.0).observed(), {"TF838"}),
+    "a loop is no second parent too": (
+        sound_tree().moving("map odom").moving("laser odom", b"x").observed(),
+        {"TF820"},
+    ),
+    "a clock that nobody stamps with": (
+        sound_tree().moving("map odom", b"x").observed(clock_ns=100 * SECOND_NS, clock_moves=True),
+        set(),
+    ),
+    "data a little late": (sound_tree().observed(stamped=data("base_link", 0.1)), set()),
+    "data a little ahead of a late edge": (
+        stamped(0.2).observed(stamped=data("base_link", 0.0)),
+        set(),
+    ),
+    "data of before": (sound_tree().observed(stamped=data("base_link", 11.0)), {"TF841"}),
+    "data ahead of time": (sound_tree().observed(stamped=data("base_link", -1.0)), {"TF841"}),
+    "late for data is told once": (
+        stamped(1.0).observed(stamped=data("base_link", 0.0)),
+        {"TF841"},
+    ),
+    "nobody is missed by name where nobody publishes": (
+        TreeState(SECONDS, plan=sound_plan()),
+        {"TF845"},
+    ),
+    "on both topics": (sound_tree().fixed("odom base_link", b"x").observed(), {"TF809"}),
+    "two trees that the plan has": (
+        sound_tree()
+        .fixed("shelf box")
+        .observed(
+            plan=sound_plan(
+                *sound_plan().edges, replace(sound_plan().edges[1], parent="shelf", child="box")
+            )
+        ),
+        set(),
+    ),
+    "two trees": (sound_tree().fixed("shelf box").observed(), {"TF830"}),
+    "of a short look two messages are no rate": (
+        replace(now_and_then(0.0, 0.5).observed(), seconds=1.0),
+        set(),
+    ),
+    "of a long one they are": (now_and_then(0.0, 4.8).observed(), {"TF838"}),
+    "rare messages with a hole among them": (
+        now_and_then(*(n / 4 for n in range(8)), *(n / 4 for n in range(13, 20))).observed(),
+        {"TF838"},
+    ),
+    "an allowed edge": (
+        sound_tree()
+        .moving("base_link tag_1", b"x")
+        .observed(plan=sound_plan(guard=GuardPolicy(allow=(EdgePattern("*", "tag_*"),)))),
+        set(),
+    ),
+    "a namespace without topics of its own": (
+        sound_tree().observed(graph=(Topic("/tf", TF_MESSAGE, ("/robot1/ekf", "/drive")),)),
+        set(),
+    ),
+    "never seen": (TreeHistory().moving("odom base_link").observed(plan=sound_plan()), {"TF811"}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_tree_has_exactly_these_findings(case: str) -> None:
+    state, expected = CASES[case]
+    assert codes(state) == expected
+
+
+#: With the names that the finding has in its message and its help.
+NAMED: dict[str, tuple[TreeState, str, list[str]]] = {
+    "late": (stamped(0.7).observed(), "TF833", ["odom → base_link", "/drive", "700 ms"]),
+    "ahead": (stamped(-0.3).observed(), "TF835", ["odom → base_link", "/drive", "300 ms"]),
+    "a node that jumps": (
+        handed_over(20.0).observed(),
+        "TF802",
+        ["cup", "table", "tool0", "let /ekf"],
+    ),
+    "data without its prefix": (
+        TreeHistory()
+        .moving("robot1/odom robot1/base_link")
+        .fixed("robot1/base_link robot1/laser")
+        .observed(stamped=data("laser", 0.0)),
+        "TF840",
+        ["/scan", "/lidar", "robot1/laser"],
+    ),
+    "a prefix": (
+        sound_tree().fixed("robot1/base_link camera").observed(),
+        "TF830",
+        ["robot1/base_link", "frame_prefix"],
+    ),
+    "a loop of one node": (
+        TreeHistory().moving("a b").moving("b a").observed(),
+        "TF820",
+        ["let /drive"],
+    ),
+    "a loop of two": (
+        TreeHistory().moving("a b").moving("b a", b"x").observed(),
+        "TF820",
+        ["one of these nodes"],
+    ),
+    "a clock ahead": (sound_tree().observed(skews_s={b"d": 3.2}), "TF834", ["/drive", "3.2 s"]),
+    "a clock behind": (sound_tree().observed(skews_s={b"d": -0.4}), "TF834", ["/drive", "400 ms"]),
+    "the one with the system's time": (
+        TreeHistory()
+        .moving("map odom", b"x", stamp=since_start)
+        .moving("base_link arm", b"x", stamp=since_start)
+        .moving("odom base_link")
+        .observed(clock_ns=5 * SECOND_NS, clock_moves=True),
+        "TF825",
+        ["/drive", "odom → base_link", "/clock", "5.0 s"],
+    ),
+    "data before the tree": (
+        stamped(0.4).observed(stamped=data("base_link", 0.0)),
+        "TF841",
+        ["/scan", "/lidar", "400 ms", "odom → base_link", "/drive", "future"],
+    ),
+    "a scan whose clock is ahead": (
+        sound_tree().observed(stamped=data("base_link", -1.0)),
+        "TF841",
+        ["/scan", "1 s ahead"],
+    ),
+    "data without a stamp": (
+        played(0, 0.0),
+        "TF841",
+        ["/scan", "odom → base_link", "header.stamp"],
+    ),
+    "data of time since a start": (
+        played(1234 * SECOND_NS, 0.0),
+        "TF841",
+        ["/scan", "1234.0 s", "ROS time"],
+    ),
+    "data of a clock in another zone": (
+        played(END_NS + 7200 * SECOND_NS, 0.0),
+        "TF841",
+        ["/scan", "2 h ahead of the system's time"],
+    ),
+    "data with the system's time": (
+        SIMULATED.observed(
+            stamped=(StampedData("/imu", "base_link", ("/imu",), (0.0,) * 5, END_NS, END_NS),),
+            clock_ns=5 * SECOND_NS,
+            clock_moves=True,
+        ),
+        "TF841",
+        ["/imu", "the system's time", "/clock", "5.0 s", "use_sim_time"],
+    ),
+    "wrong now and then": (
+        sound_tree()
+        .takes(row("odom base_link", END_NS, w=0.9))
+        .takes(row("odom base_link", END_NS + 1))
+        .observed(),
+        "TF831",
+        ["odom → base_link", "0.900", "1 of 252"],
+    ),
+    "a leak": (
+        sound_tree().observed(
+            graph=(
+                Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),
+                Topic("/tf", TF_MESSAGE, ("/robot1/ekf", "/drive")),
+            )
+        ),
+        "TF827",
+        ["/robot1/ekf", "/robot1/tf"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", NAMED)
+def test_a_finding_names_nodes_edges_and_values(case: str) -> None:
+    state, code, names = NAMED[case]
+    expect(only(state), code, *names)
+
+
+#: By the plan of an edge odom → base_link of drive at 50 Hz, and base_link → laser of static.
+BY_PLAN: dict[str, tuple[TreeHistory, str, list[str]]] = {
+    "missing": (
+        TreeHistory().moving("odom base_link"),
+        "TF811",
+        ["base_link → laser", "static (/static)"],
+    ),
+    "foreign": (
+        TreeHistory().moving("odom base_link", b"x").fixed("base_link laser"),
+        "TF801",
+        ["odom → base_link", "/ekf", "drive (/drive)"],
+    ),
+    "twice": (
+        sound_tree().moving("odom base_link", b"e"),
+        "TF801",
+        ["odom → base_link", "another /drive"],
+    ),
+    "parent": (
+        sound_tree().moving("map base_link", b"x"),
+        "TF802",
+        ["map (from /ekf)", "odom", "drive (/drive)"],
+    ),
+    "undeclared": (
+        sound_tree().moving("base_link arm", b"x"),
+        "TF803",
+        ["base_link → arm", "/ekf"],
+    ),
+    "silent": (
+        TreeHistory().moving("odom base_link", until_s=3.0).fixed("base_link laser"),
+        "TF804",
+        ["drive (/drive)", "odom → base_link", "2.02 s"],
+    ),
+    "slow": (
+        TreeHistory().moving("odom base_link", hz=20.0).fixed("base_link laser"),
+        "TF805",
+        ["odom → base_link", "20 Hz", "drive (/drive)", "50 Hz"],
+    ),
+    "topic": (
+        TreeHistory().moving("odom base_link").moving("base_link laser", b"s"),
+        "TF809",
+        ["base_link → laser", "/static", "/tf ", "/tf_static"],
+    ),
+    "pose": (
+        TreeHistory().moving("odom base_link").fixed("base_link laser", x=0.02),
+        "TF846",
+        ["laser", "base_link", "/static", "20 mm", "xyz 0.02 0 0 m", "xyz 0 0 0 m"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BY_PLAN)
+def test_with_a_plan_what_differs_from_it_is_found(case: str) -> None:
+    history, code, names = BY_PLAN[case]
+    (found,) = [one for one in diagnose(history.observed(plan=sound_plan())) if one.code == code]
+    expect(found, code, *names)
+
+
+def test_a_frame_that_goes_from_node_to_node_is_reported_once_and_one_whose_node_has_left_too() -> (
+    None
+):
+    history = TreeHistory().moving("table cup", until_s=2.0).fixed("table tool0")
+    for tick in range(101, 250):
+        now = BEGUN_NS + tick * SECOND_NS // 50
+        history.takes(row("tool0 cup", now), b"x", now)
+    assert codes(history.observed()) == {"TF802"}
+    assert "TF804" in codes(history.knows(b"x", b"s").observed())
+
+
+def test_of_a_frame_with_very_many_parents_some_are_named() -> None:
+    history = TreeHistory()
+    for index in range(60):
+        history.fixed(f"parent{index:02} cup")
+    (found,) = [one for one in diagnose(history.observed()) if one.code == "TF802"]
+    expect(found, "TF802", "cup", "60", "parent00 (from /static)", "parent01 (from /static)")
+    assert len(found.notes) < 10
+
+
+def test_stamps_that_stand_with_the_clock_are_reported_of_the_clock_alone() -> None:
+    history = (
+        TreeHistory()
+        .moving("odom base_link", stamp=lambda _: 106 * SECOND_NS)
+        .fixed("base_link laser")
+    )
+    clock = Topic("/clock", "rosgraph_msgs/msg/Clock", ("/gazebo",), ("/nav",))
+    stands = history.observed(clock_ns=106 * SECOND_NS, clock_moves=False, graph=(clock,))
+    assert codes(stands) == {"TF836"}
+    assert "TF823" in codes(replace(stands, clock_moves=True))
+
+
+def test_where_some_are_dropped_it_is_not_reported_that_the_frame_is_missing() -> None:
+    always = only(sound_tree().takes(row("base_link arm", END_NS, float("nan")), b"x").observed())
+    some = only(sound_tree().takes(row("odom base_link", END_NS, float("nan"))).observed())
+    assert always.code == some.code == "TF831"
+    assert always.help != some.help
+
+
+def test_edges_of_a_publisher_that_replaced_another_have_one_publisher() -> None:
+    """It was started anew, and the graph shows the killed one for some seconds still; fixed edges hold on."""
+    history = TreeHistory().moving("odom base_link", until_s=2.0).fixed("base_link laser")
+    for tick in range(100):
+        now = BEGUN_NS + 3 * SECOND_NS + tick * SECOND_NS // 50
+        history.takes(row("odom base_link", now), b"e", now)
+    assert codes(history.observed()) == set()
+    history.fixed("base_link laser", b"t").knows(b"s", b"t")
+    assert codes(history.observed()) == {"TF822"}
+    assert codes(history.knows(b"e", b"t").observed()) == set()
+
+
+def test_what_a_strict_guard_passes_on_is_its_owners() -> None:
+    strict = sound_plan(guard=GuardPolicy("strict"))
+    strict = replace(
+        strict, processes=(*strict.processes, PlanProcess("guard", "guard", nodes=("/ekf",)))
+    )
+    history = TreeHistory().moving("odom base_link", b"x").fixed("base_link laser", b"x")
+    assert codes(history.observed(plan=strict)) == set()
+    assert codes(history.observed(plan=sound_plan())) == {"TF801"}
+
+
+def test_processes_with_other_settings_are_searched_where_there_is_no_tf_below_a_namespace() -> (
+    None
+):
+    observed = TreeState(SECONDS, processes=(RosProcess(9, "nav", {"ROS_DOMAIN_ID": "8"}),))
+    assert codes(observed) == {"TF845", "TF908"}
+    below = (Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),)
+    assert codes(replace(observed, graph=below)) == {"TF845"}
+
+
+def test_processes_with_other_settings_cannot_be_heard_and_why_is_reported() -> None:
+    ours = {"ROS_DOMAIN_ID": "7"}
+    assert (
+        settings_apart({"ROS_DOMAIN_ID": "7", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, ours)
+        == {}
+    )
+    assert settings_apart({}, ours) == {"ROS_DOMAIN_ID": "0"}
+    assert settings_apart({**ours, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, ours) == {RANGE: "OFF"}
+    assert settings_apart({**ours, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, ours) == {}, (
+        "the default may be the same"
+    )
+    observed = TreeState(1.0, settings={**ours, "RMW_IMPLEMENTATION": "b"})
+    other = RosProcess(9, "nav", {**ours, "ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"})
+    [found] = [
+        one for one in diagnose(replace(observed, processes=(other,))) if one.code == "TF908"
+    ]
+    names = (
+        "ROS_DOMAIN_ID=8",
+        "RMW_IMPLEMENTATION=a",
+        "ROS_DOMAIN_ID is 7",
+        "RMW_IMPLEMENTATION is b",
+    )
+    expect(found, "TF908", *names, "ROS_DOMAIN_ID=8 RMW_IMPLEMENTATION=a tfcompose doctor")
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        (
+            {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"},
+            "ROS_LOCALHOST_ONLY=1",
+        ),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LAN"}, "=LAN"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "=OFF"),
+    ],
+)
+def test_settings_that_cannot_be_meant_are_found(settings: dict[str, str], name: str) -> None:
+    expect(only(sound_tree().observed(settings=settings)), "TF909", name)
+
+
+def test_times_are_shown_in_the_unit_that_people_use() -> None:
+    assert [duration(value) for value in (0.12, 3.21, 7200, 864000)] == [
+        "120 ms",
+        "3.21 s",
+        "2 h",
+        "10 days",
+    ]
+
+
+def test_joint_states_of_a_neighbour_robot_are_not_this_ones() -> None:
+    heard = Topic("/robot1/joint_states", JOINT_STATE, ("/robot1/wheels",), ("/robot1/joints",))
+    neighbours = (
+        Topic("/tf", TF_MESSAGE, ("/drive",)),
+        Topic("/robot1/tf", TF_MESSAGE, ("/robot1/joints",)),
+        heard,
+    )
+    history = TreeHistory().moving("odom base_link")
+    assert "TF842" not in codes(history.observed(graph=neighbours))
+    alone = (
+        Topic("/tf", TF_MESSAGE, ("/drive",)),
+        heard,
+    )  # nobody below /robot1 publishes TF: they are for this tree
+    assert "TF842" in codes(history.observed(graph=alone))

@@ -1,0 +1,461 @@
+"""Expected against seen, replayed: each thing that can be wrong with an edge, and nothing where all is right."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from tests.support.findings import expect
+from tfcompose.foundation.findings import Finding
+from tfcompose.foundation.geometry import Offset, Pose, offset_of, quat_from_rpy
+from tfcompose.guard.verdict.verify import verify
+from tfcompose.model.plan import (
+    Driven,
+    EdgePattern,
+    GuardPolicy,
+    Joint,
+    Plan,
+    PlanEdge,
+    PlanProcess,
+    RosSettings,
+)
+from tfcompose.model.plan.topics import parts_of
+from tfcompose.tf.live.edges import TreeObserver
+from tfcompose.tf.live.publishers import Publisher
+from tfcompose.tf.live.state import NAMELESS
+
+S = 10**9
+TOPICS = ("/tf", "/tf_static")
+TOLERANCE = Offset(1e-3, math.radians(0.1))
+LASER = Pose((0.0, 0.0, 0.3))
+DRIVE, STATIC, CAMERA, JOINTS, OTHER = (
+    f"/rover/{name}" for name in ("drive", "static", "camera", "joints", "other")
+)
+
+
+@pytest.fixture
+def plan(edge: Callable[..., PlanEdge]) -> Plan:
+    wheel = Joint("wheel_joint", "continuous", (0.0, 0.0, 1.0))
+    edges = (
+        replace(edge("odom base", "drive"), rate=10.0),
+        edge("base laser", pose=LASER),
+        edge("base wheel", "joints", Pose((0.0, 0.2, 0.0)), wheel),
+        replace(edge("camera lens", "camera", Pose((0.0, 0.015, 0.0))), kind="static"),
+        replace(edge("base rack", "other", Pose((1.0, 0.0, 0.0))), kind="static"),
+    )
+    processes = (
+        PlanProcess("drive", "external", nodes=(DRIVE,)),
+        PlanProcess("static", "static", nodes=(STATIC,)),
+        PlanProcess("joints", "joints", nodes=(JOINTS,)),
+        PlanProcess(
+            "camera",
+            "run",
+            nodes=(CAMERA,),
+            drives=(Driven("camera", "realsense/d435i", publishes=True),),
+        ),
+        PlanProcess("other", "external", nodes=(OTHER,)),
+    )
+    return Plan("rover", "0", "base", RosSettings(), edges, processes)
+
+
+class Tree:
+    """A observer that hears ten seconds of the plan's edges, unless something is changed."""
+
+    def __init__(self) -> None:
+        self.observer = TreeObserver()
+        self.sent: dict[str, dict[str, Any]] = {
+            "base": {"parent": "odom", "node": DRIVE, "rate": 10.0},
+            "laser": {"parent": "base", "node": STATIC, "pose": LASER},
+            "wheel": {
+                "parent": "base",
+                "node": JOINTS,
+                "rate": 10.0,
+                "pose": Pose((0.0, 0.2, 0.0), (0, 0, 1, 0)),
+            },
+            "lens": {
+                "parent": "camera",
+                "node": CAMERA,
+                "pose": Pose((0.0, 0.0151, 0.0), quat_from_rpy(0.01, 0, 0)),
+            },
+            "rack": {"parent": "base", "node": OTHER, "pose": Pose((1.0, 0.0, 0.0))},
+        }
+
+    def send(
+        self,
+        child: str,
+        parent: str,
+        node: str,
+        pose: Pose = Pose(),  # noqa: B008
+        rate: float = 0.0,
+        **more: Any,
+    ) -> None:
+        static = more.get("static", not rate)
+        times = [0.0] if not rate else [i / rate for i in range(round(10 * rate))]
+        gid = more.get("gid", node.encode())
+        for at in times:
+            if (
+                not more.get("until", 11) > at
+                or more.get("gap", (11, 11))[0] < at < more.get("gap", (11, 11))[1]
+            ):
+                continue
+            received = 100 * S + round(at * S)
+            stamp = 100 * S + round(at * S * more.get("speed", 1.0))
+            row = (parent, child, *divmod(stamp, S), *pose.xyz, *pose.quat_xyzw)
+            self.observer.take([row], static=static, gid=gid, received_ns=received)
+
+    def reported(self, plan: Plan, *, graph: bool = True) -> list[Finding]:
+        for child, words in self.sent.items():
+            self.send(child, **words)
+        if graph:
+            self.observer.take_graph(
+                [
+                    Publisher(words["node"].encode(), words["node"], static=False)
+                    for words in self.sent.values()
+                ]
+            )
+        self.observer.observed_ns = 110 * S
+        verdicts = verify(plan, {TOPICS: self.observer}, TOLERANCE)
+        return [found for verdict in verdicts for found in verdict.found]
+
+
+@pytest.fixture
+def tree() -> Tree:
+    return Tree()
+
+
+def test_a_tree_as_planned_has_no_findings(plan: Plan, tree: Tree) -> None:
+    assert tree.reported(plan) == []
+
+
+#: What is sent of a frame otherwise than planned, None: nothing; and what the finding is and
+#: names.
+DIFFERENCES: dict[str, tuple[str, dict[str, Any] | None, str, tuple[str, ...]]] = {
+    "missing": (
+        "laser",
+        None,
+        "TF811",
+        ("base → laser", "static (/rover/static)", "tfcompose ps"),
+    ),
+    "other parent": (
+        "laser",
+        {"parent": "odom"},
+        "TF802",
+        ("static (/rover/static)", "odom → laser", "base → laser"),
+    ),
+    "elsewhere": (
+        "laser",
+        {"pose": Pose((0.0, 0.003, 0.304), quat_from_rpy(0, math.radians(2), 0))},
+        "TF846",
+        (
+            "laser",
+            "base",
+            STATIC,
+            "5 mm",
+            "2 deg",
+            "xyz 0 0.003 0.304 m, rpy 0 2 0 deg",
+            "xyz 0 0 0.3 m, rpy 0 0 0 deg",
+        ),
+    ),
+    "moved": ("laser", {"pose": Pose((0.0, 0.003, 0.3))}, "TF846", (" 3 mm: ",)),
+    "turned": (
+        "laser",
+        {"pose": Pose((0.0, 0.0, 0.3), quat_from_rpy(0, 0, -math.pi / 2))},
+        "TF846",
+        (" 90 deg: ",),
+    ),
+    "another owner's": ("rack", {"pose": Pose((1.1, 0.0, 0.0))}, "TF846", ("rack", " 100 mm: ")),
+    "a joint's place": ("wheel", {"pose": Pose((0.0, 0.25, 0.0))}, "TF846", (" 50 mm:",)),
+    "other topic": (
+        "laser",
+        {"rate": 1.0, "static": False},
+        "TF809",
+        ("base → laser", "/tf ", STATIC, "/tf_static"),
+    ),
+    "falls silent": (
+        "base",
+        {"until": 5.0},
+        "TF804",
+        ("drive (/rover/drive)", "odom → base", "fell silent", "5.1 s"),
+    ),
+    "was silent": (
+        "base",
+        {"gap": (4.95, 6.95)},
+        "TF804",
+        ("drive (/rover/drive)", "was silent", "2.1 s"),
+    ),
+    "too rarely": (
+        "base",
+        {"rate": 7.0},
+        "TF805",
+        ("drive (/rover/drive)", "odom → base", "7 Hz", "10 Hz"),
+    ),
+    "no rotation": (
+        "laser",
+        {"pose": Pose((0.0, 0.0, 0.3), (0.0,) * 4)},
+        "TF831",
+        ("base → laser", "0.000"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", DIFFERENCES)
+def test_what_differs_from_the_plan_is_one_finding_with_its_code_and_names(
+    plan: Plan, tree: Tree, case: str
+) -> None:
+    child, sent, code, names = DIFFERENCES[case]
+    tree.sent[child] = tree.sent[child] | (sent or {})
+    if sent is None:
+        del tree.sent[child]
+    [found] = tree.reported(plan)
+    expect(found, code, *names)
+
+
+def test_an_edge_with_a_slip_in_its_name_is_missing_and_named(plan: Plan, tree: Tree) -> None:
+    tree.sent["lasr"] = tree.sent.pop("laser")
+    missing, extra = tree.reported(plan)
+    expect(missing, "TF811", "base → laser", "lasr?")
+    assert (extra.code, extra.severity) == ("TF803", "warning")
+
+
+@pytest.mark.parametrize(
+    ("policy", "severity"), [("ignore", None), ("warn", "warning"), ("error", "error")]
+)
+def test_an_edge_that_nobody_declared_counts_as_the_policy_says(
+    plan: Plan, tree: Tree, policy: Any, severity: str | None
+) -> None:
+    tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
+    plan = replace(plan, guard=GuardPolicy(unknown_edges=policy))
+    assert [(one.code, one.severity) for one in tree.reported(plan)] == (
+        [("TF803", severity)] if severity else []
+    )
+
+
+def test_an_allowed_edge_is_not_reported(plan: Plan, tree: Tree) -> None:
+    tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
+    assert (
+        tree.reported(replace(plan, guard=GuardPolicy(allow=(EdgePattern("lens", "tag_*"),))))
+        == []
+    )
+
+
+def test_a_switched_edge_may_hang_on_each_of_its_parents(plan: Plan, tree: Tree) -> None:
+    edges = tuple(
+        replace(edge, switched=("rack",)) if edge.child == "base" else edge for edge in plan.edges
+    )
+    tree.sent["base"]["parent"] = "rack"
+    assert tree.reported(replace(plan, edges=edges)) == []
+
+
+def test_a_value_within_the_tolerance_is_right(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"]["pose"] = Pose((0.0, 0.0009, 0.3), quat_from_rpy(0, math.radians(0.09), 0))
+    assert tree.reported(plan) == []
+
+
+def test_another_owners_fixed_edge_without_a_pose_may_be_anywhere(plan: Plan, tree: Tree) -> None:
+    edges = tuple(
+        replace(edge, pose=Pose()) if edge.child == "rack" else edge for edge in plan.edges
+    )
+    assert tree.reported(replace(plan, edges=edges)) == []
+
+
+def test_another_publisher_is_reported_with_both_names(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", "/ekf", rate=10.0)
+    tree.observer.take_graph([Publisher(b"/ekf", "/ekf", static=False)])
+    [found] = tree.reported(plan)
+    expect(found, "TF801", "odom → base", "/ekf", "drive (/rover/drive)")
+
+
+def test_how_far_another_publishers_pose_is_off_is_reported_with_who_it_is(
+    plan: Plan, tree: Tree
+) -> None:
+    tree.send("laser", "base", OTHER, Pose((0.25, 0.0, 0.3)))
+    [found] = tree.reported(plan)
+    expect(found, "TF801", "laser", "base", OTHER, "250 mm")
+
+
+@pytest.mark.parametrize(
+    ("metres", "output"), [(0.0125, "12.5 mm"), (0.9, "900 mm"), (1.0, "1 m"), (12.34, "12.3 m")]
+)
+def test_a_distance_is_shown_in_the_unit_that_people_use(metres: float, output: str) -> None:
+    assert Offset(metres, 0.0).text == output
+
+
+def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", DRIVE, rate=10.0, gid=b"twin")
+    for child, words in tree.sent.items():
+        tree.send(child, **words)
+    known = [
+        Publisher(words["node"].encode(), words["node"], static=False)
+        for words in tree.sent.values()
+    ]
+    tree.observer.take_graph([*known, Publisher(b"twin", DRIVE, static=False)])
+    [found] = [
+        one
+        for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE)
+        for one in verdict.found
+    ]
+    expect(found, "TF801", "odom → base", f"another {DRIVE}", f"drive ({DRIVE})")
+
+
+def test_a_publisher_that_has_left_is_reported(plan: Plan, tree: Tree) -> None:
+    for child, words in tree.sent.items():
+        tree.send(child, **words)
+    present = [words["node"] for child, words in tree.sent.items() if child != "laser"]
+    tree.observer.take_graph([Publisher(STATIC.encode(), STATIC, static=True)])
+    tree.observer.take_graph([Publisher(node.encode(), node, static=False) for node in present])
+    [found] = [
+        one
+        for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE)
+        for one in verdict.found
+    ]
+    expect(found, "TF804", "static (/rover/static)", "base → laser")
+
+
+def test_an_owner_that_was_started_again_has_not_left(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", DRIVE, rate=10.0, gid=b"before", until=1.0)
+    tree.observer.take_graph([Publisher(b"before", DRIVE, static=False)])
+    assert tree.reported(plan) == []
+
+
+def test_a_namesake_that_left_last_does_not_make_the_owner_leave(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", DRIVE, rate=100.0, gid=b"twin")
+    tree.observer.take_graph([Publisher(b"twin", DRIVE, static=False)])
+    assert tree.reported(plan) == []
+
+
+def test_where_a_simulation_goes_slower_than_the_time_of_day_edges_may_come_as_much_more_rarely(
+    plan: Plan, tree: Tree
+) -> None:
+    tree.sent["base"] |= {"rate": 2.0, "speed": 0.2}
+    tree.sent["wheel"] |= {"rate": 2.0, "speed": 0.2}
+    assert tree.reported(replace(plan, ros=RosSettings(clock="sim"))) == []
+    rarely = Tree()
+    rarely.sent["base"] |= {"rate": 5.0}
+    found = rarely.reported(replace(plan, ros=RosSettings(clock="sim")))
+    assert [one.code for one in found] == ["TF805"]
+
+
+def test_a_value_is_compared_also_where_one_before_it_was_refused(plan: Plan, tree: Tree) -> None:
+    tree.send("laser", "base", STATIC, Pose((float("nan"), 0.0, 0.0)))
+    tree.sent["laser"]["pose"] = Pose((0.0, 0.0, 0.4))
+    assert [one.code for one in tree.reported(plan)] == ["TF831", "TF846"]
+
+
+def test_a_planned_frame_that_is_published_in_itself_is_missing(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"]["parent"] = "laser"
+    assert [one.code for one in tree.reported(plan)] == ["TF821", "TF811"]
+
+
+def test_a_publisher_that_stays_without_a_name_is_blamed_and_one_that_has_just_come_is_not(
+    plan: Plan, tree: Tree
+) -> None:
+    tree.send("laser", "base", "", LASER, gid=b"raw")
+    [found] = tree.reported(plan)
+    expect(found, "TF801", "base → laser", NAMELESS, "static (/rover/static)")
+    fresh = Tree()
+    row = ("base", "laser", 109, 0, *LASER.xyz, *LASER.quat_xyzw)
+    fresh.observer.take([row], static=True, gid=b"raw", received_ns=110 * S - S // 2)
+    assert fresh.reported(plan) == []
+
+
+def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan: Plan) -> None:
+    """One of those on the topic sent it, and the owner is among them."""
+    tree = Tree()
+    tree.sent["laser"] |= {"rate": 1.0, "static": False}
+    for words in tree.sent.values():
+        words["gid"] = None
+    publishers = [
+        Publisher(words["node"].encode(), words["node"], static=False)
+        for words in tree.sent.values()
+    ]
+    for child, words in tree.sent.items():
+        tree.send(child, **words)
+    tree.observer.take_graph(
+        [*publishers, *(replace(one, static=True, gid=one.gid + b"s") for one in publishers)]
+    )
+    verdicts = verify(plan, {TOPICS: tree.observer}, TOLERANCE)
+    assert [found.code for verdict in verdicts for found in verdict.found] == []
+
+
+def test_a_frame_that_a_driver_sends_far_from_its_preset_is_reported_and_a_strangers_is_not_compared(
+    plan: Plan, tree: Tree
+) -> None:
+    driven = replace(plan.process("camera").drives[0], frames={"lens": "nominal"})
+    camera = replace(plan.process("camera"), drives=(driven,))
+    plan = replace(
+        plan, processes=tuple(camera if each.name == "camera" else each for each in plan.processes)
+    )
+    assert tree.reported(plan) == [], "calibrated"
+    tree = Tree()
+    tree.sent["lens"]["pose"] = Pose((0.0, 0.06, 0.0))
+    [found] = tree.reported(plan)
+    expect(found, "TF828", "lens", "camera", CAMERA, "45 mm", "realsense/d435i")
+    tree = Tree()
+    tree.send("lens", "camera", OTHER, Pose((0.0, 0.06, 0.0)))
+    assert [one.code for one in tree.reported(plan)] == ["TF801"]
+
+
+def test_of_a_recording_nothing_is_advised_that_only_a_running_robot_can_do(
+    plan: Plan, tree: Tree
+) -> None:
+    del tree.sent["laser"]
+    tree.sent["base"]["until"] = 5.0
+    for words in tree.sent.values():
+        words["gid"] = None
+    found = {one.code: one.help for one in tree.reported(plan, graph=False)}
+    assert found == {"TF804": "", "TF811": ""}
+
+
+def test_a_bag_knows_no_publishers_and_blames_none(plan: Plan, tree: Tree) -> None:
+    for words in tree.sent.values():
+        words["gid"] = None
+    assert tree.reported(plan, graph=False) == []
+
+
+def test_edges_are_searched_on_the_topics_of_their_owners(plan: Plan) -> None:
+    moved = replace(plan.process("static"), remap={"/tf": "/r1/tf", "/tf_static": "/r1/tf_static"})
+    plan = replace(
+        plan, processes=tuple(moved if each.name == "static" else each for each in plan.processes)
+    )
+    topics = {pair: [edge.child for edge in part.edges] for pair, part in parts_of(plan).items()}
+    assert topics == {
+        TOPICS: ["base", "wheel", "lens", "rack"],
+        ("/r1/tf", "/r1/tf_static"): ["laser"],
+    }
+
+
+angles = st.floats(-3.1, 3.1)
+
+
+@given(st.tuples(angles, angles, angles), st.tuples(angles, angles, angles), st.floats(0.5, 2))
+def test_the_angle_between_two_orientations_is_scipys(
+    a: tuple[float, float, float], b: tuple[float, float, float], scale: float
+) -> None:
+    expected, observed = quat_from_rpy(*a), quat_from_rpy(*b)
+    scaled = tuple(-scale * each for each in observed)
+    angle = (Rotation.from_quat(expected).inv() * Rotation.from_quat(observed)).magnitude()
+    assert offset_of(Pose(a, expected), Pose(b, scaled)).rot_rad == pytest.approx(angle, abs=1e-7)  # type: ignore[arg-type]
+    assert offset_of(Pose(a, expected), Pose(b, observed)).xyz_m == pytest.approx(math.dist(a, b))
+
+
+def test_what_a_strict_guard_passes_on_is_its_owners(plan: Plan) -> None:
+    strict = replace(
+        plan, processes=(*plan.processes, PlanProcess("guard", "guard", nodes=("/rover/guard",)))
+    )
+    tree = Tree()
+    for sent in tree.sent.values():
+        sent["node"] = "/rover/guard"
+    assert tree.reported(strict) == []
+    assert {one.code for one in tree.reported(plan)} == {"TF801"}
+
+
+@pytest.mark.parametrize("metres", [0.012, 0.1, 0.7, 3.3])
+def test_what_is_off_by_the_tolerance_is_within_it(metres: float) -> None:
+    off = offset_of(Pose((1.1, 0.2, 0.3)), Pose((1.1 + metres, 0.2, 0.3)))
+    assert not off.beyond(Offset(metres, 0.0))
+    assert off.beyond(Offset(metres * 0.999, 0.0))

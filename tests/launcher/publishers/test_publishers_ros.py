@@ -1,0 +1,609 @@
+"""The publishing processes as they run: real processes, heard by a node of the test."""
+
+import math
+import signal
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise, repeat
+from statistics import median
+from typing import Any, Literal
+
+import pytest
+from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from tests.support.waiting import until
+from tfcompose.foundation.geometry import Pose, angle_between, normalised, quat_from_rpy
+from tfcompose.foundation.signals import Stop
+from tfcompose.model.plan import Joint, PlanProcess, Simulation, Sweep
+from tfcompose.tf.ros.graph import writers
+from tfcompose.tf.ros.node import (
+    JOINT_STATES,
+    LATCHED,
+    Received,
+    Subscription,
+    TFSubscription,
+    latch,
+    open_node,
+    wait,
+)
+from tfcompose.tf.ros.tf_codec import Transform, decode
+
+pytestmark = pytest.mark.ros
+
+UNTIL_S = 30.0
+Y = (0.0, 1.0, 0.0)
+
+
+@dataclass
+class Listeners:
+    """A node of the test that hears what processes say."""
+
+    node: Any
+
+    def tf(self, count: int, *, static: bool = False) -> list[tuple[Received, list[Transform]]]:
+        """Return the next messages, at least ``count`` of them."""
+        return [
+            (each, decode(each.data))
+            for each in take(self.node, TFSubscription(self.node, static=static), count)
+        ]
+
+
+def take(node: Any, subscription: Subscription, count: int) -> list[Received]:
+    received: list[Received] = []
+    end = time.monotonic() + UNTIL_S
+    while len(received) < count and time.monotonic() < end:
+        wait(node, [subscription], 1.0, Stop())
+        received += subscription.take()
+    assert len(received) >= count
+    return received
+
+
+@pytest.fixture
+def listeners(domain: object) -> Iterator[Listeners]:
+    assert domain
+    with open_node("ears", "/test") as node:
+        yield Listeners(node)
+
+
+@pytest.fixture
+def rover(edge: Callable[..., Any], write: Callable[..., Any]) -> Any:
+    """A robot with two wheels, a mimic of the left one, and a gripper whose second finger mimics that mimic."""
+    axle = Pose((0.1, 0.2, 0.0), quat_from_rpy(0.3, 0.0, 0.0))
+    moving = [
+        edge(
+            "base finger", "joints", None, Joint("finger", "prismatic", Y, "follower", 0.01, 0.002)
+        ),
+        edge(
+            "base follower", "joints", None, Joint("follower", "continuous", Y, "left", -2.0, 0.5)
+        ),
+        edge("base left", "joints", axle, Joint("left", "continuous", Y)),
+        edge("base right", "joints", axle, Joint("right", "revolute", Y)),
+    ]
+    return write(moving, PlanProcess("joints", "joints"))
+
+
+def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+) -> None:
+    edges = [edge(f"base_link frame_{n}", "static", Pose((n, 0.0, 0.0))) for n in range(150)]
+    other = [edge("odom base_link", "wheels")]
+    both = PlanProcess("static", "static"), PlanProcess("wheels", "external")
+    process = start("tfcompose.launcher.publishers.static", write(edges + other, *both), "static")
+    process.until_says("150 edges on /tf_static")
+    ((received, transforms),) = listeners.tf(1, static=True)
+    assert [(t.parent, t.child, t.xyz[0]) for t in transforms] == [
+        ("base_link", f"frame_{n}", n) for n in range(150)
+    ]
+    assert 0 <= time.time_ns() - transforms[0].stamp_ns < 60e9
+    assert until(
+        lambda: [w.node for w in writers(listeners.node, "/tf_static")] == ["/rover/static"]
+    )
+    (writer,) = writers(listeners.node, "/tf_static")
+    assert writer.gid == received.gid
+    assert (writer.durability, writer.type) == ("transient_local", "tf2_msgs/msg/TFMessage")
+
+
+def test_joint_states_move_the_wheels_and_what_mimics_them(
+    start: Callable[..., Any], listeners: Listeners, rover: Any
+) -> None:
+    start("tfcompose.launcher.publishers.joints", rover, "joints").until_says(
+        "4 edges on /tf, from /rover/joint_states"
+    )
+    subscription = TFSubscription(listeners.node, static=False)
+    message = JointState(name=["left", "gripper", "right"], position=[0.7, math.nan, -1.2])
+    message.header.stamp.sec, message.header.stamp.nanosec = 12, 34
+    found = _answer(listeners, subscription, message)
+
+    axle = Rotation.from_euler("xyz", [0.3, 0, 0])
+    turned = {
+        "left": (axle, 0.7),
+        "right": (axle, -1.2),
+        "follower": (Rotation.identity(), -2.0 * 0.7 + 0.5),
+    }
+    for name, (before, angle) in turned.items():
+        expected = (before * Rotation.from_rotvec([0, angle, 0])).as_quat()
+        assert angle_between(found[name].quat_xyzw, tuple(expected)) < 1e-7
+    assert found["left"].xyz == (0.1, 0.2, 0.0)
+    assert found["finger"].xyz == pytest.approx((0, 0.01 * (-2.0 * 0.7 + 0.5) + 0.002, 0))
+    assert {t.stamp_ns for t in found.values()} == {12_000_000_034}
+
+
+def test_joint_states_that_hold_some_joints_move_those(
+    start: Callable[..., Any], listeners: Listeners, rover: Any
+) -> None:
+    start("tfcompose.launcher.publishers.joints", rover, "joints").until_says("edges")
+    subscription = TFSubscription(listeners.node, static=False)
+    before = time.time_ns()
+    found = _answer(listeners, subscription, JointState(name=["right"], position=[1.0]))
+    assert list(found) == ["right"]
+    assert before <= found["right"].stamp_ns <= time.time_ns(), (
+        "a message without a stamp counts from its arrival"
+    )
+
+
+def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
+    start: Callable[..., Any], listeners: Listeners, rover: Any
+) -> None:
+    process = start("tfcompose.launcher.publishers.joints", rover, "joints")
+    process.until_says("edges")
+    publisher = listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
+    subscription = TFSubscription(listeners.node, static=False)
+    good = JointState(name=["left"], position=[1.0])
+    _answer(listeners, subscription, good, publisher)
+    cases = {
+        "another number": JointState(name=["left", "right"], position=[1.0]),
+        "not finite": JointState(name=["left"], position=[math.nan]),
+        "no positions": JointState(name=["left"]),
+    }
+    for case, message in cases.items():
+        publisher.publish(message)
+        process.until_says(case)
+    for message in cases.values():
+        publisher.publish(message)
+        _answer(listeners, subscription, good, publisher)
+    assert [process.output.count(case) for case in cases] == [1, 1, 1]
+    assert process.output.count("dropped a joint state") == 3
+
+
+def test_drivers_that_send_their_own_joints_each_move_them_all(
+    start: Callable[..., Any], listeners: Listeners, rover: Any
+) -> None:
+    start("tfcompose.launcher.publishers.joints", rover, "joints").until_says("edges")
+    subscription = TFSubscription(listeners.node, static=False)
+    drivers = [
+        listeners.node.create_publisher(JointState, "/rover/joint_states", 10) for _ in range(2)
+    ]
+    observed: set[frozenset[str]] = set()
+
+    def both() -> bool:
+        for name, driver in zip(("left", "right"), drivers, strict=True):
+            driver.publish(JointState(name=[name], position=[1.0]))
+        wait(listeners.node, [subscription], 0.1, Stop())
+        observed.update(
+            frozenset(t.child for t in decode(each.data)) for each in subscription.take()
+        )
+        return len(observed) > 1
+
+    assert until(both)
+    assert observed == {frozenset({"left", "follower", "finger"}), frozenset({"right"})}
+
+
+def test_joints_that_no_joint_state_speaks_of_are_named_once_with_who_sends_the_others(
+    start: Callable[..., Any], listeners: Listeners, rover: Any
+) -> None:
+    right = JointState(name=["right"], position=[1.0])
+    publisher = listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
+    process = start("tfcompose.launcher.publishers.joints", rover, "joints")
+
+    def has_reported() -> bool:
+        publisher.publish(right)  # from before its start on, so that it is heard in its first 5 s
+        return until(lambda: "no joint state" in process.output, 0.1)
+
+    assert until(has_reported)
+    process.until_says("no joint state after 5 s for left: /rover/joint_states comes from ")
+    assert process.output.count("no joint state") == 1
+
+
+def test_without_any_joint_state_it_says_that_nobody_publishes_them(
+    start: Callable[..., Any], rover: Any
+) -> None:
+    process = start("tfcompose.launcher.publishers.joints", rover, "joints")
+    process.until_says(
+        "no joint state after 5 s for left, right: nobody publishes /rover/joint_states\n"
+    )
+
+
+def test_publish_frequency_is_reported_and_leaves_nothing_out_in_silence(
+    start: Callable[..., Any], listeners: Listeners, rover: Any
+) -> None:
+    process = start(
+        "tfcompose.launcher.publishers.joints",
+        rover,
+        "joints",
+        "--ros-args",
+        "-p",
+        "publish_frequency:=10.0",
+    )
+    process.until_says("4 edges on /tf, from /rover/joint_states, at most 10 Hz")
+    subscription = TFSubscription(listeners.node, static=False)
+    publisher = listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
+    message = JointState(name=["left"], position=[1.0])
+    _answer(listeners, subscription, message, publisher)
+    warning = (
+        "joint states come with more than 10 Hz: some are left out, as publish_frequency says"
+    )
+
+    def send() -> bool:
+        for _ in range(3):
+            publisher.publish(message)
+        return until(lambda: warning in process.output, 1)
+
+    assert until(send), process.output
+
+
+def test_a_parameter_of_another_type_is_refused_with_a_sentence(
+    start: Callable[..., Any], rover: Any
+) -> None:
+    process = start(
+        "tfcompose.launcher.publishers.joints",
+        rover,
+        "joints",
+        "--ros-args",
+        "-p",
+        "publish_frequency:=fast",
+    )
+    assert process.process.wait(UNTIL_S) == 1
+    process.close()
+    (line,) = process.errors
+    assert "publish_frequency" in line
+
+
+@pytest.mark.parametrize("name", ["static", "joints"])
+def test_another_description_changes_nothing_and_is_reported_with_its_publisher(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    write: Callable[..., Any],
+    name: Literal["static", "joints"],
+) -> None:
+    process = start(
+        f"tfcompose.launcher.publishers.{name}", write([], PlanProcess(name, name)), name
+    )
+    process.until_says("edge")
+    same = latch(listeners.node, "/rover/robot_description", "<robot name='rover'/>")
+    other = latch(listeners.node, "/rover/robot_description", "<robot name='stranger'/>")
+    process.until_says("/test/ears publishes another /rover/robot_description: ")
+    other.publish(String(data="<robot name='third'/>"))
+    take_for(
+        listeners.node,
+        Subscription(listeners.node, String, "/rover/robot_description", LATCHED),
+        0.5,
+    )
+    assert process.output.count("another") == 1
+    assert same
+
+
+@pytest.mark.parametrize("name", ["static", "joints"])
+def test_the_description_is_latched(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    write: Callable[..., Any],
+    name: Literal["static", "joints"],
+) -> None:
+    start(
+        f"tfcompose.launcher.publishers.{name}", write([], PlanProcess(name, name)), name
+    ).until_says("edge")
+    subscription = Subscription(listeners.node, String, "/rover/robot_description", LATCHED)
+    (received,) = take(listeners.node, subscription, 1)
+    assert deserialize_message(received.data, String).data == "<robot name='rover'/>"
+
+
+def test_the_description_is_left_to_the_joints_process_where_there_is_one(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+) -> None:
+    file = write([edge("a b")], PlanProcess("static", "static"), PlanProcess("joints", "joints"))
+    start("tfcompose.launcher.publishers.static", file, "static").until_says(
+        "1 edge on /tf_static"
+    )
+    subscription = Subscription(listeners.node, String, "/rover/robot_description", LATCHED)
+    listeners.tf(1, static=True)
+    assert take_for(listeners.node, subscription, 0.5) == []
+
+
+def test_a_body_drives_on_a_circle(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+) -> None:
+    circle = Simulation("circle", 50.0, radius=2.0, speed=0.8)
+    file = write(
+        [edge("odom base_link", "wheels")], PlanProcess("wheels", "simulate", simulate=circle)
+    )
+    start("tfcompose.launcher.publishers.simulate", file, "wheels").until_says(
+        "1 edge on /tf, simulated at 50 Hz"
+    )
+    transforms = [transform for _, (transform,) in listeners.tf(30)]
+    angles = []
+    for transform in transforms:
+        x, y, z = transform.xyz
+        assert math.hypot(x, y) == pytest.approx(2.0)
+        assert z == 0
+        expected = Rotation.from_euler("z", math.atan2(y, x) + math.pi / 2).as_quat()
+        assert angle_between(transform.quat_xyzw, tuple(expected)) < 1e-7
+        angles.append(math.atan2(y, x))
+    for (before, a), (after, b) in pairwise(zip(transforms, angles, strict=True)):
+        seconds = (after.stamp_ns - before.stamp_ns) / 1e9
+        assert math.remainder(b - a - 0.8 * seconds, math.tau) == pytest.approx(0, abs=1e-3)
+
+
+def test_the_rate_does_not_drift(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+) -> None:
+    pose = Pose((1.0, 2.0, 3.0), normalised((0.0, 0.0, 1.0, 1.0)))
+    process = PlanProcess("map", "simulate", simulate=Simulation("fixed", 25.0, pose=pose))
+    start(
+        "tfcompose.launcher.publishers.simulate", write([edge("map odom", "map")], process), "map"
+    ).until_says("simulated")
+    transforms = [transform for _, (transform,) in listeners.tf(51)]
+    assert {(t.parent, t.child, t.xyz, t.quat_xyzw) for t in transforms} == {
+        ("map", "odom", pose.xyz, pose.quat_xyzw)
+    }
+    # A late tick moves no later one: most stamps lie near whole periods from each other, however
+    # busy the machine is.
+    periods = [transform.stamp_ns / 40_000_000 for transform in transforms]
+    off = min(median(abs(math.remainder(a - b, 1.0)) for a in periods) for b in periods)
+    assert off < 0.15, "0.25 is what drifting stamps give"
+    assert periods[50] - periods[0] >= 49
+    assert median(b - a for a, b in pairwise(periods)) < 1.5, "most ticks come"
+
+
+def test_simulated_joint_states_are_published(
+    start: Callable[..., Any], listeners: Listeners, write: Callable[..., Any]
+) -> None:
+    simulated = Simulation("joints", 50.0, joints={"left": 0.5, "right": -1.0})
+    file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
+    start("tfcompose.launcher.publishers.simulate", file, "wheels").until_says(
+        "2 joints on /rover/joint_states, simulated at 50 Hz"
+    )
+    subscription = Subscription(listeners.node, JointState, "/rover/joint_states", JOINT_STATES)
+    message = deserialize_message(take(listeners.node, subscription, 3)[-1].data, JointState)
+    assert dict(zip(message.name, message.position, strict=True)) == {"left": 0.5, "right": -1.0}
+    assert 0 <= time.time_ns() - message.header.stamp.sec * 1e9 < 60e9
+
+
+def test_swept_joints_move_within_their_limits_and_the_others_stay(
+    start: Callable[..., Any], listeners: Listeners, write: Callable[..., Any]
+) -> None:
+    simulated = Simulation(
+        "joints", 50.0, joints={"lift": 0.2, "grip": 0.5}, sweep={"lift": Sweep(1.0, 0.1, 0.5)}
+    )
+    file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
+    start("tfcompose.launcher.publishers.simulate", file, "wheels").until_says(
+        "2 joints on /rover/joint_states, simulated at 50 Hz"
+    )
+    subscription = Subscription(listeners.node, JointState, "/rover/joint_states", JOINT_STATES)
+    messages = [
+        deserialize_message(each.data, JointState)
+        for each in take(listeners.node, subscription, 75)
+    ]
+    assert {tuple(message.name) for message in messages} == {("lift", "grip")}
+    assert {message.position[1] for message in messages} == {0.5}
+    # Later messages are where a sine of this period is that goes through the first one's place,
+    # upwards or downwards.
+    stamps_s = [
+        message.header.stamp.sec + message.header.stamp.nanosec / 1e9 for message in messages
+    ]
+    lifts = [message.position[0] for message in messages]
+    rotation = math.asin((lifts[0] - 0.3) / 0.2)
+    by_direction = [
+        [0.3 + 0.2 * math.sin(first + math.tau * (stamp_s - stamps_s[0])) for stamp_s in stamps_s]
+        for first in (rotation, math.pi - rotation)
+    ]
+    assert any(lifts == pytest.approx(expected, abs=0.01) for expected in by_direction)
+
+
+def test_simulated_time_comes_from_the_clock_topic(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+) -> None:
+    circle = Simulation("circle", 10.0, radius=1.0, speed=1.0)
+    process = PlanProcess("wheels", "simulate", simulate=circle)
+    start(
+        "tfcompose.launcher.publishers.simulate",
+        write([edge("odom base", "wheels")], process, clock="sim"),
+        "wheels",
+    )
+    subscription = TFSubscription(listeners.node, static=False)
+    clock = listeners.node.create_publisher(Clock, "/clock", 10)
+    # Whoever has just started may hear the clock before somebody hears it on /tf, and answers each
+    # time once.
+    _repeat(
+        listeners,
+        subscription,
+        (partial(clock.publish, _time(seconds)) for seconds in range(1000, 2000)),
+    )
+    for case, seconds in enumerate((5.0, 5.03, 5.1, 5.3, 1.0, 1.1)):
+        send = partial(clock.publish, _time(seconds))
+        if case == 1:  # within a period
+            send()
+            assert take_for(listeners.node, subscription, 0.3) == []
+            continue
+        found = _repeat(listeners, subscription, repeat(send), round(seconds * 1e9))
+        expected = seconds - (5.0 if case < 4 else 1.0)  # 1.0 is a simulator that starts anew
+        assert math.atan2(found.xyz[1], found.xyz[0]) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("module", ["launcher.publishers.simulate", "guard"])
+def test_that_simulated_time_does_not_come_is_reported_once(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+    module: str,
+) -> None:
+    kind = module.rpartition(".")[2]
+    process = PlanProcess(kind, kind, simulate=Simulation("fixed", 10.0))  # type: ignore[arg-type]
+    started = start(
+        f"tfcompose.{module}", write([edge("odom base", kind)], process, clock="sim"), kind
+    )
+    started.until_says(
+        "no time on /clock after 5 s: the plan's clock is sim, and nobody publishes it\n"
+    )
+    take_for(listeners.node, TFSubscription(listeners.node, static=False), 1.0)
+    assert started.output.count("/clock") == 1
+
+
+def test_joint_states_without_a_time_get_simulated_time(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+) -> None:
+    left = edge("base left", "joints", None, Joint("left", "continuous", Y))
+    file = write([left], PlanProcess("joints", "joints"), clock="sim")
+    start("tfcompose.launcher.publishers.joints", file, "joints").until_says("1 edge on /tf")
+    subscription = TFSubscription(listeners.node, static=False)
+    states = listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
+    clock = listeners.node.create_publisher(Clock, "/clock", 10)
+
+    def send(hundredths: int) -> None:
+        clock.publish(_time(7 + hundredths / 100))
+        states.publish(JointState(name=["left"], position=[1.0]))
+
+    found = _repeat(
+        listeners, subscription, (partial(send, hundredths) for hundredths in range(1000))
+    )
+    assert 7e9 <= found.stamp_ns <= 17e9
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("clock", ["wall", "sim"])
+def test_every_process_ends_before_its_next_message_and_silently(
+    start: Callable[..., Any],
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+    number: int,
+    clock: str,
+) -> None:
+    simulated = Simulation("fixed", 0.01)  # a message in 100 s
+    processes = [PlanProcess(k, k, simulate=simulated) for k in ("static", "joints", "simulate")]
+    file = write([edge("map odom", "simulate"), edge("a b")], *processes, clock=clock)
+
+    running = [
+        start(f"tfcompose.launcher.publishers.{process.kind}", file, process.name)
+        for process in processes
+    ]
+    for each in running:
+        each.until_says("edge")
+    for each in running:
+        code = each.end(number)
+        each.close()
+        assert (code, each.errors) == (0, [])
+
+
+def test_an_interrupt_during_the_start_ends_silently_too(
+    start: Callable[..., Any], write: Callable[..., Any]
+) -> None:
+    file = write([], PlanProcess("static", "static"))
+    process = start("tfcompose.launcher.publishers.static", file, "static", PYTHONVERBOSE="1")
+    imports = ("import 'tfcompose.launcher.publishers.description'", "import 'rclpy'")
+    end = time.monotonic() + UNTIL_S
+    while not any(one in line for line in process.errors for one in imports):
+        assert time.monotonic() < end, "it loads nothing"
+        time.sleep(0.001)
+    code = process.end(signal.SIGINT)
+    process.close()
+    assert code == 0
+    assert "Traceback" not in "".join(process.errors)
+
+
+def test_a_node_is_called_as_the_plan_says_and_its_topics_move_with_it(
+    start: Callable[..., Any],
+    listeners: Listeners,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+) -> None:
+    process = PlanProcess(
+        "static", "static", nodes=("/fleet/r1/frames",), remap={"/tf_static": "tf_static"}
+    )
+    start(
+        "tfcompose.launcher.publishers.static",
+        write([edge("a b")], process),
+        "static",
+        "--ros-args",
+        "-r",
+        "__node:=frames2",
+    )
+    assert until(
+        lambda: (
+            [w.node for w in writers(listeners.node, "/fleet/r1/tf_static")]
+            == ["/fleet/r1/frames2"]
+        )
+    )
+
+
+def take_for(node: Any, subscription: Subscription, seconds: float) -> list[Received]:
+    received: list[Received] = []
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0:
+        wait(node, [subscription], left, Stop())
+        received += subscription.take()
+    return received
+
+
+def _time(seconds: float) -> Clock:
+    message = Clock()
+    message.clock.sec, message.clock.nanosec = divmod(round(seconds * 1e9), 1_000_000_000)
+    return message
+
+
+def _repeat(
+    listeners: Listeners,
+    subscription: Subscription,
+    sends: Iterable[Callable[[], None]],
+    stamp_ns: int | None = None,
+) -> Transform:
+    """Send until something comes on /tf, with that stamp: best effort may lose messages."""
+    end = time.monotonic() + UNTIL_S
+    for send in sends:
+        send()
+        wait(listeners.node, [subscription], 0.2, Stop())
+        for received in subscription.take():
+            (transform,) = decode(received.data)
+            if stamp_ns in (None, transform.stamp_ns):
+                return transform
+        if time.monotonic() > end:
+            break
+    raise AssertionError("nothing came on /tf")
+
+
+def _answer(
+    listeners: Listeners, subscription: Subscription, message: Any, publisher: Any = None
+) -> dict[str, Transform]:
+    """Send a joint state until it is answered on /tf; return the answer by child frame."""
+    sender = publisher or listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
+    end = time.monotonic() + UNTIL_S
+    while time.monotonic() < end:
+        sender.publish(message)
+        wait(listeners.node, [subscription], 0.2, Stop())
+        for received in subscription.take():
+            take_for(listeners.node, subscription, 0.2)
+            return {transform.child: transform for transform in decode(received.data)}
+    raise AssertionError("no answer on /tf")

@@ -1,0 +1,132 @@
+"""A plan's file that is broken is refused, with the path to what is wrong."""
+
+import json
+from typing import Any
+
+import pytest
+
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.plan import (
+    Joint,
+    Plan,
+    PlanEdge,
+    PlanProcess,
+    Ready,
+    RosSettings,
+    Simulation,
+    SourceLine,
+    Sweep,
+)
+from tfcompose.model.plan.file import read_plan, write_plan
+
+AT = SourceLine("r.yaml", 1)
+EDGES = (
+    PlanEdge("base", "a", "static", "static", "/s", Pose(), None, AT),
+    PlanEdge("base", "b", "joint", "joints", "/j", Pose(), 50.0, AT, Joint("b_joint", "revolute")),
+)
+PROCESSES = (
+    PlanProcess("static", "static", owns=(("base", "a"),)),
+    PlanProcess("joints", "joints"),
+    PlanProcess("camera", "run", ready=Ready("topic", "/scan"), lifecycle={"/camera": "active"}),
+    PlanProcess(
+        "arm", "simulate", simulate=Simulation("joints", 20.0, sweep={"b": Sweep(2.0, -1.0, 1.0)})
+    ),
+)
+PLAN = Plan("rover", "", "base", RosSettings(), EDGES, PROCESSES)
+MISSING = object()
+
+
+def changed(path: tuple[str | int, ...], value: Any) -> str:
+    """Return the plan's text with another value at the path, or without it."""
+    data = json.loads(write_plan(PLAN))
+    *above, last = path
+    holder = data
+    for step in above:
+        holder = holder[step]
+    if value is MISSING:
+        del holder[last]
+    else:
+        holder[last] = value
+    return json.dumps(data)
+
+
+def refused(text: str) -> str:
+    """Return the message of the one finding for a text that is no plan."""
+    with pytest.raises(RejectedError) as rejected:
+        read_plan(text, "plan.json")
+    (found,) = rejected.value.findings
+    assert (found.code, found.span and found.span.file) == ("TF902", "plan.json")
+    return found.message.removeprefix("not a valid plan: ")
+
+
+def test_what_is_encoded_is_decoded() -> None:
+    assert read_plan(write_plan(PLAN), "plan.json") == PLAN
+
+
+#: Paths, and what is wrong there.
+WRONG: tuple[tuple[tuple[str | int, ...], Any], ...] = (
+    (("robot",), 7),
+    (("base",), MISSING),
+    (("host",), None),
+    (("ros", "clock"), "moon"),
+    (("ros", "discovery"), "everywhere"),
+    (("ros", "domain_id"), True),
+    (("ros", "shared_frames"), "map"),
+    (("ros", "shared_frames"), [7]),
+    (("guard", "mode"), "loose"),
+    (("guard", "allow"), [{"parent": "*"}]),
+    (("claims",), None),
+    (("edges",), {}),
+    (("edges", 1), 7),
+    (("edges", 1, "kind"), MISSING),
+    (("edges", 1, "parent"), None),
+    (("edges", 1, "xyz"), [1, 2]),
+    (("edges", 1, "xyz", 2), float("nan")),
+    (("edges", 1, "quat_xyzw"), [0, 0, 0, 2]),
+    (("edges", 1, "rate"), 10**400),
+    (("edges", 1, "source", "line"), 1.5),
+    (("edges", 1, "joint"), None),
+    (("edges", 1, "joint", "type"), "fixed"),
+    (("edges", 1, "joint", "axis"), [0, 0, "1"]),
+    (("processes", 0, "restart"), "maybe"),
+    (("processes", 0, "max_restarts"), 1.0),
+    (("processes", 0, "required"), 1),
+    (("processes", 0, "stop", "signal"), "SIGFOO"),
+    (("processes", 0, "stop", "timeout_s"), "3"),
+    (("processes", 0, "owns", 0), ["base"]),
+    (("processes", 0, "env"), {"A": 1}),
+    (("processes", 0, "drives"), [{}]),
+    (("processes", 0, "switches"), {"/a": {"publish_tf": None}}),
+    (("processes", 0, "after"), {"camera": "born"}),
+    (("processes", 2, "lifecycle", "/camera"), "on"),
+    (("processes", 2, "ready", "kind"), "soon"),
+    (("processes", 2, "log_level"), "loud"),
+    (("processes", 3, "simulate"), None),
+    (("processes", 3, "simulate", "rate"), 0),
+    (("processes", 3, "simulate", "sweep", "b", "period_s"), -1.0),
+    (("processes", 3, "simulate", "sweep", "b", "upper"), None),
+)
+
+
+def test_what_is_wrong_is_refused_with_the_path_to_it() -> None:
+    for path, value in WRONG:
+        steps = (
+            f".{step}"
+            if isinstance(step, str) and step.isidentifier()
+            else f"[{json.dumps(step)}]"
+            for step in path
+        )
+        at = "".join(steps).removeprefix(".")
+        # A rule about several keys names the mapping that holds them.
+        assert refused(changed(path, value)).startswith((at, f"{at.rpartition('.')[0]} has ")), (
+            path
+        )
+
+
+def test_keys_of_a_later_version_are_ignored() -> None:
+    assert read_plan(changed(("processes", 2, "colour"), "blue"), "plan.json") == PLAN
+
+
+def test_a_value_that_is_long_is_shown_in_part() -> None:
+    assert len(refused(changed(("edges", 1, "kind"), "x" * 10_000))) < 200

@@ -1,0 +1,389 @@
+"""``tfcompose echo`` on the real thing."""
+
+import json
+import math
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from builtin_interfaces.msg import Time
+from rosgraph_msgs.msg import Clock
+
+from tests.support import processes
+from tests.support.processes import Started
+from tests.support.waiting import until
+from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.foundation.signals import Stop
+from tfcompose.model.plan import PlanEdge, PlanProcess, Simulation
+from tfcompose.tf.live.echo import echo as run_echo
+from tfcompose.tf.live.pose_query import PoseQuery
+from tfcompose.tf.ros.clock import SimClock
+from tfcompose.tf.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Transform, encode
+
+pytestmark = pytest.mark.ros
+
+#: So long echo waits for a pose that does not come, again and again: where much else runs,
+#: publishers are found late.
+TIMEOUTS_S = (2.0, 6.0, 20.0)
+DOWN_15 = Pose((0.2, 0.0, 0.1), quat_from_rpy(0, math.radians(15), 0))
+
+
+@pytest.fixture
+def rover(
+    write: Callable[..., Path], start: Callable[..., Started], edge: Callable[..., PlanEdge]
+) -> None:
+    """A base that stands at x = 2 in odom, with a camera that looks down 15 degrees, and a tree of its own beside."""
+    edges = [
+        edge("odom base_link", "drive"),
+        edge("base_link camera", pose=DOWN_15),
+        edge("world table"),
+    ]
+    drive = PlanProcess(
+        "drive", "simulate", simulate=Simulation("fixed", 50.0, pose=Pose((2.0, 0.0, 0.0)))
+    )
+    plan = write(edges, PlanProcess("static", "static"), drive)
+    for module, name in (("static", "static"), ("simulate", "drive")):
+        started = start(f"tfcompose.launcher.publishers.{module}", plan, name)
+        started.until_says("edge")
+
+
+def echo(*arguments: str, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tfcompose", "echo", *arguments, "--timeout", str(timeout)]
+    return processes.run(command)
+
+
+def misses(*arguments: str, why: str) -> subprocess.CompletedProcess[str]:
+    """Let echo wait, longer and longer, until it misses the pose for this reason."""
+    for timeout in TIMEOUTS_S:
+        done = echo(*arguments, timeout=timeout)
+        if why in done.stderr:
+            break
+    assert why in done.stderr
+    assert done.returncode == 1
+    return done
+
+
+@pytest.mark.usefixtures("rover")
+def test_a_time_before_it_listened_is_searched_in_recordings() -> None:
+    done = misses("odom", "camera", "--at", "1000000000.5", why="into the past")
+    assert "--bag" in done.stderr
+
+
+@pytest.mark.usefixtures("rover")
+def test_names_are_tf2s_without_a_slash_before_them() -> None:
+    pose = json.loads(echo("/odom", "/camera", "--once", "--format", "json").stdout)
+    assert (pose["parent"], pose["child"]) == ("odom", "camera")
+
+
+@pytest.mark.usefixtures("rover")
+def test_once_prints_the_pose_in_metres_quaternion_radians_and_degrees() -> None:
+    done = echo("odom", "camera", "--once")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("pose of camera in odom at ")
+    assert "xyz        [2.2000, 0.0000, 0.1000] m" in done.stdout
+    assert "rpy        [0.0000, 0.2618, 0.0000] rad" in done.stdout
+    assert "[0.00, 15.00, 0.00] deg" in done.stdout
+
+
+@pytest.mark.usefixtures("rover")
+def test_json_is_one_object_a_line_until_a_signal_ends_it_with_exit_code_0() -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "tfcompose",
+        "echo",
+        "odom",
+        "camera",
+        "--rate",
+        "20",
+        "--timeout",
+        "60",
+    ]
+    command += ["--format", "json"]
+    with processes.start(command, stdout=subprocess.PIPE) as process:
+        assert process.stdout
+        rows = [json.loads(process.stdout.readline()) for _ in range(3)]
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 0
+    for row in rows:
+        assert (row["parent"], row["child"]) == ("odom", "camera")
+        assert row["xyz"] == pytest.approx([2.2, 0, 0.1])
+        assert row["quat_xyzw"] == pytest.approx(DOWN_15.quat_xyzw)
+        assert row["rpy"] == pytest.approx([0, math.radians(15), 0])
+    stamps = [row["stamp_ns"] for row in rows]
+    assert stamps == sorted(set(stamps)), "each line has a newer time"
+
+
+@pytest.mark.usefixtures("rover")
+@pytest.mark.parametrize(
+    ("a", "b", "why"),
+    [
+        ("odom", "camra", "camera?"),
+        ("odom", "table", "two trees"),
+    ],
+)
+def test_a_miss_says_why_and_ends_with_exit_code_1(a: str, b: str, why: str) -> None:
+    done = misses(a, b, why=why)
+    assert done.stdout == ""
+    assert "error[TF814]" in done.stderr
+
+
+def test_when_the_owner_falls_silent_it_says_so_and_ends(
+    write: Callable[..., Path], start: Callable[..., Started], edge: Callable[..., PlanEdge]
+) -> None:
+    drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0))
+    plan = write([edge("odom base_link", "drive")], drive)
+    command = [
+        sys.executable,
+        "-m",
+        "tfcompose",
+        "echo",
+        "odom",
+        "base_link",
+        "--rate",
+        "20",
+        "--timeout",
+    ]
+    for timeout in TIMEOUTS_S:
+        owner = start("tfcompose.launcher.publishers.simulate", plan, "drive")
+        owner.until_says("edge")
+        words = [*command, str(timeout)]
+        with processes.start(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            assert process.stdout
+            first = process.stdout.readline()
+            owner.end()
+            _, errors = process.communicate(timeout=90)
+        assert process.returncode == 1
+        if first:  # or it was not found in time
+            break
+    assert first.startswith("pose of base_link in odom")
+    silent = re.search(r" odom → base_link for (\d+\.\d) s", errors)
+    assert silent, errors
+    assert float(silent[1]) >= timeout
+
+
+@pytest.mark.usefixtures("domain")
+def test_where_nothing_is_published_it_says_so() -> None:
+    done = echo("odom", "base_link", "--once", timeout=0.5)
+    assert done.returncode == 1
+    assert "error[TF814]" in done.stderr
+
+
+class Talker:
+    """Sends TF from the test: latched what is fixed, again and again what moves."""
+
+    def __init__(self, node: Any, namespace: str = "") -> None:
+        self._publishers = [
+            TFPublisher(node, static=static, topic=f"{namespace}{topic}")
+            for static, topic in ((False, "/tf"), (True, "/tf_static"))
+        ]
+
+    def say(self, parent: str, child: str, x: float, stamp_ns: int = 0, w: float = 1.0) -> None:
+        data = encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), (0.0, 0.0, 0.0, w))])
+        self._publishers[stamp_ns == 0].publish(data)
+
+    def is_heard(self) -> bool:
+        return all(each.publisher.get_subscription_count() for each in self._publishers)
+
+    def until_heard(self, by: subprocess.Popen[str]) -> None:
+        assert until(lambda: self.is_heard() or by.poll() is not None)
+
+
+@pytest.fixture
+def running(domain: Any) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start ``tfcompose echo`` and do not wait."""
+    started: list[subprocess.Popen[str]] = []
+
+    def run(*arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "tfcompose", "echo", *arguments]
+        process = processes.start(
+            command, env=domain.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        started.append(process)
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(
+    ("at", "x", "when"),
+    [
+        ("101.25", "1.25", "at 101.250000000"),
+        ("-0.5", "2.50", "at 102.500000000"),
+        ("103", "3.00", "at 103.000000000"),
+    ],
+)
+def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as_requested(
+    running: Callable[..., subprocess.Popen[str]], at: str, x: str, when: str
+) -> None:
+    words = ["--at", at, "--precision", "2", "--timeout", "60"]
+    with open_node("talks", "") as node:
+        talker = Talker(node)
+        process = running("odom", "/base_link", *words, *(["--once"] if at[0] == "-" else []))
+        talker.until_heard(process)
+        for second in range(4):
+            talker.say("odom", "base_link", float(second), (100 + second) * 10**9)
+        output, errors = process.communicate(timeout=90)
+    assert (process.returncode, errors) == (0, "")
+    lines = output.splitlines()
+    if at[0] != "-":  # from the newest so far, whichever it was when the first came
+        assert when in lines[0]
+        assert lines[1:3] == [
+            f"  xyz        [{x}, 0.00, 0.00] m",
+            "  quat_xyzw  [0.00, 0.00, 0.00, 1.00]",
+        ]
+        assert lines[4] == "             [0, 0, 0] deg"
+
+
+@pytest.fixture
+def messages_of(running: Callable[..., subprocess.Popen[str]]) -> Callable[..., str]:
+    """Let echo hear (x, stamp in seconds, w of the quaternion) of base_link in odom; return why it ends."""
+
+    def run(samples: Sequence[tuple[float, int, float]], why: str, *arguments: str) -> str:
+        with open_node("talks", "") as node:
+            talker = Talker(node)
+            for timeout in TIMEOUTS_S:
+                assert until(lambda: not talker.is_heard()), "the one before has left"
+                process = running("odom", "base_link", *arguments, "--timeout", str(timeout))
+                talker.until_heard(process)
+                for x, second, w in samples:
+                    talker.say("odom", "base_link", x, second * 10**9, w)
+                _, errors = process.communicate(timeout=90)
+                assert process.returncode == 1
+                if why in errors:
+                    break
+        return errors
+
+    return run
+
+
+def test_a_time_that_is_over_is_a_miss_with_the_milliseconds(
+    messages_of: Callable[..., str],
+) -> None:
+    why = "oldest sample is 100 ms"
+    samples = [(float(second), 100 + second, 1.0) for second in range(4)]
+    assert why in messages_of(samples, why, "--at", "99.9")
+
+
+def test_under_a_namespace_only_its_topics_are_heard(
+    running: Callable[..., subprocess.Popen[str]],
+) -> None:
+    with open_node("talks", "") as node:
+        ours, others = Talker(node, "/robot1"), Talker(node)
+        others.say("odom", "base_link", 9.0)
+        ours.say("odom", "base_link", 1.0)
+        words = ["--namespace", "robot1", "--format", "json", "--timeout", "60"]
+        process = running("odom", "base_link", "--once", *words)
+        output, errors = process.communicate(timeout=90)
+    assert (process.returncode, errors) == (0, "")
+    row = json.loads(output)
+    assert (row["xyz"], row["stamp_ns"]) == ([1.0, 0.0, 0.0], None)
+
+
+def test_when_the_time_starts_again_it_says_so(messages_of: Callable[..., str]) -> None:
+    why = "base_link was too old"
+    assert why in messages_of([(1.0, 100, 1.0), (1.0, 1, 1.0)], why, "--rate", "100")
+
+
+def test_when_simulated_time_starts_again_it_goes_on(
+    running: Callable[..., subprocess.Popen[str]],
+) -> None:
+    """A bag that is played with its clock, again and again."""
+    with open_node("talks", "") as node:
+        talker, clock, stop = (
+            Talker(node),
+            node.create_publisher(Clock, "/clock", 1),
+            threading.Event(),
+        )
+        process = running(
+            "odom", "base_link", "--timeout", "60", "--rate", "100", "--format", "json"
+        )
+        assert process.stdout
+        second = 100
+
+        def play() -> None:
+            while not stop.wait(0.05):
+                clock.publish(Clock(clock=Time(sec=second)))
+                talker.say("odom", "base_link", float(second), second * 10**9)
+
+        thread = threading.Thread(target=play)
+        thread.start()
+        try:
+            assert json.loads(process.stdout.readline())["xyz"][0] == 100.0
+            second = 7
+            assert json.loads(process.stdout.readline())["xyz"][0] == 7.0
+        finally:
+            stop.set()
+            thread.join()
+
+
+@pytest.mark.usefixtures("domain")
+def test_what_was_sent_before_simulated_time_starts_again_does_not_outlive_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It comes with the new time, between two looks of echo's."""
+    poses: list[float] = []
+    second, now_ns, stop = [100], SimClock.now_ns, Stop()
+    query = PoseQuery(
+        "odom", "base_link", once=False, rate=100.0, timeout_s=60.0, topics=("/tf", "/tf_static")
+    )
+
+    def say(pose: Pose, _: int | None) -> None:
+        poses.append(pose.xyz[0])
+        if pose.xyz[0] < 100:
+            stop.request()
+
+    with open_node("talks", "") as node:
+        talker, publisher = Talker(node), node.create_publisher(Clock, "/clock", 1)
+
+        def late(clock: SimClock) -> int | None:
+            if poses and second == [100]:
+                talker.say("odom", "base_link", 101.0, 101 * 10**9)
+                second[:] = [7]
+
+            def comes() -> bool:
+                publisher.publish(Clock(clock=Time(sec=second[0])))
+                return now_ns(clock) == second[0] * 10**9
+
+            assert until(comes)
+            talker.say("odom", "base_link", float(second[0]), second[0] * 10**9)
+            return now_ns(clock)
+
+        monkeypatch.setattr(SimClock, "now_ns", late)
+        assert run_echo(query, say, stop) is None
+    assert (poses[0], poses[-1]) == (100.0, 7.0)
+    assert 101.0 not in poses
+
+
+def test_what_tf2_refuses_is_reported_where_the_frame_is_missing(
+    messages_of: Callable[..., str],
+) -> None:
+    why = "base_link was rejected"
+    assert why in messages_of([(0.0, 1, 1.1)], why)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--at", "soon"),
+        ("--at", "3000000000"),
+        ("--at", "1.0000000001"),
+        ("--precision", "-1"),
+        ("--rate", "0"),
+    ],
+)
+def test_an_option_that_cannot_be_read_is_wrong_use(words: tuple[str, str]) -> None:
+    done = echo("odom", "base_link", *words)
+    assert done.returncode == 2
+    assert words[1] in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,90 @@
+import gc
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tfcompose.tf.ros import typesupport
+from tfcompose.tf.ros.environment import RosError
+from tfcompose.tf.ros.node import TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE_HASH, Transform, encode
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def own() -> Any:
+    """The own type; its type support is there only as long as it is."""
+    return typesupport.own_type()
+
+
+def _address(own: Any) -> int:
+    return typesupport.capsule_address(own.__class__._TYPE_SUPPORT)
+
+
+def test_the_hash_is_that_of_the_description(own: Any) -> None:
+    address = _address(own)
+    assert typesupport.hash_text(address) == TF_MESSAGE_HASH
+    assert typesupport.type_hash(typesupport.description_json(address)) == TF_MESSAGE_HASH
+
+
+def test_the_description_is_that_of_tf_message(own: Any) -> None:
+    gc.collect()
+    found = typesupport.description_json(_address(own))
+    kind = {
+        "type_id": 145,
+        "capacity": 0,
+        "string_capacity": 0,
+        "nested_type_name": "geometry_msgs/msg/TransformStamped",
+    }
+    assert found["type_description"] == {
+        "type_name": "tf2_msgs/msg/TFMessage",
+        "fields": [{"name": "transforms", "type": kind}],
+    }
+    assert [each["type_name"] for each in found["referenced_type_descriptions"]] == [
+        "builtin_interfaces/msg/Time",
+        "geometry_msgs/msg/Quaternion",
+        "geometry_msgs/msg/Transform",
+        "geometry_msgs/msg/TransformStamped",
+        "geometry_msgs/msg/Vector3",
+        "std_msgs/msg/Header",
+    ]
+
+
+def test_another_rmw_is_refused_with_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        typesupport, "get_rmw_implementation_identifier", lambda: "rmw_cyclonedds_cpp"
+    )
+    with pytest.raises(RosError, match=r"rmw_cyclonedds_cpp\b.*\btf2_msgs\b"):
+        typesupport.own_type()
+
+
+@pytest.mark.parametrize("what", ["_FASTRTPS", "_INTROSPECTION", "_STAMPED"])
+def test_another_layout_is_refused_with_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    monkeypatch.setattr(
+        typesupport, what, type(getattr(typesupport, what))(getattr(typesupport, what)[:-1])
+    )
+    with pytest.raises(RosError, match="Jazzy"):
+        typesupport.own_type()
+
+
+SEES = """
+import rclpy, sys, time
+rclpy.init(); node = rclpy.create_node("sees"); end = time.monotonic() + 50
+while time.monotonic() < end and "/tf" not in dict(node.get_topic_names_and_types()):
+    time.sleep(0.02)
+info = node.get_publishers_info_by_topic("/tf")[0]
+print(dict(node.get_topic_names_and_types())["/tf"], info.topic_type, info.topic_type_hash)
+"""
+
+
+@pytest.mark.usefixtures("domain")
+def test_another_process_sees_the_type_and_its_hash(python: Callable[[str], str]) -> None:
+    with open_node("talks", "/rover") as node:
+        publisher = TFPublisher(node, static=False)
+        publisher.publish(encode([Transform(0, "a", "b", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+        observed = python(SEES)
+    assert "['tf2_msgs/msg/TFMessage'] tf2_msgs/msg/TFMessage" in observed
+    assert TF_MESSAGE_HASH in observed

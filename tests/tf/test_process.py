@@ -1,0 +1,71 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.signals import Stop
+from tfcompose.model.plan import PlanProcess, Simulation
+from tfcompose.tf.process import Own, read_own, start
+
+
+def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    return error
+
+
+def never(own: Own, _: Stop) -> None:
+    raise AssertionError(f"{own.process.name} begins")
+
+
+def test_wrong_arguments_end_with_code_2_and_the_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert start(["plan.json"], "static", never) == 2
+    assert "usage: python -m tfcompose.launcher.publishers.static " in _last_error(capsys)
+
+
+def test_a_missing_plan_ends_with_code_2_and_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert start(["no/such/plan.json", "joints"], "joints", never) == 2
+    assert "no/such/plan.json" in _last_error(capsys)
+
+
+def test_what_is_no_plan_ends_with_code_2(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "plan.json"
+    file.write_text("{}")
+    assert start([str(file), "static"], "static", never) == 2
+    assert "not a plan" in _last_error(capsys)
+
+
+def test_a_process_that_the_plan_does_not_have_is_refused(write: Callable[..., Path]) -> None:
+    file = str(write([], PlanProcess("static", "static")))
+    with pytest.raises(RejectedError, match="other"):
+        read_own([file, "other"], "static")
+    with pytest.raises(RejectedError, match=r"static\b.*\bjoints"):
+        read_own([file, "static"], "joints")
+
+
+def test_a_simulation_without_a_rate_is_refused(write: Callable[..., Path]) -> None:
+    file = str(write([], PlanProcess("body", "simulate", simulate=Simulation("fixed", 0.0))))
+    with pytest.raises(RejectedError, match=r"processes\[0\]\.simulate\.rate"):
+        read_own([file, "body"], "simulate")
+
+
+def test_a_node_has_the_name_and_the_namespace_of_the_plan(write: Callable[..., Path]) -> None:
+    file = str(write([], PlanProcess("static", "static", nodes=("/fleet/r1/frames",))))
+    own = read_own([file, "static", "--ros-args", "-r", "/tf:=tf"], "static")
+    assert (own.namespace, own.node_name, own.ros_args) == (
+        "/fleet/r1",
+        "frames",
+        ["-r", "/tf:=tf"],
+    )
+    assert own.description.parent == own.file.parent
+
+
+def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
+    write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tfcompose.tf.process.missing_ros", lambda: "no rclpy: install it")
+    assert start([str(write([], PlanProcess("static", "static"))), "static"], "static", never) == 1
+    assert _last_error(capsys) == "no rclpy: install it\n"

@@ -1,0 +1,291 @@
+"""The plan for Kubernetes: valid objects, at most one publisher of each edge, and what a new plan restarts."""
+
+import json
+import os
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import kubernetes_validate
+import pytest
+import yaml
+
+from tests.support import processes
+from tests.support.plans import built, compiled_plan
+from tests.support.robots import DRIVEN
+from tfcompose.model.plan.file import read_plan
+from tfcompose.tools.exporters.kubernetes import Cluster, cluster_name, files_of, kubernetes
+
+ROBOTS = Path(__file__).parents[3] / "robots"
+VERSIONS = ("1.31", "1.37")
+TFCOMPOSE = (sys.executable, "-m", "tfcompose")
+
+HOSTED = """
+tfcompose: 1
+robot: big_rover
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+  mast: {parent: base_link, xyz: [0, 0, 1]}
+processes:
+  static: {host: brain}
+  spawner: {run: [spawn, "$(HOME)"], host: brain}
+  drive: {run: [drive], node: drive, ready: {time: 3 s}, host: rear.local, after: {spawner: done, static: ready}}
+  late: {run: [late], host: rear.local, after: {drive: ready, spawner: started}}
+"""
+
+
+def manifests(
+    text: str, cluster: Cluster | None = None, **changes: str
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the objects of a robot by their files, and what is not kept; ``changes`` replace files' texts."""
+    files = built(text) | changes
+    plan = read_plan(files["plan.json"], "plan.json")
+    paths = {path for process in plan.started for path in files_of(plan, process)}
+    made, gaps = kubernetes(
+        plan, cluster or Cluster("robot:1"), {path: files[path] for path in sorted(paths)}
+    )
+    return {file.path: yaml.safe_load(file.text) for file in made}, gaps
+
+
+def workloads(made: dict[str, Any]) -> dict[str, Any]:
+    return {
+        one["metadata"]["name"]: one
+        for one in made.values()
+        if one["kind"] in ("StatefulSet", "Job")
+    }
+
+
+def pod_of(made: dict[str, Any], name: str) -> dict[str, Any]:
+    (found,) = [one for path, one in workloads(made).items() if path.startswith(name)]
+    pod: dict[str, Any] = found["spec"]["template"]
+    return pod
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_kubernetes_takes_the_objects_of_every_robot(version: str) -> None:
+    texts = [
+        DRIVEN,
+        HOSTED,
+        *(
+            (path.read_text("utf-8"))
+            for path in sorted(ROBOTS.glob("*.yaml"))
+            if path.stem not in {"picker", "two_rovers"}
+        ),
+    ]
+    for text in texts:
+        for cluster in (Cluster("robot:1"), Cluster("robot:1", "/opt/robot")):
+            made, _ = manifests(text, cluster)
+            resources = made.pop("kustomization.yaml")["resources"]
+            assert set(resources) == set(made)
+            for one in made.values():
+                kubernetes_validate.validate(one, version, strict=True)
+            assert len(workloads(made)) == len(made) - (1 if cluster.folder else 2)
+
+
+def test_no_edge_has_two_publishers_during_an_update() -> None:
+    """A StatefulSet of one pod promises at most one; nothing else does."""
+    made, _ = manifests(DRIVEN)
+    for one in workloads(made).values():
+        assert (one["kind"], one["spec"]["replicas"]) == ("StatefulSet", 1)
+        assert (
+            one["spec"]["selector"]["matchLabels"] == one["spec"]["template"]["metadata"]["labels"]
+        )
+
+
+def test_what_is_waited_for_until_it_is_done_is_a_job_and_each_runs_on_its_host() -> None:
+    made, gaps = manifests(HOSTED)
+    kinds = {name: one["kind"] for name, one in workloads(made).items()}
+    (spawner,) = [name for name in kinds if name.startswith("big-rover-spawner-")]
+    assert kinds[spawner] == "Job"
+    assert workloads(made)[spawner]["spec"]["template"]["spec"]["restartPolicy"] == "OnFailure"
+    fewer, _ = manifests(
+        HOSTED.replace("spawner: {", "spawner: {restart: on-failure, max_restarts: 2, ")
+    )
+    (job,) = [one for one in workloads(fewer).values() if one["kind"] == "Job"]
+    assert job["spec"]["backoffLimit"] == 2
+    assert {kinds[f"big-rover-{name}"] for name in ("static", "drive", "late", "guard")} == {
+        "StatefulSet"
+    }
+    hosts = {
+        name: pod_of(made, f"big-rover-{name}")["spec"].get("nodeSelector")
+        for name in ("static", "drive", "guard")
+    }
+    on = "kubernetes.io/hostname"
+    assert hosts == {"static": {on: "brain"}, "drive": {on: "rear.local"}, "guard": None}
+    declared = "hosts: {brain: {node_selector: {computer: big}}, rear.local: {}}\nprocesses:\n"
+    labelled, _ = manifests(HOSTED.replace("processes:\n", declared))
+    hosts = {
+        name: pod_of(labelled, f"big-rover-{name}")["spec"].get("nodeSelector")
+        for name in ("static", "drive")
+    }
+    assert hosts == {"static": {"computer": "big"}, "drive": {on: "rear.local"}}
+    unseen = {
+        tuple(name for name in ("late", "drive") if name in line)
+        for line in gaps
+        if "wait for spawner" in line
+    }
+    assert unseen == {
+        ("late",),
+        ("drive",),
+    }, "a pod cannot see that another was started, or is done"
+
+
+def test_a_pod_waits_for_an_edge_or_a_time_and_its_probes_watch_an_edge_of_the_process() -> None:
+    made, _ = manifests(DRIVEN)
+    (wait,) = pod_of(made, "rover-slam")["spec"]["initContainers"]
+    words = wait["command"]
+    assert words[words.index("echo") + 1 :] == [
+        "map",
+        "dock",
+        "--once",
+        "--timeout",
+        "5",
+    ], "no namespace: /tf is shared"
+    plan = compiled_plan(DRIVEN)
+    for process in plan.started:
+        (container,) = pod_of(made, f"rover-{process.name}")["spec"]["containers"]
+        owned = [[edge.parent, edge.child] for edge in plan.edges_of(process.name)]
+        for probe in ("startupProbe", "livenessProbe"):
+            assert (probe in container) == bool(owned)
+            if owned:
+                words = container[probe]["exec"]["command"]
+                assert words[words.index("echo") + 1 :][:2] == owned[0]
+    late, _ = manifests(HOSTED)
+    (wait,) = pod_of(late, "big-rover-late")["spec"]["initContainers"]
+    assert wait["command"] == ["sleep", "3"]
+
+
+def test_a_wait_goes_on_until_its_command_succeeds(tmp_path: Path) -> None:
+    """With a program that fails twice in the place of ``python3``."""
+    made, _ = manifests(DRIVEN)
+    words = pod_of(made, "rover-slam")["spec"]["initContainers"][0]["command"]
+    program = tmp_path / "python3"
+    program.write_text(
+        f'#!/bin/sh\necho "$4 $5" >> {tmp_path}/tries\n[ $(wc -l < {tmp_path}/tries) -gt 2 ]\n'
+    )
+    program.chmod(0o755)
+    env = {"PATH": f"{tmp_path}:{os.environ['PATH']}", "ROS_DISTRO": "none"}
+    assert processes.run(words, env=env).returncode == 0
+    assert (tmp_path / "tries").read_text("utf-8").splitlines() == ["map dock"] * 3
+
+
+def test_a_process_is_ended_as_the_plan_says() -> None:
+    made, _ = manifests(DRIVEN)
+    drive, slam = (pod_of(made, f"rover-{name}")["spec"] for name in ("drive", "slam"))
+    assert (drive["terminationGracePeriodSeconds"], slam["terminationGracePeriodSeconds"]) == (
+        2,
+        10,
+    )
+    assert "lifecycle" not in drive["containers"][0], "SIGTERM is what the kubelet sends"
+    assert "kill -s INT 1" in slam["containers"][0]["lifecycle"]["preStop"]["exec"]["command"][2]
+
+
+def test_the_config_map_gives_each_pod_the_files_that_it_reads_where_it_reads_them() -> None:
+    made, _ = manifests(DRIVEN)
+    data = made["plan.yaml"]["data"]
+    files = built(DRIVEN)
+    for name, paths in {
+        "drive": ["plan.json", "params/drive.yaml"],
+        "slam": ["plan.json"],
+    }.items():
+        (volume,) = pod_of(made, f"rover-{name}")["spec"]["volumes"]
+        items = volume["configMap"]["items"]
+        assert [item["path"] for item in items] == paths
+        for item in items:
+            assert data[item["key"]] == files[item["path"]]
+            assert re.fullmatch(r"[A-Za-z0-9_.-]+", item["key"])
+    on_nodes, _ = manifests(DRIVEN, Cluster("robot:1", "/opt/robot"))
+    assert "plan.yaml" not in on_nodes
+    assert (
+        pod_of(on_nodes, "rover-drive")["spec"]["volumes"][0]["hostPath"]["path"] == "/opt/robot"
+    )
+
+
+def test_files_whose_paths_make_one_key_keep_their_texts() -> None:
+    """``arm/drive`` is a process of a part, ``arm_drive`` one beside it."""
+    plan = compiled_plan(DRIVEN)
+    files = {"drive": "params/arm/drive.yaml", "slam": "params/arm_drive.yaml"}
+    changed = [replace(one, params_file=files.get(one.name)) for one in plan.processes]
+    texts = {path: path for one in changed for path in files_of(plan, one)}
+    made = {
+        file.path: yaml.safe_load(file.text)
+        for file in kubernetes(replace(plan, processes=tuple(changed)), Cluster("i"), texts)[0]
+    }
+    for name, file in files.items():
+        items = pod_of(made, f"rover-{name}")["spec"]["volumes"][0]["configMap"]["items"]
+        (key,) = [item["key"] for item in items if item["path"] == file]
+        assert made["plan.yaml"]["data"][key] == file
+
+
+def test_a_new_plan_restarts_what_it_changes_and_tfcomposes_own() -> None:
+    def digests(text: str) -> dict[str, str]:
+        made, _ = manifests(text)
+        return {
+            name: one["spec"]["template"]["metadata"]["annotations"]["tfcompose/content"]
+            for name, one in workloads(made).items()
+        }
+
+    before, after = digests(DRIVEN), digests(DRIVEN.replace("wheel: 0.1", "wheel: 0.2"))
+    changed = {name for name in before if before[name] != after[name]}
+    assert changed == {"rover-drive"}
+    moved = digests(DRIVEN.replace("xyz: [1, -2, 0.5]", "xyz: [1, -2, 0.6]"))
+    assert {name for name in before if before[name] != moved[name]} == {
+        "rover-static",
+        "rover-guard",
+    }
+
+
+def test_a_word_that_kubernetes_would_fill_in_stays_as_it_is() -> None:
+    """The arguments name the process alone; the plan has its words. Names of processes are the user's."""
+    plan = compiled_plan(HOSTED)
+    named = replace(
+        plan,
+        processes=tuple(
+            replace(one, name="a$(b)") if one.name == "late" else one for one in plan.processes
+        ),
+    )
+    texts = {path: "" for one in named.started for path in files_of(named, one)}
+    made = {
+        file.path: yaml.safe_load(file.text) for file in kubernetes(named, Cluster("i"), texts)[0]
+    }
+    assert pod_of(made, "big-rover-a")["spec"]["containers"][0]["args"][-1] == "a$$(b)"
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [("Big Rover", "big-rover"), ("__", "robot"), ("r/2.x", "r-2-x"), ("a" * 90, "a" * 48)],
+)
+def test_names_are_labels(name: str, label: str) -> None:
+    assert cluster_name(name) == label
+
+
+def test_names_that_make_one_label_get_different_ones() -> None:
+    text = HOSTED.replace("  late:", "  Late: {run: [x], host: brain}\n  late:")
+    names = list(workloads(manifests(text)[0]))
+    assert len({name for name in names if "late" in name}) == 2
+    assert len(set(names)) == len(names)
+
+
+def test_a_plan_that_a_config_map_cannot_hold_is_refused_with_a_way_out(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(DRIVEN)
+    done = processes.run([*TFCOMPOSE, "build", "robot.yaml", "-o", "built"], cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    plan = tmp_path / "built" / "plan.json"
+    params = tmp_path / "built" / "params" / "drive.yaml"
+    params.write_text(params.read_text("utf-8") + f"# {'x' * 1_000_001}\n")
+    words = ["export", "k8s", str(plan), "--image", "robot:1"]
+    done = processes.run([*TFCOMPOSE, *words], cwd=tmp_path)
+    assert (done.returncode, "--at" in done.stderr) == (2, True)
+    assert not (tmp_path / "built" / "k8s").exists()
+    assert processes.run([*TFCOMPOSE, *words, "--at", "/opt/robot"], cwd=tmp_path).returncode == 0
+    assert json.loads(plan.read_text("utf-8"))["robot"] == "rover"
+
+
+def test_without_an_image_nothing_is_built(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(DRIVEN)
+    done = processes.run([*TFCOMPOSE, "export", "k8s", "robot.yaml"], cwd=tmp_path)
+    assert (done.returncode, "--image" in done.stderr) == (2, True)
+    assert not (tmp_path / "build").exists()

@@ -1,0 +1,1336 @@
+"""Launch files in Python, XML and YAML, imported."""
+
+import io
+import os
+import platform
+import random
+import re
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.support.bringups import compiled, import_of, places, printed_errors, started_with
+from tests.support.importing import PRESETS
+from tfcompose.cli import compiling, main, reading
+from tfcompose.spec.load import load
+from tfcompose.tools.importers import launch
+from tfcompose.tools.importers import launch_actions as actions
+from tfcompose.tools.importers.launch_substitutions import Context
+
+PYTHON = """
+import os
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import *
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction, OpaqueFunction, RegisterEventHandler
+from launch.actions import SetEnvironmentVariable, Shutdown, TimerAction
+from launch.conditions import IfCondition, UnlessCondition
+from launch.event_handlers import OnProcessExit
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
+from launch_ros.actions import ComposableNodeContainer, LifecycleNode, Node, PushRosNamespace, SetParameter, SetRemap
+from launch_ros.descriptions import ComposableNode, ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def cameras(context):
+    count = int(LaunchConfiguration("cameras").perform(context))
+    made = {"package": "camera", "executable": "camera"}
+    return [Node(**made, name=f"camera_{i}", parameters=[{"id": i}]) for i in range(count)]
+
+
+def generate_launch_description():
+    own = get_package_share_directory("rover")
+    calibrate = ExecuteProcess(cmd=["python3", os.path.join(own, "calibrate.py")], cwd=own, name="calibrate")
+    return LaunchDescription([
+        DeclareLaunchArgument("cameras", default_value="2", description="how many"),
+        DeclareLaunchArgument("rviz", default_value="false"),
+        SetEnvironmentVariable("LEVEL", "3"),
+        Node(package="tf2_ros", executable="static_transform_publisher", name="mount",
+             arguments=["0.1", "0", "0.3", "0.5", "0", "-0.2", "base_link", "laser"]),
+        OpaqueFunction(function=cameras),
+        Node(package="rviz2", executable="rviz2", condition=IfCondition(LaunchConfiguration("rviz"))),
+        Node(package="teleop", executable="keys", condition=UnlessCondition(LaunchConfiguration("rviz"))),
+        GroupAction([
+            PushRosNamespace("front"),
+            SetParameter("speed", 20),
+            SetRemap("scan", "scan_raw"),
+            Node(package="drive", executable="drive", name="drive", namespace="left", respawn=True,
+                 parameters=[os.path.join(own, "drive.yaml"), {
+                     "wheels": {"count": 4}, "text": "4", "from_argument": LaunchConfiguration("cameras"),
+                     "kept": ParameterValue(LaunchConfiguration("cameras"), value_type=str), "mixed": [1, 2.5],
+                 }],
+                 remappings=[("odom", "odometry")], ros_arguments=["--log-level", "debug"]),
+        ]),
+        LifecycleNode(package="map", executable="server", name="map_server", namespace="", autostart=True),
+        calibrate,
+        RegisterEventHandler(OnProcessExit(target_action=calibrate, on_exit=[
+            Node(package="slam", executable="slam", name="mapper")])),
+        TimerAction(period=5.0, actions=[Node(package="late", executable="late", name="late")]),
+        Node(package="safety", executable="stop", name="stop", on_exit=Shutdown(),
+             arguments=["--rate", PythonExpression(["2 * ", LaunchConfiguration("cameras")])]),
+        ComposableNodeContainer(
+            name="perception", namespace="", package="rclcpp_components", executable="component_container",
+            composable_node_descriptions=[
+                ComposableNode(package="image_proc", plugin="image_proc::RectifyNode", name="rectify")]),
+    ])
+"""
+
+
+@pytest.fixture(autouse=True)
+def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiling, "library", lambda: PRESETS)
+    monkeypatch.setattr(
+        launch, "has_launch", lambda: False
+    )  # test_real_launch claims the same of ROS's own
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """The folder launch of a package in a source tree."""
+    folder = tmp_path / "rover"
+    (folder / "launch").mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>rover</name></package>", encoding="utf-8")
+    (folder / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
+    return folder / "launch"
+
+
+def source(folder: Path, name: str, text: str) -> Path:
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_each_action_of_a_python_launch_file_has_its_entry(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(package)
+    _, data = import_of(source(package, "rover.launch.py", PYTHON), code=None)
+    assert data["frames"]["laser"] == {
+        "parent": "base_link",
+        "xyz": [0.1, 0, 0.3],
+        "rpy": [-0.2, 0, 0.5],
+    }
+    processes = data["processes"]
+    order = [
+        "camera_0",
+        "camera_1",
+        "keys",
+        "drive",
+        "map_server",
+        "calibrate",
+        "mapper",
+        "late",
+        "stop",
+        "rectify",
+    ]
+    assert list(processes) == order
+    assert data["containers"] == {"perception": {"env": {"LEVEL": "3"}}}
+    assert processes.pop("rectify") == {
+        "component": "image_proc/image_proc::RectifyNode",
+        "container": "perception",
+    }
+    assert all(process["env"] == {"LEVEL": "3"} for process in processes.values())
+    assert [processes[f"camera_{i}"]["params"] for i in range(2)] == [{"id": 0}, {"id": 1}]
+    drive = processes["drive"]
+    assert drive["params"] == {
+        "file": "../drive.yaml", "wheels.count": 4, "text": "4", "from_argument": "${args.cameras}",
+        "kept": "2",
+        "mixed": [1, 2.5],
+    }  # fmt: skip
+    assert drive["remap"] == {"scan": "scan_raw", "odom": "odometry"}
+    assert (drive["namespace"], drive["restart"], drive["log_level"]) == (
+        "front/left",
+        "always",
+        "debug",
+    )
+    assert processes["map_server"]["lifecycle"] == "active"
+    assert processes["mapper"]["after"] == {"calibrate": "done"}
+    (gate,) = processes["late"]["after"]
+    assert processes[gate]["ready"] == {"time": "5 s"}
+    assert (processes["stop"]["required"], processes["stop"]["run"]["args"]) == (
+        True,
+        ["--rate", "4"],
+    )
+    assert processes["calibrate"]["run"] == ["python3", str(package.parent / "calibrate.py")]
+
+
+def test_what_is_not_taken_is_named_with_its_line(
+    package: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, _ = import_of(source(package, "rover.launch.py", PYTHON), code=None)
+    lines = PYTHON.splitlines()
+    wanted = ['"cameras", default', 'executable="rviz2"']
+    found = places(printed_errors(capsys), "TF020")
+    for words in wanted:
+        line = next(number for number, one in enumerate(lines, start=1) if words in one)
+        assert f"rover.launch.py:{line}" in found
+        assert f"rover.launch.py:{line}: " in text
+    assert "cameras:=2" in text
+    assert "rviz:=false" in text
+
+
+def test_what_an_included_file_lacks_is_named_and_all_else_of_it_is_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "inner.launch.py").write_text(INNER, encoding="utf-8")
+    _, data = import_of(source(tmp_path, "a.launch.py", OUTER))
+    assert {name: one.get("params") for name, one in data["processes"].items()} == {
+        "first": {"other": 1}, "second": {"speed": "${args.unit}"}
+    }  # fmt: skip
+    found = places(printed_errors(capsys), "TF020")
+    assert found == [
+        "a.launch.py:8",
+        "inner.launch.py:7",
+        "inner.launch.py:8",
+        "inner.launch.py:10",
+    ]
+
+
+OUTER = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription as Include
+from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
+from launch_ros.actions import Node
+def generate_launch_description():
+    return LaunchDescription([
+        Include([ThisLaunchFileDir(), "/inner.launch.py"], launch_arguments=[("speed", LaunchConfiguration("gone"))]),
+        DeclareLaunchArgument("unit", default_value="1"),
+        Node(package="p", executable="e", name="second", parameters=[{"speed": LaunchConfiguration("unit")}]),
+    ])
+"""
+INNER = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+def generate_launch_description():
+    return LaunchDescription([DeclareLaunchArgument("speed"),
+        Node(package="p", executable="e", name="first",
+             parameters=[{"speed": LaunchConfiguration("speed"), "other": 1}]),
+        Node(package="p", executable="e", name="third", namespace=LaunchConfiguration("speed"))])
+"""
+
+
+def test_what_python_makes_at_random_is_the_same_at_each_import(tmp_path: Path) -> None:
+    file = source(tmp_path, "a.launch.py", RANDOM)
+    text, data = import_of(file)
+    assert len(data["processes"]["n"]["remap"]) == 8
+    assert text == import_of(file)[0]
+
+
+RANDOM = """
+import tempfile
+from launch import LaunchDescription
+from launch_ros.actions import Node
+from nav2_common.launch import ParseMultiRobotPose
+def generate_launch_description():
+    assert not ParseMultiRobotPose("robots").value()
+    return LaunchDescription([Node(package="p", executable="e", name="n", arguments=[tempfile.mktemp(suffix=".sdf")],
+                                   remappings={(word, f"other_{word}") for word in "abcdefgh"})])
+"""
+
+
+def test_a_number_with_a_point_stays_a_double_as_a_parameter_and_keeps_its_text_in_a_command(
+    tmp_path: Path,
+) -> None:
+    file = source(tmp_path, "a.launch.py", DOUBLE)
+    text, data = import_of(file)
+    assert data["processes"]["n"]["run"]["args"] == ["--rate=10.0"]
+    assert data["processes"]["n"]["params"] == {"rate": "${args.rate}", "topic": "10.0_hz"}
+    for rate in ("10", "7"):
+        robot = compiled(text, tmp_path, rate=rate).robot
+        assert robot
+        assert started_with(robot)["n"]["params"]["rate"] == f"{rate}.0"
+
+
+DOUBLE = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+def generate_launch_description():
+    rate = LaunchConfiguration("rate")
+    return LaunchDescription([DeclareLaunchArgument("rate", default_value="10.0"),
+        Node(package="p", executable="e", name="n", arguments=[["--rate=", rate]],
+             parameters=[{"rate": rate, "topic": [rate, "_hz"]}])])
+"""
+
+
+def test_a_root_key_that_a_parameter_file_would_be_put_below_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, _ = import_of(source(tmp_path, "a.launch.py", ROOT_KEY), code=None)
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:6"]
+    assert "below front" in text
+
+
+ROOT_KEY = """
+from launch import LaunchDescription
+from launch_ros.actions import Node
+from nav2_common.launch import RewrittenYaml
+def generate_launch_description():
+    params = RewrittenYaml(source_file="a.yaml", root_key="front", param_rewrites={}, convert_types=True)
+    return LaunchDescription([Node(package="p", executable="e", name="n", parameters=[params])])
+"""
+
+
+def test_an_argument_that_is_the_clock_of_all_nodes_is_the_robots(tmp_path: Path) -> None:
+    file = source(tmp_path, "a.launch.py", CLOCK)
+    text, _ = import_of(file)
+    for value, clock in (("true", "sim"), ("false", "wall")):
+        robot = compiled(text, tmp_path, use_sim_time=value).robot
+        assert robot
+        assert robot.ros.clock == clock
+
+
+CLOCK = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+def generate_launch_description():
+    clock = {"use_sim_time": LaunchConfiguration("use_sim_time")}
+    return LaunchDescription([DeclareLaunchArgument("use_sim_time", default_value="true")] + [
+        Node(package="p", executable="e", name=name, parameters=[clock]) for name in ("a", "b")])
+"""
+
+
+def test_a_description_of_an_installed_package_is_addressed_by_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    share = tmp_path / "install/share"
+    for folder in ("ament_index/resource_index/packages", "rover_description/urdf"):
+        (share / folder).mkdir(parents=True)
+    (share / "ament_index/resource_index/packages/rover_description").touch()
+    (share / "rover_description/urdf/rover.xacro").write_text(
+        '<robot name="rover"><link name="base_link"/></robot>', encoding="utf-8"
+    )
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(share.parent))
+    _, data = import_of(source(tmp_path, "a.launch.xml", INSTALLED))
+    assert data["parts"]["rover"]["xacro"] == "package://rover_description/urdf/rover.xacro"
+
+
+INSTALLED = """<launch>
+  <node pkg="robot_state_publisher" exec="robot_state_publisher">
+    <param name="robot_description" value="$(command '$(find-pkg-prefix xacro)/bin/xacro
+      $(find-pkg-share rover_description)/urdf/rover.xacro')"/>
+  </node>
+</launch>
+"""
+
+
+def test_arguments_that_nothing_reads_are_one_finding(
+    package: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    unread = "".join(f'<arg name="unread_{number}" default="1"/>' for number in range(3))
+    text = (
+        f'<launch>{unread}<arg name="cameras" default="2"/><node pkg="a" exec="b" args="$(var'
+        ' cameras)"/></launch>'
+    )
+    _, data = import_of(source(package, "unread.launch.xml", text), code=None)
+    printed = printed_errors(capsys)
+    assert places(printed, "TF020") == ["unread.launch.xml:1"]
+    assert all(f"unread_{number}" in printed for number in range(3))
+    assert list(data["args"]) == ["cameras"]
+
+
+def test_arguments_are_given_and_conditions_passed_over(package: Path) -> None:
+    file = source(package, "rover.launch.py", PYTHON)
+    _, data = import_of(file, "cameras:=1", "rviz:=true", code=None)
+    assert "camera_1" not in data["processes"]
+    assert "rviz2" in data["processes"]
+    assert "keys" not in data["processes"]
+    out = file.with_name("imported.yaml")
+    assert main(["import", str(file), "-o", str(out), "cameras:=3", "--force"]) == 0
+    assert "camera_2" in load(out.read_text("utf-8"), str(out)).data["processes"]
+    text, data = import_of(file, "--all-branches", code=None)
+    assert data["args"] == {
+        "cameras": {"default": 2, "description": "how many"}, "rviz": {"default": False},
+    }  # fmt: skip
+    assert data["processes"]["rviz2"]["when"] == "${args.rviz}"
+    assert data["processes"]["keys"]["when"] == "${not (args.rviz)}"
+    robot = compiled(text, package).robot
+    assert robot
+    assert {"rviz2", "keys"} & {process.name for process in robot.processes} == {"keys"}
+
+
+WITH_ARGUMENTS = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.conditions import IfCondition, LaunchConfigurationEquals, UnlessCondition
+from launch.substitutions import EqualsSubstitution, LaunchConfiguration as Given
+from launch_ros.actions import Node
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("mode", default_value="slam", choices=["slam", "fixed"]),
+        DeclareLaunchArgument("rate", default_value="20"),
+        DeclareLaunchArgument("loud", default_value="True"),
+        DeclareLaunchArgument("height", default_value="0.5"),
+        Node(package="a", executable="slam", name="slam", condition=LaunchConfigurationEquals("mode", "slam")),
+        Node(package="a", executable="fixed", name="fixed",
+             condition=IfCondition(EqualsSubstitution(Given("mode"), "fixed"))),
+        Node(package="a", executable="b", name="b", arguments=["--mode", Given("mode"), ["--rate=", Given("rate")],
+             Given("loud")], parameters=[{"rate": Given("rate"), "loud": Given("loud"),
+             "topic": [Given("mode"), "/scan"], "number": [Given("rate"), "0"]}],
+             remappings=[("scan", [Given("mode"), "/scan"])],
+             condition=UnlessCondition(Given("loud"))),
+        Node(package="tf2_ros", executable="static_transform_publisher",
+             arguments=["--z", Given("height"), "--frame-id", "base_link", "--child-frame-id", "mast"]),
+    ])
+"""
+
+
+def test_launch_arguments_become_arguments_of_the_robot_where_launch_would_read_them_alike(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = source(tmp_path, "a.launch.py", WITH_ARGUMENTS)
+    text, data = import_of(file, "--all-branches", code=None)
+    assert data["args"] == {
+        "mode": {"type": "string", "default": "slam", "choices": ["slam", "fixed"]},
+        "rate": {"default": 20},
+        "loud": {"default": True},
+    }  # fmt: skip
+    processes = data["processes"]
+    assert processes["slam"]["when"] == "${args.mode == 'slam'}"
+    assert processes["fixed"]["when"] == "${args.mode == 'fixed'}"
+    assert processes["b"]["run"]["args"] == [
+        "--mode",
+        "${args.mode}",
+        "--rate=${args.rate}",
+        "True",
+    ]
+    assert processes["b"]["params"] == {
+        "rate": "${args.rate}", "loud": True, "topic": "${args.mode}/scan", "number": 200,
+    }  # fmt: skip
+    assert processes["b"]["remap"] == {"scan": "${args.mode}/scan"}
+    assert data["frames"]["mast"]["xyz"] == [0, 0, 0.5]
+    assert sorted(places(printed_errors(capsys), "TF020")) == ["a.launch.py:11"]
+    assert "rate:=20 loud:=True height:=0.5" in text
+    assert compiled(text, tmp_path).robot
+
+
+XML = """<launch>
+  <arg name="name" default="front"/>
+  <let name="twice" value="$(var name)_$(var name)"/>
+  <node pkg="tf2_ros" exec="static_transform_publisher" args="--x 1 --yaw 0.5 --frame-id base_link
+    --child-frame-id $(var name)_laser"/>
+  <group>
+    <push_ros_namespace namespace="$(var name)"/>
+    <set_env name="LEVEL" value="3"/>
+    <node pkg="drive" exec="drive" name="drive" if="$(eval '1 &lt; 2')" launch-prefix="gdb -ex run"
+      respawn="true" respawn_delay="3.0">
+      <param name="rate" value="20"/><param name="text" value="20" type="str"/>
+      <param name="sub"><param name="a" value="1.5"/></param>
+      <param from="$(find-pkg-share rover)/drive.yaml"/>
+      <remap from="odom" to="$(var twice)"/>
+      <env name="MODE" value="x"/>
+    </node>
+  </group>
+  <executable cmd="echo $(env NO_SUCH_NAME 'a b') 'c d'" name="words"/>
+  <timer period="2.0"><node pkg="late" exec="late" name="late"/></timer>
+  <include file="$(dirname)/more.launch.xml"><arg name="name" value="rear"/></include>
+  <bogus/>
+</launch>
+"""
+YAML = """launch:
+- arg: {name: name, default: front}
+- let: {name: twice, value: "$(var name)_$(var name)"}
+- node:
+    pkg: tf2_ros
+    exec: static_transform_publisher
+    args: "--x 1 --yaw 0.5 --frame-id base_link --child-frame-id $(var name)_laser"
+- group:
+  - push_ros_namespace: {namespace: "$(var name)"}
+  - set_env: {name: LEVEL, value: "3"}
+  - node:
+      pkg: drive
+      exec: drive
+      name: drive
+      if: "$(eval '1 < 2')"
+      launch-prefix: gdb -ex run
+      respawn: true
+      respawn_delay: 3.0
+      param:
+      - {name: rate, value: 20}
+      - {name: text, value: "20", type: str}
+      - {name: sub, param: [{name: a, value: 1.5}]}
+      - {from: "$(find-pkg-share rover)/drive.yaml"}
+      remap: [{from: odom, to: "$(var twice)"}]
+      env: [{name: MODE, value: x}]
+- executable: {cmd: "echo $(env NO_SUCH_NAME 'a b') 'c d'", name: words}
+- timer: {period: 2.0, children: [{node: {pkg: late, exec: late, name: late}}]}
+- include: {file: $(dirname)/more.launch.xml, arg: [{name: name, value: rear}]}
+- bogus: {}
+"""
+MORE = '<launch><arg name="name"/><node pkg="scan" exec="scan" name="$(var name)_scan"/></launch>'
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("rover.launch.xml", XML), ("rover.launch.yaml", YAML)]
+)
+def test_xml_and_yaml_say_the_same(
+    name: str,
+    text: str,
+    package: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(package)
+    source(package, "more.launch.xml", MORE)
+    _, data = import_of(source(package, name, text), code=None)
+    assert data["frames"]["front_laser"] == {
+        "parent": "base_link",
+        "xyz": [1, 0, 0],
+        "rpy": [0, 0, 0.5],
+    }
+    processes = data["processes"]
+    assert list(processes) == ["drive", "words", "late", "rear_scan"]
+    assert processes["drive"]["params"] == {
+        "rate": 20,
+        "text": "20",
+        "sub.a": 1.5,
+        "file": "../drive.yaml",
+    }
+    assert processes["drive"]["remap"] == {"odom": "front_front"}
+    assert processes["drive"]["env"] == {"LEVEL": "3", "MODE": "x"}
+    assert processes["drive"]["namespace"] == "front"
+    assert processes["drive"]["prefix"] == ["gdb", "-ex", "run"]
+    assert (processes["drive"]["restart"], processes["drive"]["restart_delay"]) == (
+        "always",
+        "3 s",
+    )
+    assert processes["words"]["run"] == ["echo", "a b", "c d"]
+    (gate,) = processes["late"]["after"]
+    assert processes[gate]["ready"] == {"time": "2 s"}
+    lines = text.splitlines()
+    wanted = [number for number, line in enumerate(lines, start=1) if "bogus" in line]
+    assert f"{name}:{wanted[0]}" in places(printed_errors(capsys), "TF020")
+
+
+BOXES_IN = {
+    "boxes.launch.py": (
+        """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, TimerAction
+from launch.conditions import IfCondition, UnlessCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import (
+    ComposableNodeContainer, LoadComposableNodes, Node, PushRosNamespace, SetParameter, SetRemap)
+from launch_ros.descriptions import ComposableNode, ParameterValue
+
+def generate_launch_description():
+    color = LaunchConfiguration("color")
+    container = ComposableNodeContainer(
+        name="perception", namespace="cam", package="rclcpp_components", executable="component_container_mt",
+        emulate_tty=True, output="own_log", sigterm_timeout="9", arguments=["--ros-args", "--log-level", "debug"],
+        composable_node_descriptions=[
+            ComposableNode(
+                package="image_proc", plugin="image_proc::RectifyNode", name="rectify", namespace="cam",
+                parameters=[{"queue": 5, "sub": {"rate": 2.0}, "names": ["a", "b"], "n": color,
+                             "text": ParameterValue(color, value_type=str)}],
+                remappings=[("image", "image_raw")], extra_arguments=[{"use_intra_process_comms": True}]),
+            ComposableNode(package="p", plugin="p::Never", name="never", condition=UnlessCondition(color)),
+            ComposableNode(package="p", plugin="p::Color", name="color", condition=IfCondition(color)),
+        ])
+    return LaunchDescription([
+        DeclareLaunchArgument("color", default_value="true"),
+        container,
+        GroupAction([
+            PushRosNamespace("left"), SetParameter("speed", 3), SetRemap("scan", "scan_raw"),
+            LoadComposableNodes(target_container=["/mine", "/box"], composable_node_descriptions=[
+                ComposableNode(package="p", plugin="p::Grouped", name="grouped", namespace="deep",
+                               remappings=[("scan", "late_rule")])]),
+        ]),
+        TimerAction(period=0.1, actions=[
+            LoadComposableNodes(target_container="elsewhere", composable_node_descriptions=[
+                ComposableNode(package="p", plugin="p::Late", name="late")])]),
+        Node(package="own", executable="box", name="box", namespace="mine"),
+        Node(package="rclcpp_components", executable="component_container_isolated", name="stock", namespace="",
+             arguments=["--use_multi_threaded_executor", "--verbose"]),
+    ])
+"""
+    ),
+    "boxes.launch.xml": (
+        """<launch>
+  <arg name="color" default="true"/>
+  <node_container pkg="rclcpp_components" exec="component_container_mt" name="perception" namespace="cam"
+    emulate_tty="true" output="own_log" sigterm_timeout="9" args="--ros-args --log-level debug">
+    <composable_node pkg="image_proc" plugin="image_proc::RectifyNode" name="rectify" namespace="cam">
+      <param name="queue" value="5"/><param name="sub"><param name="rate" value="2.0"/></param>
+      <param name="names" value="a, b" value-sep=", "/>
+      <param name="n" value="$(var color)"/><param name="text" value="$(var color)" type="str"/>
+      <remap from="image" to="image_raw"/>
+      <extra_arg name="use_intra_process_comms" value="true"/>
+    </composable_node>
+    <composable_node pkg="p" plugin="p::Never" name="never" unless="$(var color)"/>
+    <composable_node pkg="p" plugin="p::Color" name="color" if="$(var color)"/>
+  </node_container>
+  <group>
+    <push_ros_namespace namespace="left"/><set_parameter name="speed" value="3"/>
+    <set_remap from="scan" to="scan_raw"/>
+    <load_composable_node target="/mine/box">
+      <composable_node pkg="p" plugin="p::Grouped" name="grouped" namespace="deep">
+        <remap from="scan" to="late_rule"/>
+      </composable_node>
+    </load_composable_node>
+  </group>
+  <timer period="0.1">
+    <load_composable_node target="elsewhere"><composable_node pkg="p" plugin="p::Late" name="late"/>
+    </load_composable_node>
+  </timer>
+  <node pkg="own" exec="box" name="box" namespace="mine"/>
+  <node pkg="rclcpp_components" exec="component_container_isolated" name="stock" namespace=""
+    args="--use_multi_threaded_executor --verbose"/>
+</launch>
+"""
+    ),
+    "boxes.launch.yaml": (
+        """launch:
+- arg: {name: color, default: "true"}
+- node_container:
+    pkg: rclcpp_components
+    exec: component_container_mt
+    name: perception
+    namespace: cam
+    emulate_tty: true
+    output: own_log
+    sigterm_timeout: 9.0
+    args: --ros-args --log-level debug
+    composable_node:
+    - pkg: image_proc
+      plugin: image_proc::RectifyNode
+      name: rectify
+      namespace: cam
+      param:
+      - {name: queue, value: 5}
+      - {name: sub, param: [{name: rate, value: 2.0}]}
+      - {name: names, value: [a, b]}
+      - {name: n, value: $(var color)}
+      - {name: text, value: $(var color), type: str}
+      remap: [{from: image, to: image_raw}]
+      extra_arg: [{name: use_intra_process_comms, value: "true"}]
+    - {pkg: p, plugin: "p::Never", name: never, unless: $(var color)}
+    - {pkg: p, plugin: "p::Color", name: color, if: $(var color)}
+- group:
+  - push_ros_namespace: {namespace: left}
+  - set_parameter: {name: speed, value: "3"}
+  - set_remap: {from: scan, to: scan_raw}
+  - load_composable_node:
+      target: /mine/box
+      composable_node:
+      - {pkg: p, plugin: "p::Grouped", name: grouped, namespace: deep, remap: [{from: scan, to: late_rule}]}
+- timer:
+    period: 0.1
+    children:
+    - load_composable_node:
+        target: elsewhere
+        composable_node: [{pkg: p, plugin: "p::Late", name: late}]
+- node: {pkg: own, exec: box, name: box, namespace: mine}
+- node:
+    pkg: rclcpp_components
+    exec: component_container_isolated
+    name: stock
+    namespace: ""
+    args: --use_multi_threaded_executor --verbose
+"""
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BOXES_IN)
+def test_composable_nodes_become_components_of_containers(name: str, tmp_path: Path) -> None:
+    text, data = import_of(source(tmp_path, name, BOXES_IN[name]), code=None)
+    assert data["containers"] == {
+        "perception": {
+            "executor": "multi", "namespace": "cam", "log_level": "debug", "output": "log", "emulate_tty": True,
+            "stop": {"timeout": "9 s", "kill_timeout": "5 s"},
+        },
+        "box": {"package": "own", "executable": "box", "namespace": "mine"},
+        "stock": {"isolation": "isolated", "executor": "multi", "args": ["--verbose"]},
+        "elsewhere": {"external": True},
+    }  # fmt: skip
+    processes = data["processes"]
+    assert processes["rectify"] == {
+        "component": "image_proc/image_proc::RectifyNode", "container": "perception", "namespace": "cam",
+        "params": {"queue": 5, "sub.rate": 2.0, "names": ["a", "b"], "n": "${args.color}",
+                   "text": "true"},
+        "remap": {"image": "image_raw"}, "extra_arguments": {"use_intra_process_comms": True},
+    }  # fmt: skip
+    assert processes["grouped"] == {
+        "component": "p/p::Grouped", "container": "box", "namespace": "left/deep", "params": {"speed": 3},
+        "remap": {"scan": "scan_raw"},
+    }  # fmt: skip
+    assert processes["late"]["container"] == "elsewhere"
+    assert processes["late"]["after"]
+    assert "never" not in processes
+    assert text.count("TODO") == 2, "the argument, and what its value leaves out"
+    _, data = import_of(tmp_path / name, "--all-branches", code=None)
+    assert data["processes"]["never"]["when"] == "${not (args.color)}"
+    assert data["processes"]["color"]["when"] == "${args.color}"
+    assert data["processes"]["rectify"]["params"]["n"] == "${args.color}"
+
+
+PUBLISHERS = """<launch>
+  <node_container pkg="rclcpp_components" exec="component_container" name="box" namespace="">
+    <composable_node pkg="tf2_ros" plugin="tf2_ros::StaticTransformBroadcasterNode" name="mount">
+      <param name="translation.x" value="0.5"/><param name="rotation.z" value="1.0"/>
+      <param name="rotation.w" value="0.0"/>
+      <param name="frame_id" value="base_link"/><param name="child_frame_id" value="laser"/>
+    </composable_node>
+    <composable_node pkg="p" plugin="p::Bogus" name="bogus" bogus="1"/>
+    <composable_node pkg="p" plugin="p::Moves" name="moves"><param name="robot_description" value="&lt;robot/>"/>
+    </composable_node>
+    <composable_node pkg="p" name="nameless"/>
+  </node_container>
+  <composable_node pkg="p" plugin="p::Alone" name="alone"/>
+  <load_composable_node><composable_node pkg="p" plugin="p::Lost" name="lost"/></load_composable_node>
+</launch>
+"""
+
+
+def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data = import_of(source(tmp_path, "a.launch.xml", PUBLISHERS), code=None)
+    assert data["frames"]["laser"] == {
+        "parent": "base_link",
+        "xyz": [0.5, 0, 0],
+        "rpy": [0, 0, "180 deg"],
+    }
+    assert list(data["processes"]) == ["bogus", "moves"]
+    wanted = [number for number, line in enumerate(PUBLISHERS.splitlines(), start=1)
+              if any(word in line for word in ("p::Bogus", "p::Moves", "nameless", "p::Alone", "p::Lost"))]  # fmt: skip
+    assert set(places(printed_errors(capsys), "TF020")) == {
+        f"a.launch.xml:{line}" for line in wanted
+    }
+
+
+ODD = """
+from launch import LaunchDescription
+from launch_ros.actions import ComposableNodeContainer, LoadComposableNodes, Node
+from launch_ros.descriptions import ComposableNode
+def generate_launch_description():
+    return LaunchDescription([
+        ComposableNodeContainer(name=None, package="a", executable="b", composable_node_descriptions=[None, 3]),
+        LoadComposableNodes(target_container=None, composable_node_descriptions=None),
+        Node(package="a", executable="b", output={"both": 3}),
+        Node(package="a", executable="b", output="bogus"),
+        Node(package="a", executable="b", arguments=3, parameters=[7], remappings=[1]),
+        LoadComposableNodes(target_container="", composable_node_descriptions=[ComposableNode(package="a", plugin="")]),
+        Node(package="a", executable="c", name="sound", sigkill_timeout="-1", respawn=True, respawn_delay=float("nan")),
+        ComposableNodeContainer(name="box", namespace="", package="a", executable="b", composable_node_descriptions=[
+            ComposableNode(package="a", plugin="a::B::", name="odd")]),
+    ])
+"""
+
+
+def test_an_action_that_is_given_nonsense_does_not_end_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data = import_of(source(tmp_path, "odd.launch.py", ODD), code=None)
+    assert data["processes"]["sound"] == {
+        "run": {"package": "a", "executable": "c"},
+        "restart": "always",
+    }
+    assert data["processes"]["odd"] == {"component": "a/a::B::", "container": "box"}
+    found = places(printed_errors(capsys), "TF020")
+    assert {f"odd.launch.py:{line}" for line in (9, 10, 11, 12, 13)} <= set(found)
+
+
+def test_a_parameter_file_lies_over_the_parameters_before_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    over = "/**: {ros__parameters: {a: {b: 5}}}\n/elsewhere: {ros__parameters: {d: 1}}\n"
+    (tmp_path / "over.yaml").write_text(over, encoding="utf-8")
+    text = f"""<launch><node pkg="p" exec="e" name="n">
+      <param name="a"><param name="b" value="1"/><param name="c" value="2"/></param><param name="d" value="3"/>
+      <param from="{tmp_path}/over.yaml"/><param name="e" value="4"/></node>
+      <node pkg="p" exec="e" name="m"><param name="a" value="1"/><param from="{tmp_path}/none.yaml"/></node></launch>"""
+    _, data = import_of(source(tmp_path, "a.launch.xml", text), code=None)
+    assert data["processes"]["n"]["params"] == {"file": "over.yaml", "a.c": 2, "d": 3, "e": 4}
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.xml:4"]
+
+
+#: As in bringups of MoveIt, TurtleBot 4 and Nav2.
+BRINGUP = """
+import launch
+from launch import LaunchContext, LaunchDescription
+from launch.substitutions import Command, EnvironmentVariable, PathJoinSubstitution, PythonExpression
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+from moveit_configs_utils import MoveItConfigsBuilder
+from nav2_common.launch import HasNodeParams, LaunchConfigAsBool
+
+def generate_launch_description():
+    simple = EnvironmentVariable("NO_SUCH_SETTING", default_value="1").perform(LaunchContext())
+    has_params = HasNodeParams(source_file=PathJoinSubstitution([
+        FindPackageShare("arm_moveit_config"), "config", "diagnostics.yaml"]), node_name="analyzers")
+    moveit = (MoveItConfigsBuilder("arm").robot_description(mappings={"ros2_control": "true"})
+              .trajectory_execution(file_path="config/controllers.yaml").planning_pipelines("ompl", ["ompl"])
+              .to_moveit_configs())
+    xacro = Command(["xacro ", PathJoinSubstitution([FindPackageShare("no_such_arm"), "arm.xacro"]), " a:=b"])
+    stop = Node(package="stop", executable="stop", parameters=[{"level": simple}])
+    return LaunchDescription([
+        launch.actions.DeclareLaunchArgument("loud", default_value="Yes"),
+        launch.actions.DeclareLaunchArgument("quick", default_value="True"),
+        Node(package="robot_state_publisher", executable="robot_state_publisher",
+             parameters=[{"robot_description": ParameterValue(xacro, value_type=str)}],
+             remappings=[("/tf", "tf"), ("/tf_static", "tf_static")]),
+        Node(package="moveit_ros_move_group", executable="move_group", name="move_group", parameters=[
+            moveit.robot_description_kinematics, moveit.trajectory_execution, moveit.planning_pipelines,
+            moveit.planning_scene_monitor, moveit.joint_limits, {"loud": LaunchConfigAsBool("loud")}],
+             condition=launch.conditions.IfCondition(has_params)),
+        Node(package="diagnostic_aggregator", executable="aggregator_node",
+             parameters=[PathJoinSubstitution([FindPackageShare("arm_moveit_config"), "config", "diagnostics.yaml"])]),
+        Node(package="shy", executable="shy", name="shy",
+             condition=launch.conditions.IfCondition(PythonExpression(["not ", LaunchConfigAsBool("quick")]))),
+        stop,
+        launch.actions.RegisterEventHandler(launch.event_handlers.OnProcessExit(
+            target_action=stop, on_exit=[launch.actions.EmitEvent(event=launch.events.Shutdown())])),
+    ])
+"""
+
+
+def test_bringups_of_moveit_and_turtlebots_are_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "arm_moveit_config/config"
+    config.mkdir(parents=True)
+    (config.parent / "package.xml").write_text(
+        "<package><name>arm_moveit_config</name></package>", encoding="utf-8"
+    )
+    for name, text in {
+        "controllers": "{moveit_manage_controllers: true, trajectory: {names: [a, b]}}",
+        "kinematics": "{arm: {kinematics_solver_timeout: 0.05}}", "joint_limits": "{default_scaling: 0.1}",
+        "ompl_planning": "{planner: ompl}", "diagnostics": "{analyzers: {ros__parameters: {path: Robot}}}",
+    }.items():  # fmt: skip
+        (config / f"{name}.yaml").write_text(text, encoding="utf-8")
+    _, data = import_of(source(tmp_path, "arm.launch.py", BRINGUP), code=None)
+    processes = data["processes"]
+    assert processes["move_group"]["params"] == {
+        "robot_description_kinematics.arm.kinematics_solver_timeout": 0.05, "moveit_manage_controllers": True,
+        "trajectory.names": ["a", "b"], "planning_pipelines": ["ompl"], "default_planning_pipeline": "ompl",
+        "ompl.planner": "ompl", "publish_planning_scene": True, "publish_geometry_updates": True,
+        "publish_state_updates": True, "publish_transforms_updates": True, "publish_robot_description": False,
+        "publish_robot_description_semantic": False,
+        "robot_description_planning.default_scaling": 0.1, "loud": True,
+    }  # fmt: skip
+    assert processes["analyzers"]["run"] == {
+        "package": "diagnostic_aggregator",
+        "executable": "aggregator_node",
+    }
+    assert (processes["stop"]["required"], processes["stop"]["params"]) == (True, {"level": "1"})
+    (part,) = data["parts"].values()
+    assert (part["xacro"], part["args"]) == ("package://no_such_arm/arm.xacro", {"a": "b"})
+    assert "ros" not in data
+    printed = printed_errors(capsys)
+    assert "event handler" not in printed
+    assert "remapped" not in printed
+    _, data = import_of(tmp_path / "arm.launch.py", "--all-branches", code=None)
+    assert data["processes"]["shy"]["when"] == "${not (args.quick)}"
+
+
+ROS1 = """<launch>
+  <arg name="height" default="0.1"/>
+  <node pkg="tf" type="static_transform_publisher" name="a" args="0.2 0 $(arg height) 0 0 0 base_link laser 100"/>
+  <node pkg="tf2_ros" type="static_transform_publisher" name="b" args="0.1 0 0.2 0 0 0 1 base_link camera"/>
+  <node pkg="tf2_ros" type="static_transform_publisher" name="c" args="0 0 0 -1.5707963 0 -1.5707963 camera optical"/>
+  <group ns="front"><node pkg="drive" type="drive.py" name="drive" required="true"/></group>
+</launch>
+"""
+
+
+def test_launch_files_of_ros_1_are_read(tmp_path: Path) -> None:
+    text, data = import_of(source(tmp_path, "robot.launch", ROS1), "height:=0.4")
+    assert data["frames"] == {
+        "base_link": {},
+        "laser": {"parent": "base_link", "xyz": [0.2, 0, 0.4]},
+        "camera": {"parent": "base_link", "xyz": [0.1, 0, 0.2]},
+        "optical": {"parent": "camera", "rpy": [-1.5707963, 0, -1.5707963]},
+    }
+    assert data["processes"]["drive"] == {
+        "run": {"package": "drive", "executable": "drive.py"}, "namespace": "front", "required": True,
+    }  # fmt: skip
+    robot = compiled(text, tmp_path).robot
+    assert robot
+
+
+ROS1_DESCRIBED = """<launch>
+  <param name="robot_description"
+    command="$(find xacro)/xacro '$(find rover)/rover.xacro' wheels:=4"/>
+  <param name="rate" value="20"/>
+  <node pkg="robot_state_publisher" type="robot_state_publisher" name="robot_state_publisher"/>
+  <node pkg="rviz" type="rviz" name="rviz" args="-d '$(find rover)/rviz/a b.rviz' --fullscreen"/>
+</launch>
+"""
+
+
+def test_a_description_and_quotes_of_ros_1_are_read(
+    package: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (package.parent / "rover.xacro").write_text(
+        '<robot name="rover" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arg name="wheels"'
+        ' default="2"/><link name="base_link"/></robot>',
+        encoding="utf-8",
+    )
+    _, data = import_of(source(package, "rover.launch", ROS1_DESCRIBED))
+    (part,) = data["parts"].values()
+    assert part["args"] == {"wheels": "4"}
+    assert part["xacro"].endswith("rover.xacro")
+    assert data["processes"]["rviz"]["run"]["args"] == [
+        "-d",
+        f"{package.parent}/rviz/a b.rviz",
+        "--fullscreen",
+    ]
+    assert data["processes"]["rviz"]["params"] == {"rate": 20}
+    assert places(printed_errors(capsys), "TF020") == ["rover.launch:5"]  # rate
+
+
+def test_a_launch_file_comes_from_standard_input(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reading._standard_input.cache_clear()
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(ROS1.encode())))
+    assert main(["import", "-"]) == 0
+    reading._standard_input.cache_clear()
+    assert (
+        "# <stdin>:3: in the order x y z yaw pitch roll frame child period"
+        in capsys.readouterr().out
+    )
+
+
+DISPLAY = """
+import os, xacro
+from launch import LaunchDescription
+from launch_ros.actions import Node
+from ament_index_python.packages import get_package_share_directory
+
+def generate_launch_description():
+    folder = get_package_share_directory("rover")
+    made = xacro.process_file(os.path.join(folder, "urdf", "rover.urdf.xacro"), mappings={"height": "0.5"}).toxml()
+    return LaunchDescription([
+        Node(package="robot_state_publisher", executable="robot_state_publisher", name="robot_state_publisher",
+             parameters=[{"robot_description": made, "publish_frequency": 50.0}]),
+        Node(package="joint_state_publisher_gui", executable="joint_state_publisher_gui"),
+        Node(package="tf2_ros", executable="static_transform_publisher",
+             arguments=["--frame-id", "mast", "--child-frame-id", "lamp", "--z", "0.1"]),
+    ])
+"""
+ROVER = """<robot name="rover" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="height" default="1"/>
+<link name="base_link"/><link name="mast"/><link name="wheel"/>
+<joint name="m" type="fixed"><parent link="base_link"/><child link="mast"/><origin xyz="0 0 $(arg height)"/></joint>
+<joint name="w" type="continuous"><parent link="base_link"/><child link="wheel"/></joint></robot>
+"""
+
+
+def test_a_robot_state_publisher_with_a_xacro_file_becomes_a_part(package: Path) -> None:
+    (package.parent / "urdf").mkdir()
+    source(package.parent / "urdf", "rover.urdf.xacro", ROVER)
+    text, data = import_of(
+        source(package, "display.launch.py", DISPLAY), "--package", f"rover={package.parent}"
+    )
+    assert data["parts"] == {
+        "rover": {"xacro": "package://rover/urdf/rover.urdf.xacro", "args": {"height": "0.5"}},
+    }  # fmt: skip
+    assert data["processes"]["joint_state_publisher_gui"] == {
+        "simulate": {"joints": "zero", "rate": "10 Hz"}
+    }
+    assert data["processes"]["joints"] == {"params": {"publish_frequency": 50}}
+    robot = compiled(text, package).robot
+    assert robot
+    assert {(edge.name, edge.pose.xyz[2]) for edge in robot.edges} == {
+        ("base_link → mast", 0.5), ("base_link → wheel", 0), ("mast → lamp", 0.1),
+    }  # fmt: skip
+
+
+def test_a_robot_state_publisher_with_a_urdf_becomes_links(package: Path) -> None:
+    urdf = ROVER.replace('<xacro:arg name="height" default="1"/>', "").replace(
+        "$(arg height)", "0.5"
+    )
+    source(package, "rover.urdf", urdf)
+    reading = 'open(os.path.join(os.path.dirname(__file__), "rover.urdf")).read()'
+    begin = DISPLAY.index("xacro.process_file")
+    end = DISPLAY.index("\n", begin)
+    text, data = import_of(
+        source(package, "display.launch.py", DISPLAY[:begin] + reading + DISPLAY[end:])
+    )
+    assert data["joints"]["w"]["type"] == "continuous"
+    robot = compiled(text, package).robot
+    assert robot
+    assert {edge.name for edge in robot.edges} == {
+        "base_link → mast",
+        "base_link → wheel",
+        "mast → lamp",
+    }
+
+
+HOSTILE = """
+import os, socket, subprocess, shutil
+os.system("touch {mark}")
+subprocess.run(["touch", "{mark}"])
+for call in (lambda: subprocess.Popen(["touch", "{mark}"]), lambda: open("{mark}", "w"), lambda: os.fork(),
+             lambda: os.posix_spawn("/usr/bin/touch", ["touch", "{mark}"], os.environ),
+             lambda: socket.create_connection(("127.0.0.1", {port})), lambda: shutil.rmtree("{folder}")):
+    try:
+        call()
+    except OSError:
+        pass
+from launch import LaunchDescription
+from launch_ros.actions import Node
+def generate_launch_description():
+    return LaunchDescription([Node(package="a", executable="b")])
+"""
+
+
+def test_a_launch_file_that_would_do_harm_is_contained_and_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mark, folder = tmp_path / "mark", tmp_path / "folder"
+    folder.mkdir()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        text = HOSTILE.format(mark=mark, folder=folder, port=port)
+        import_of(source(tmp_path, "hostile.launch.py", text), code=None)
+        server.settimeout(0)
+        with pytest.raises(BlockingIOError):
+            server.accept()
+    assert not mark.exists()
+    assert folder.is_dir()
+    printed = printed_errors(capsys)
+    assert places(printed, "TF020").count("hostile.launch.py:3") == 1
+    for word in (
+        "os.system",
+        "subprocess.Popen",
+        "os.fork",
+        "os.posix_spawn",
+        "socket.",
+        "open for writing",
+        "rmtree",
+    ):
+        assert word in printed
+
+
+#: It takes the hook off, by which Python refuses, and calls the C library.
+NATIVE = """
+import ctypes, os, sys
+import tfcompose.tools.importers.launch_process as reader
+reader._REFUSED = frozenset()
+libc = ctypes.CDLL(None)
+made = {{
+    "open": libc.open(b"{folder}/made", os.O_WRONLY | os.O_CREAT, 0o644), "creat": libc.creat(b"{folder}/made", 0o644),
+    "unlink": libc.unlink(b"{folder}/kept"), "chmod": libc.chmod(b"{folder}/kept", 0), "socket": libc.socket(2, 1, 0),
+    "rename": libc.rename(b"{folder}/kept", b"{folder}/made"), "kill": libc.kill(os.getppid(), 0), "fork": libc.fork(),
+    "execv": libc.execl(b"/bin/true", b"true", None),
+}}
+libc.system(b"touch {folder}/made")
+reads = open("{folder}/kept").read()
+import threading
+thread = threading.Thread(target=lambda: made.update(thread=0))
+thread.start()
+thread.join()
+open(os.devnull, "w").write("nothing")
+from launch import LaunchDescription
+from launch_ros.actions import Node
+def generate_launch_description():
+    return LaunchDescription([Node(package="a", executable="b", arguments=[reads, str(made)])])
+"""
+
+
+@pytest.mark.skipif(
+    platform.machine() not in {"x86_64", "aarch64"}, reason="the kernel confines on these two"
+)
+def test_the_kernel_confines_a_launch_file_that_calls_the_c_library(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_text("what is in it", encoding="utf-8")
+    _, data = import_of(
+        source(tmp_path, "native.launch.py", NATIVE.format(folder=tmp_path)), code=None
+    )
+    reads, made = data["processes"]["b"]["run"]["args"]
+    assert reads == (tmp_path / "kept").read_text("utf-8") == "what is in it"
+    assert not (tmp_path / "made").exists()
+    answers = yaml.safe_load(made)
+    assert answers.pop("thread") == 0
+    assert set(answers.values()) == {-1}
+
+
+def test_a_launch_file_that_calls_the_c_library_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = "import ctypes\n\nctypes.CDLL(None)\n"
+    assert main(["import", str(source(tmp_path, "native.launch.py", text))]) == 1
+    assert places(printed_errors(capsys), "TF020") == ["native.launch.py:3"]
+
+
+def test_a_launch_file_that_aborts_is_not_called_slow(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["import", str(source(tmp_path, "a.launch.py", "import os; os.abort()"))]) == 1
+    printed = printed_errors(capsys)
+    assert "SIGABRT" in printed
+    assert "long" not in printed
+
+
+@pytest.mark.parametrize(
+    "text", ["while True: pass", "x = [0]\nwhile True: x = x * 2", "import os; os.abort()"]
+)
+def test_a_launch_file_without_end_is_ended(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "_MOST_WALL_S", 3.0)
+    assert main(["import", str(source(tmp_path, "endless.launch.py", text))]) == 1
+    assert "endless.launch.py" in printed_errors(capsys)
+
+
+@pytest.mark.parametrize(
+    ("place", "text"),
+    [
+        ("a.launch.py:2", "\ndef generate_launch_description(:\n"),
+        (
+            "a.launch.py:3",
+            "def generate_launch_description():\n    import gone\n    return 1 / 0\n",
+        ),
+        ("a.launch.py:2", "def generate_launch_description():\n    raise KeyboardInterrupt\n"),
+        ("a.launch.py:1", "x = 1\n"),
+        ("a.launch.py:1", "import os\nos._exit(0)\n"),
+        ("a.launch.xml:2", "<launch>\n<node\n"),
+        ("a.launch.xml:1", ""),
+        ("<stdin>:2", "def generate_launch_description():\n    return 1 / 0\n"),
+        ("<stdin>:1", "import os; os.abort()\ndef generate_launch_description(): pass\n"),
+    ],
+)
+def test_a_launch_file_that_cannot_be_read_is_refused_at_its_line(
+    place: str,
+    text: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(reading, "_standard_input", text.encode)
+    name = place.partition(":")[0]
+    assert main(["import", "-" if name == "<stdin>" else source(tmp_path, name, text).name]) == 1
+    printed = capfd.readouterr().err
+    assert re.search(rf"^{re.escape(place)}:1: error\[TF00[28]\]", printed, re.MULTILINE), printed
+    assert "Traceback" not in printed
+    assert places(printed, "TF020") == (["a.launch.py:2"] if "gone" in text else [])
+
+
+def test_ctrl_c_ends_an_import_without_a_traceback(tmp_path: Path) -> None:
+    begun = tmp_path / "begun"
+    os.mkfifo(begun)
+    text = (
+        f"def generate_launch_description():\n    open({str(begun)!r}).read()\n    while True:"
+        " pass\n"
+    )
+    file = source(tmp_path, "endless.launch.py", text)
+    words = [sys.executable, "-m", "tfcompose", "import", str(file)]
+    with subprocess.Popen(
+        words, stderr=subprocess.PIPE, start_new_session=True, text=True
+    ) as process:
+        begun.write_text("the launch file is read\n", encoding="utf-8")  # waits for its reader
+        os.killpg(process.pid, signal.SIGINT)
+        _, printed = process.communicate(timeout=60)
+    assert (process.returncode, printed) == (130, "")
+
+
+def test_no_launch_file_makes_a_traceback(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is left of a file after parts of it were taken out or doubled is imported, or refused."""
+    chance = random.Random(18)
+    for name, text in (
+        ("a.launch.py", PYTHON),
+        ("b.launch.xml", XML),
+        ("c.launch.yaml", YAML),
+        ("d.launch", ROS1),
+    ):
+        for _ in range(4):
+            lines = text.splitlines(keepends=True)
+            for _ in range(chance.randint(1, 4)):
+                at = chance.randrange(len(lines))
+                lines[at : at + 1] = chance.choice(
+                    ([], [lines[at]] * 2, [lines[at][: len(lines[at]) // 2]])
+                )
+            code = main(["import", str(source(tmp_path, name, "".join(lines)))])
+            printed = printed_errors(capsys)
+            assert code in {0, 1, 2}
+            assert "Traceback" not in printed, "".join(lines)
+
+
+COMPOSED = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, TimerAction
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import ComposableNodeContainer, LoadComposableNodes, Node, PushRosNamespace, SetParameter
+from launch_ros.descriptions import ComposableNode
+
+def generate_launch_description():
+    mine = ComposableNodeContainer(name="mine", namespace="rear", package="my_package", executable="my_container")
+    return LaunchDescription([
+        DeclareLaunchArgument("rectify", default_value="false"),
+        LoadComposableNodes(target_container="/front/box", composable_node_descriptions=[
+            ComposableNode(package="early", plugin="early::HTTPServerNode")]),
+        ComposableNodeContainer(
+            name="box", namespace="front", package="rclcpp_components", executable="component_container_isolated",
+            arguments=["--use_multi_threaded_executor", "--ros-args", "--log-level", "info"], output="log",
+            emulate_tty=True, respawn=True, sigterm_timeout="3", sigkill_timeout="9",
+            composable_node_descriptions=[
+                ComposableNode(
+                    package="image_proc", plugin="image_proc::RectifyNode", name="rectify", namespace="left",
+                    remappings=[("image", "image_raw")], parameters=[{"size": 5, "a": {"b": [1.0, 2.0]}}],
+                    extra_arguments=[{"use_intra_process_comms": True}],
+                    condition=IfCondition(LaunchConfiguration("rectify"))),
+                ComposableNode(package="image_proc", plugin="image_proc::CropNode", name="crop"),
+            ]),
+        Node(package="rclcpp_components", executable="component_container_mt", name="plain"),
+        TimerAction(period=4.0, actions=[LoadComposableNodes(
+            target_container="plain", composable_node_descriptions=[
+                ComposableNode(package="depth", plugin="depth::Cloud", name="cloud")])]),
+        LoadComposableNodes(target_container="some/where", composable_node_descriptions=[
+            ComposableNode(package="demo", plugin="demo::Talker", name="talker")]),
+        GroupAction([PushRosNamespace("g"), SetParameter("speed", 2), mine, LoadComposableNodes(
+            target_container=mine, composable_node_descriptions=[
+                ComposableNode(package="demo", plugin="demo::Talker", name="talker")])]),
+    ])
+"""
+BOX = {
+    "isolation": "isolated", "executor": "multi", "namespace": "front", "restart": "always",
+    "stop": {"timeout": "3 s", "kill_timeout": "9 s"}, "output": "log", "emulate_tty": True, "log_level": "info",
+}  # fmt: skip
+
+
+def test_containers_have_their_components_whoever_loads_them(package: Path) -> None:
+    file = source(package, "composed.launch.py", COMPOSED)
+    _, data = import_of(file, code=None)
+    assert data["containers"] == {
+        "box": BOX,
+        "plain": {"executor": "multi"},
+        "mine": {
+            "package": "my_package",
+            "executable": "my_container",
+            "namespace": "g/rear",
+            "params": {"speed": 2},
+        },
+        "where": {"external": True, "namespace": "some"},
+    }
+    processes = data["processes"]
+    (gate,) = processes["cloud"].pop("after")
+    assert processes.pop(gate) == {"run": ["sleep", "4"]}
+    assert processes == {
+        "http_server_node": {"component": "early/early::HTTPServerNode", "container": "box"},
+        "crop": {"component": "image_proc/image_proc::CropNode", "container": "box"},
+        "cloud": {"component": "depth/depth::Cloud", "container": "plain"},
+        "talker": {"component": "demo/demo::Talker", "container": "where"},
+        "talker_2": {"component": "demo/demo::Talker", "container": "mine", "node": "talker", "namespace": "g",
+                     "params": {"speed": 2}},
+    }  # fmt: skip
+    _, data = import_of(file, "--all-branches", code=None)
+    assert data["processes"]["rectify"] == {
+        "component": "image_proc/image_proc::RectifyNode", "container": "box", "namespace": "left",
+        "params": {"size": 5, "a.b": [1.0, 2.0]}, "remap": {"image": "image_raw"},
+        "extra_arguments": {"use_intra_process_comms": True}, "when": "${args.rectify}",
+    }  # fmt: skip
+
+
+COMPOSED_XML = """<launch>
+  <arg name="rectify" default="true"/>
+  <node_container pkg="rclcpp_components" exec="component_container" name="box" namespace="front">
+    <composable_node pkg="image_proc" plugin="image_proc::RectifyNode" name="rectify" unless="$(var rectify)">
+      <param name="size" value="5"/>
+      <remap from="image" to="image_raw"/>
+      <extra_arg name="use_intra_process_comms" value="true"/>
+    </composable_node>
+  </node_container>
+  <load_composable_node target="/front/box" if="$(var rectify)">
+    <composable_node pkg="image_proc" plugin="image_proc::CropNode" name="crop"/>
+  </load_composable_node>
+</launch>
+"""
+
+
+def test_records_tell_containers_apart_though_the_earlier_ones_are_gone() -> None:
+    """Python gives the ``id`` of an object that is gone to another one: components were in a wrong container then."""
+    context = Context()
+    for count in range(50):
+        inside = [actions.ComposableNode(package="p", plugin="p::C", name=f"in_{count}")]
+        container = {"package": "p", "executable": "e", "name": f"box_{count}", "namespace": ""}
+        actions.ComposableNodeContainer(**container, composable_node_descriptions=inside).visit(
+            context
+        )
+    boxes, components = context.records[::2], context.records[1::2]
+    assert [one["container"] for one in components] == [str(one["id"]) for one in boxes]
+    assert len({one["id"] for one in context.records}) == 100
+
+
+def test_an_argument_that_a_command_makes_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "rover.xacro").write_text('<robot name="rover"/>', encoding="utf-8")
+    text, data = import_of(source(tmp_path, "a.launch.py", SPAWNED))
+    file = f"{tmp_path}/rover.xacro"
+    assert data["processes"]["create"]["run"]["args"] == ["-string", file, f"-file={file}"]
+    assert data["processes"]["a"]["run"] == {"launch": "gone/a.launch.py", "args": {"text": file}}
+    assert places(printed_errors(capsys), "TF020") == [
+        "a.launch.py:8",
+        "a.launch.py:11",
+        "a.launch.py:11",
+    ]
+    assert "U000" not in text
+
+
+SPAWNED = """import os
+from launch import LaunchDescription
+from launch.actions import IncludeLaunchDescription
+from launch.substitutions import Command
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
+def generate_launch_description():
+    return LaunchDescription([Node(package="ros_gz_sim", executable="create", arguments=[
+        "-string", Command(["xacro ", os.path.join(os.path.dirname(__file__), "rover.xacro")]),
+        ["-file=", os.path.join(os.path.dirname(__file__), "rover.xacro")]]),
+        IncludeLaunchDescription([FindPackageShare("gone"), "/a.launch.py"], launch_arguments={
+            "text": Command(["xacro ", os.path.join(os.path.dirname(__file__), "rover.xacro")])}.items())])
+"""
+
+
+def test_a_condition_and_a_list_that_are_given_by_keyword_count(tmp_path: Path) -> None:
+    file = source(tmp_path, "a.launch.py", BY_KEYWORD)
+    _, data = import_of(file)
+    assert set(data["processes"]) == {"kept"}
+    assert data["processes"]["kept"]["params"] == {"names": ["a", "b"]}
+
+
+BY_KEYWORD = """
+from launch import LaunchDescription
+from launch.conditions import IfCondition
+from launch_ros.actions import Node
+from launch_ros.descriptions import ParameterValue
+def generate_launch_description():
+    return LaunchDescription([
+        Node(package="p", executable="e", name="gone", condition=IfCondition(predicate_expression="false")),
+        Node(package="p", executable="e", name="kept", parameters=[{"names": ParameterValue(["a", "b"])}]),
+    ])
+"""
+
+
+def test_containers_of_an_xml_launch_file_too(package: Path) -> None:
+    file = source(package, "composed.launch.xml", COMPOSED_XML)
+    _, data = import_of(file, "--all-branches", code=None)
+    assert data["containers"] == {"box": {"namespace": "front"}}
+    assert data["processes"] == {
+        "rectify": {
+            "component": "image_proc/image_proc::RectifyNode", "container": "box", "params": {"size": 5},
+            "remap": {"image": "image_raw"}, "extra_arguments": {"use_intra_process_comms": True},
+            "when": "${not (args.rectify)}",
+        },
+        "crop": {
+            "component": "image_proc/image_proc::CropNode", "container": "box", "when": "${args.rectify}",
+        },
+    }  # fmt: skip

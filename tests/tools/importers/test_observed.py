@@ -1,0 +1,160 @@
+"""Trees that were observed, live or in a bag, imported."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.bags import START_S, UP, write_bag
+from tests.support.bringups import compiled
+from tests.support.importing import PRESETS
+from tests.support.tree_history import BEGUN_NS, END_NS, TreeHistory, sound_tree
+from tfcompose.cli import main
+from tfcompose.spec.load import load
+from tfcompose.tf.live.publishers import Publisher
+from tfcompose.tools.importers.draft import Draft
+from tfcompose.tools.importers.observed import Observed, round_rate, started_by
+
+
+def drafted(history: TreeHistory, where: str = "", words: tuple[str, ...] = ()) -> Draft:
+    draft = Draft("rover")
+    Observed(draft, lambda _: where, lambda _: words).add(history.observer.edges(END_NS))
+    return draft
+
+
+def test_edges_have_their_values_rates_and_owners(tmp_path: Path) -> None:
+    words = ("/opt/ros/jazzy/lib/drive/driver", "--fast", "--ros-args", "-r", "__node:=drive")
+    draft = drafted(sound_tree(), "on this machine as pid 7: …", words)
+    data = load(draft.text(), "robot.yaml").data
+    assert data["frames"] == {
+        "odom": {},
+        "base_link": {"parent": "odom", "owner": "drive", "rate": "50 Hz"},
+        "laser": {"parent": "base_link", "owner": "static_2", "static": True},
+    }
+    assert data["processes"] == {
+        "drive": {"external": True}, "static_2": {"external": True, "node": "/static"},
+    }  # fmt: skip
+    assert "package: drive, executable: driver, args: [" in draft.text()
+    result = compiled(draft.text(), tmp_path)
+    assert result.robot
+    assert not result.errors
+
+
+UPRIGHT, OPTICAL = (0.0, 0.0, 0.0, 1.0), (-0.5, 0.5, -0.5, 0.5)
+#: The frames of a camera of the D400 series, with their parents, positions, rotations and senders.
+CAMERA = {
+    "cam_bottom_screw_frame": ("base_link", (0.3, 0.0, 0.2), UPRIGHT, b"s"),
+    "cam_link": ("cam_bottom_screw_frame", (0.0106, 0.0175, 0.0125), UPRIGHT, b"s"),
+    "cam_depth_frame": ("cam_link", (0.0, 0.0, 0.0), UPRIGHT, b"e"),
+    "cam_depth_optical_frame": ("cam_depth_frame", (0.0, 0.0, 0.0), OPTICAL, b"e"),
+    "cam_color_frame": ("cam_link", (-0.0002, 0.0148, 0.0001), UPRIGHT, b"e"),
+    "cam_color_optical_frame": ("cam_color_frame", (0.0, 0.0, 0.0), OPTICAL, b"e"),
+}
+
+
+def test_which_model_a_calibrated_camera_is_stays_a_question_where_several_fit() -> None:
+    history = TreeHistory().knows(b"s", b"e")
+    for child, (parent, xyz, quat_xyzw, gid) in CAMERA.items():
+        history.takes((parent, child, 0, 0, *xyz, *quat_xyzw), gid, BEGUN_NS, static=True)
+    draft = Draft("rover")
+    observed = Observed(draft, lambda _: "", lambda _: ())
+    observed.add(history.observer.edges(END_NS))
+    observed.recognise(PRESETS)
+    assert any(
+        "realsense/d435i" in note for note in draft.notes["frames", "cam_bottom_screw_frame"]
+    )
+    assert "cam_color_frame" in draft.sections["frames"]
+
+
+def test_a_second_publisher_is_named() -> None:
+    draft = drafted(sound_tree().moving("map base_link", b"x"))
+    assert [one.code for one in draft.found] == ["TF020"]
+
+
+@pytest.mark.parametrize(
+    ("measured", "meant"),
+    [
+        (49.7, 50),
+        (10.02, 10),
+        (29.4, 30),
+        (0.99, 1),
+        (7.49, 7.5),
+        (43.9, 43),
+        (201, 200),
+        (None, None),
+        (0.0, None),
+    ],
+)
+def test_rates_are_round_where_a_round_one_is_near(
+    measured: float | None, meant: float | None
+) -> None:
+    assert round_rate(measured) == meant
+
+
+def test_a_comment_names_a_node_whose_name_is_another_one_at_each_start() -> None:
+    node = "static_transform_publisher_aB3dE6gH9jK2mN5p"
+    history = TreeHistory().takes(
+        ("base_link", "laser", 0, 0, 0.0, 0.0, 0.0, *UPRIGHT), b"s", BEGUN_NS, static=True
+    )  # fmt: skip
+    history.observer.take_graph([Publisher(b"s", f"/{node}", static=True)])
+    text = drafted(history).text()
+    assert "another name at each start" in text
+
+
+def test_a_command_line_names_its_package() -> None:
+    assert started_by(("python3", "/ws/install/drive/lib/drive/node", "-v")) == {
+        "package": "drive", "executable": "node", "args": ["-v"],
+    }  # fmt: skip
+    assert started_by(("/usr/bin/rviz2",)) == {}
+    assert started_by(()) == {}
+
+
+def test_a_bag_becomes_a_robot_that_verify_finds_in_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    turned = (0.0, 0.0, 0.38268343236508984, 0.9238795325112867)
+    sent = [("/tf_static", 0.0, "base_link", "laser", 0.0, (0.1, 0.0, 0.25), turned)]
+    sent += [
+        ("/tf", tick / 20, "odom", "base_link", tick / 20, (tick / 20, 0.0, 0.0), UP)
+        for tick in range(100)
+    ]
+    bag, out = write_bag(tmp_path / "bag", sent), tmp_path / "robot.yaml"
+    assert START_S
+    assert main(["import", "--bag", str(bag), "-o", str(out)]) == 0
+    data = load(out.read_text("utf-8"), str(out)).data
+    assert data["frames"]["laser"] == {
+        "parent": "base_link",
+        "xyz": [0.1, 0, 0.25],
+        "rpy": [0, 0, "45 deg"],
+    }
+    assert data["frames"]["base_link"] == {"parent": "odom", "owner": "recorded", "rate": "20 Hz"}
+    capsys.readouterr()
+    assert main(["verify", str(out), "--bag", str(bag)]) == 0, capsys.readouterr().out
+
+
+SENSED = """
+tfcompose: 1
+robot: r
+links: {base_link: {}}
+sensors:
+  front: {preset: realsense/d435i, parent: base_link, xyz: [0.1, 0, 0.2], driver: none, options: {imu: true}}
+"""
+
+
+def test_sensors_of_a_recording_have_their_presets(tmp_path: Path) -> None:
+    robot = compiled(SENSED, tmp_path).robot
+    assert robot
+    edges = [("/tf_static", 0.0, edge.parent, edge.child, 0.0, edge.pose.xyz, edge.pose.quat_xyzw)
+             for edge in robot.edges]  # fmt: skip
+    bag, out = write_bag(tmp_path / "bag", edges), tmp_path / "robot.yaml"
+    assert main(["import", "--bag", str(bag), "-o", str(out)]) == 0
+    data = load(out.read_text("utf-8"), str(out)).data
+    assert data["sensors"] == {
+        "front": {
+            "preset": "realsense/d435i", "parent": "base_link", "xyz": [0.1, 0, 0.2], "options": {"imu": True},
+            "driver": "none",
+        },
+    }  # fmt: skip
+    assert data["frames"] == {"base_link": {}}
+    assert main(["verify", str(out), "--bag", str(bag)]) == 0
+    assert main(["import", "--bag", str(bag), "-o", str(out), "--force", "--no-sensors"]) == 0
+    assert "front_depth_frame" in load(out.read_text("utf-8"), str(out)).data["frames"]

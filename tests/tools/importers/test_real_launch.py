@@ -1,0 +1,329 @@
+"""What is imported of launch files is what ROS's launch would start; where launch is installed."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.support.bringups import (
+    compiled,
+    exported,
+    flat,
+    import_of,
+    places,
+    printed_errors,
+    started_with,
+)
+from tests.support.composition import can_build, composition_interfaces
+from tests.tools.importers.test_exported import ARGUED, COMBINATIONS
+from tests.tools.importers.test_launch import (
+    BOXES_IN,
+    COMPOSED,
+    COMPOSED_XML,
+    MORE,
+    PYTHON,
+    WITH_ARGUMENTS,
+    XML,
+    YAML,
+)
+from tfcompose.model.robot import Robot
+from tfcompose.tools.importers import launch as importing
+
+pytestmark = pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch is not installed")
+SCRIPT = Path(__file__).parents[2] / "support/real_launch.py"
+#: Each component has a name of the file's.
+NAMED = COMPOSED.replace("early::HTTPServerNode", 'early::HTTPServerNode", name="http_server_node')
+#: XML without what launch refuses.
+SOUND_XML = XML.replace("  <bogus/>\n", "")
+SOUND_YAML = YAML.replace("- bogus: {}\n", "").replace("respawn: true", 'respawn: "true"')
+
+
+def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
+    """Return what launch starts, by the node's name, or by the command: words, names, remappings, parameters."""
+    out = file.with_name("started.json")
+    environment = {**os.environ, "ROS_LOG_DIR": str(file.parent)}
+    if can_build():
+        folder = composition_interfaces(Path(tempfile.gettempdir()) / f"composition_{os.getuid()}")
+        environment["PYTHONPATH"] = os.pathsep.join(
+            [str(folder), os.environ.get("PYTHONPATH", "")]
+        )
+    subprocess.run(
+        [sys.executable, SCRIPT, out, file, *words],
+        check=True,
+        env=environment,
+        capture_output=True,
+    )
+    records = json.loads(out.read_text("utf-8"))
+    return {one["node"]: _loaded(one) for one in records if "component" in one} | dict(
+        one_of(one["words"], one["params"]) for one in records if "component" not in one
+    )
+
+
+def _loaded(one: dict[str, Any]) -> dict[str, Any]:
+    params = {key: repr(value) for key, value in sorted(one["params"].items())}
+    return {"program": one["component"], **one, "params": params, "component": True}
+
+
+def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str, Any]]:
+    program = next((word for word in words if "/" in word and not word.startswith("-")), words[0])
+    rest = words[words.index(program) + 1 :]
+    at = rest.index("--ros-args") if "--ros-args" in rest else len(rest)
+    rules = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-r"]
+    remap = dict(reversed([rule.split(":=", 1) for rule in rules]))  # the first one counts
+    name, namespace = remap.pop("__node", ""), remap.pop("__ns", "/")
+    given = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-p"]
+    params: dict[str, Any] = {
+        name: yaml.safe_load(value) for name, value in (one.split(":=", 1) for one in given)
+    }
+    for file in files:
+        for node in file.values():
+            params |= flat(node["ros__parameters"])
+    typed = {
+        key: repr(list(value) if isinstance(value, tuple) else value)
+        for key, value in sorted(params.items())
+    }
+    return name or program, {"program": program, "words": rest[:at], "namespace": namespace.strip("/"), "remap": remap,
+                             "params": typed}  # fmt: skip
+
+
+def of_robot(robot: Robot) -> dict[str, dict[str, Any]]:
+    """Return the same of a robot's processes, by their nodes' names, or by their programs."""
+    nodes = {
+        process.name: process.ros_nodes[0].name.rpartition("/")[2]
+        for process in robot.processes
+        if process.package
+    }
+    return {
+        one.get("node") or nodes.get(name, one["program"]): {
+            key: value for key, value in one.items() if key not in {"env", "output"}
+        } | ({"component": True} if "node" in one else {})
+        for name, one in started_with(robot).items()
+    }  # fmt: skip
+
+
+def imported(file: Path, *words: str) -> dict[str, dict[str, Any]]:
+    """Return the same of the robot that import makes of the file."""
+    text, _ = import_of(file, *words, code=None)
+    robot = compiled(text, file.parent).robot
+    assert robot
+    return of_robot(robot)
+
+
+def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of what a package shares that is installed below the folder."""
+    prefix = folder / "install"
+    index, share = prefix / "share/ament_index/resource_index/packages", prefix / "share" / package
+    index.mkdir(parents=True)
+    share.mkdir()
+    (index / package).touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{prefix}:{os.environ.get('AMENT_PREFIX_PATH', '')}")
+    return share
+
+
+@pytest.mark.parametrize("has_launch", [True, False], ids=["launch", "stand-in"])
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("rover.launch.xml", SOUND_XML, ()),
+        ("rover.launch.yaml", SOUND_YAML, ("name:=left",)),
+        ("a.launch.py", WITH_ARGUMENTS, ("loud:=false", "mode:=fixed")),
+        ("composed.launch.py", NAMED, ("rectify:=true",)),
+        ("composed.launch.xml", COMPOSED_XML, ("rectify:=false",)),
+        *((name, text, ()) for name, text in BOXES_IN.items()),
+    ],
+)
+def test_each_process_is_started_as_launch_would(  # noqa: PLR0913 (fixtures, and cases)
+    name: str,
+    text: str,
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    has_launch: bool,
+) -> None:
+    monkeypatch.setattr(importing, "has_launch", lambda: has_launch)
+    share = installed("rover", tmp_path, monkeypatch)
+    (share / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
+    (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
+    file = tmp_path / name
+    file.write_text(text, encoding="utf-8")
+    expected, found = started(file, *words), imported(file, *words)
+    expected = {
+        key: one
+        for key, one in expected.items()
+        if not one["program"].endswith("/static_transform_publisher")
+    }
+    assert expected
+    found.pop("sleep", None)  # the time of a timer, which launch starts no process for
+    assert found.keys() == expected.keys()
+    for key, one in expected.items():
+        assert found[key] == one, key
+
+
+@pytest.mark.parametrize("words", [(), ("--all-branches",)], ids=["defaults", "all branches"])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("rover.launch.py", PYTHON.replace(", autostart=True", "")),
+        ("rover.launch.xml", SOUND_XML),
+        ("rover.launch.yaml", SOUND_YAML),
+        ("a.launch.py", WITH_ARGUMENTS),
+        ("composed.launch.py", COMPOSED),
+        ("composed.launch.xml", COMPOSED_XML),
+        *BOXES_IN.items(),
+    ],
+)
+def test_launch_and_the_stand_in_give_the_same_robot_file(
+    name: str, text: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    share = installed("rover", tmp_path, monkeypatch)
+    (share / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
+    (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
+    file = tmp_path / name
+    file.write_text(text, encoding="utf-8")
+    by_launch, _ = import_of(file, *words, code=None)
+    monkeypatch.setattr(importing, "has_launch", lambda: False)
+    by_stand_in, _ = import_of(file, *words, code=None)
+    assert (
+        by_launch.splitlines()[0] == f"# imported from {name} by tfcompose, read by ROS's launch"
+    )
+    assert by_launch.splitlines()[1:] == by_stand_in.splitlines()[1:]
+
+
+def test_what_launch_refuses_the_stand_in_reads_and_a_finding_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "a.launch.xml"
+    file.write_text(
+        '<launch>\n<bogus/>\n<node pkg="p" exec="e" name="n"/>\n</launch>\n', encoding="utf-8"
+    )
+    text, data = import_of(file)
+    assert set(data["processes"]) == {"n"}
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.xml:1", "a.launch.xml:2"]
+    assert "read by ROS's launch" not in text.splitlines()[0]
+
+
+def test_actions_and_substitutions_of_other_packages_do_what_they_do(tmp_path: Path) -> None:
+    file = tmp_path / "a.launch.py"
+    file.write_text(OTHERS, encoding="utf-8")
+    _, data = import_of(file)
+    assert data["processes"]["made"]["params"] == {"speed": 6}
+    assert data["processes"]["made"]["namespace"] == "outer/left"
+    assert data["processes"]["own"]["run"] == {
+        "package": "camera",
+        "executable": "camera",
+        "args": ["--fast"],
+    }
+    assert data["args"] == {"half": {"default": 3, "description": "of the speed"}}
+    assert data["processes"]["kept"]["params"] == {"half": "${args.half}"}
+
+
+OTHERS = """
+from launch import Action, LaunchDescription, Substitution
+from launch.actions import DeclareLaunchArgument, GroupAction, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node, PushRosNamespace
+class Twice(Substitution):
+    def __init__(self, value):
+        super().__init__()
+        self.value = value
+    def perform(self, context):
+        return str(2 * int(context.perform_substitution(self.value)))
+class Made(Action):
+    def __init__(self, side, **kwargs):
+        super().__init__(**kwargs)
+        self.side = side
+    def execute(self, context):
+        return [Node(package="p", executable="e", name="made", namespace=self.side,
+                     parameters=[{"speed": Twice(LaunchConfiguration("half"))}])]
+def kept(context, params):
+    return [Node(package="p", executable="e", name="kept", parameters=[params])]
+class Camera(Node):
+    def __init__(self, label):
+        super().__init__(package="camera", executable="camera", name=label, arguments=["--fast"])
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("half", default_value="3", description="of the speed"),
+        GroupAction([PushRosNamespace("outer"), Made("left")]),
+        Camera("own"),
+        OpaqueFunction(function=kept, kwargs={"params": {"half": LaunchConfiguration("half")}}),
+    ])
+"""
+
+
+def test_launch_starts_nothing_and_reaches_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "a.launch.py"
+    file.write_text(REACHING.replace("TOUCHED", str(tmp_path / "touched")), encoding="utf-8")
+    text, data = import_of(file)
+    assert text.splitlines()[0].endswith("read by ROS's launch")
+    assert set(data["processes"]) == {"n"}
+    assert not (tmp_path / "touched").exists()
+    assert places(printed_errors(capsys), "TF020") == [
+        f"a.launch.py:{line}" for line in (5, 7, 11, 15)
+    ]
+
+
+REACHING = """import os, socket
+from launch import LaunchDescription
+from launch.actions import ExecuteProcess
+from launch_ros.actions import Node
+os.system("touch TOUCHED")
+try:
+    socket.create_connection(("127.0.0.1", 22))
+except OSError:
+    pass
+try:
+    open("TOUCHED", "w")
+except OSError:
+    pass
+try:
+    os.posix_spawn("/bin/touch", ["touch", "TOUCHED"], {})
+except OSError:
+    pass
+def generate_launch_description():
+    return LaunchDescription([Node(package="p", executable="e", name="n")])
+"""
+
+
+@pytest.mark.parametrize("given", COMBINATIONS, ids=lambda given: "-".join(given.values()))
+def test_launch_starts_of_an_export_what_the_plan_of_the_same_arguments_has(
+    given: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for what waits for another one's end: here no process is started."""
+    share = installed("nav2_bringup", tmp_path, monkeypatch)
+    (share / "navigation_launch.py").write_text(INCLUDED, encoding="utf-8")
+    (tmp_path / "argued.yaml").write_text(ARGUED, encoding="utf-8")
+    file = exported(tmp_path / "argued.yaml", tmp_path / "out")
+    found = started(file, *(f"{name}:={value}" for name, value in given.items()))
+    robot = compiled(ARGUED, tmp_path, **given).robot
+    assert robot
+    expected = of_robot(robot)
+    is_included = expected.pop("nav2_bringup/navigation_launch.py", None) is not None
+    assert (found.pop("included", {}).get("words") == [given["mode"], "3"]) is is_included
+    assert found.pop("robot_state_publisher")["params"].keys() == {
+        "publish_frequency",
+        "robot_description",
+        "use_sim_time",
+    }
+    for after_another in ("toolbox", "/once"):
+        expected.pop(after_another, None)
+    assert found == expected
+
+
+INCLUDED = """
+from launch import LaunchDescription
+from launch.actions import ExecuteProcess
+from launch.substitutions import LaunchConfiguration
+def generate_launch_description():
+    return LaunchDescription([
+        ExecuteProcess(cmd=["included", LaunchConfiguration("mode"), LaunchConfiguration("n")])])
+"""

@@ -1,0 +1,196 @@
+"""Shell scripts and lines of a terminal, imported."""
+
+import io
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.bringups import compiled, import_of, places, printed_errors
+from tfcompose.cli import main, reading
+
+
+@pytest.fixture(autouse=True)
+def _input_of_its_own() -> Iterator[None]:
+    reading._standard_input.cache_clear()
+    yield
+    reading._standard_input.cache_clear()
+
+
+def script(folder: Path, text: str) -> Path:
+    file = folder / "start.sh"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_lines_of_a_script_become_frames_and_processes_in_their_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # from where the script is started: its files are named from there
+    source = script(tmp_path, """#!/bin/bash
+source /opt/ros/jazzy/setup.bash
+HEIGHT="0.3"   # metres
+ros2 run tf2_ros static_transform_publisher 0 0 ${HEIGHT} 0 0 0 base_link lidar &
+rosrun tf static_transform_publisher 0 0 0 -1.5707963 0 -1.5707963 \\
+    lidar optical 100
+export RCUTILS_COLORIZED_OUTPUT=1
+ROS_DOMAIN_ID=3 ros2 run drive node --ros-args -r __node:=base -r __ns:=/front -p rate:=20 -p 'name:="x y"' \\
+  --params-file drive.yaml -r scan:=front/scan --log-level debug >/tmp/log 2>&1 &
+ros2 launch camera rs.launch.py name:=front
+python3 scripts/mission.py --fast
+wait
+""")  # fmt: skip
+    (tmp_path / "drive.yaml").write_text(
+        "/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8"
+    )
+    _, data = import_of(source, code=None)
+    assert data["frames"] == {
+        "base_link": {},
+        "lidar": {"parent": "base_link", "xyz": [0, 0, 0.3]},
+        "optical": {"parent": "lidar", "rpy": [-1.5707963, 0, -1.5707963]},
+    }
+    assert list(data["processes"]) == ["base", "rs", "mission"]
+    base = data["processes"]["base"]
+    file = base["params"].pop("file")
+    assert ((tmp_path / file).is_file(), base["params"]) == (True, {"rate": 20, "name": "x y"})
+    assert base["run"] == {"package": "drive", "executable": "node"}
+    assert (base["namespace"], base["remap"], base["log_level"]) == (
+        "front",
+        {"scan": "front/scan"},
+        "debug",
+    )
+    assert base["env"] == {"RCUTILS_COLORIZED_OUTPUT": "1", "ROS_DOMAIN_ID": "3"}
+    assert data["processes"]["rs"]["run"] == {
+        "launch": "camera/rs.launch.py",
+        "args": {"name": "front"},
+    }
+    assert data["processes"]["mission"]["run"] == ["python3", "scripts/mission.py", "--fast"]
+
+
+def test_what_only_a_shell_can_do_is_a_comment_and_a_finding(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = script(tmp_path, """ros2 run tf2_ros static_transform_publisher 0 0 1 0 0 0 base_link a
+sleep 3
+for i in 1 2; do ros2 run drive node --id $i & done
+ros2 run drive node --host $(hostname)
+ros2 bag play x | tee log
+ros2 run tf2_ros static_transform_publisher 0 0 1 0 0 0 base_link b 100
+ros2 run tf2_ros static_transform_publisher 0 0 2 0 0 0 base_link a
+""")  # fmt: skip
+    text, data = import_of(source)
+    assert set(data["frames"]) == {"base_link", "a"}
+    assert "processes" not in data
+    found = places(printed_errors(capsys), "TF020")
+    assert sorted(set(found)) == [f"start.sh:{line}" for line in range(2, 8)]
+    for line in range(2, 8):
+        assert f"start.sh:{line}: " in text
+
+
+def test_a_program_that_only_shows_or_runs_once_is_no_process(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data = import_of(
+        script(tmp_path, "ls -la\nmkdir -p log\npkill gzserver\nros2 run drive node\n")
+    )
+    assert list(data["processes"]) == ["node"]
+    assert places(printed_errors(capsys), "TF020") == ["start.sh:2", "start.sh:3"]
+
+
+def test_degrees_are_not_guessed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = script(
+        tmp_path, "ros2 run tf2_ros static_transform_publisher 0 0 1 90 0 0 base_link a\n"
+    )
+    _, data = import_of(source)
+    assert data["frames"]["a"]["rpy"] == [0, 0, 90]
+    assert "TF410" in printed_errors(capsys)
+
+
+def test_lines_come_from_standard_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = (
+        b"$ ros2 run tf2_ros static_transform_publisher --frame-id base_link --child-frame-id a"
+        b" --x 1\n"
+    )
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(line)))
+    assert main(["import", "-"]) == 0
+    result = compiled(capsys.readouterr().out, tmp_path)
+    assert result.robot
+    assert [(edge.name, edge.pose.xyz) for edge in result.robot.edges] == [
+        ("base_link → a", (1, 0, 0))
+    ]
+
+
+PUBLISH = "ros2 run tf2_ros static_transform_publisher 0 0 1 0 0 0 base_link"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"  512  {PUBLISH} a",
+        f" 513* 2026-01-02 10:00:00 {PUBLISH} a",
+        f"me@host:~/ws$ {PUBLISH} a",
+        f"$ {PUBLISH} a",
+        f"nohup {PUBLISH} a >/dev/null 2>&1 &",
+        f"xterm -e {PUBLISH} a &",
+        f'gnome-terminal -- bash -c "{PUBLISH} a; exec bash"',
+        f"bash -c 'source /opt/ros/jazzy/setup.bash && {PUBLISH} a'",
+        '<node pkg="tf2_ros" exec="static_transform_publisher" args="0 0 1 0 0 0 base_link a"/>',
+    ],
+)
+def test_what_stands_around_a_command_in_a_terminal_is_no_part_of_it(
+    line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        sys,
+        "stdin",
+        io.TextIOWrapper(io.BytesIO(f"{line}\n 600  history | grep static\n".encode())),
+    )
+    assert main(["import", "-"]) == 0
+    result = compiled(capsys.readouterr().out, tmp_path)
+    assert result.robot
+    assert [(edge.name, edge.pose.xyz) for edge in result.robot.edges] == [
+        ("base_link → a", (0, 0, 1))
+    ]
+    assert not [one.name for one in result.robot.processes if one.argv]
+
+
+def test_a_publisher_behind_an_unknown_program_is_named_and_prefixes_stay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = script(tmp_path, f"""export ROS_DOMAIN_ID=7
+{PUBLISH} a
+sudo {PUBLISH} b
+tmux send-keys -t tf "{PUBLISH} c" C-m
+nice -n 5 ros2 run drive node
+{PUBLISH} d 100
+""")  # fmt: skip
+    _, data = import_of(source)
+    assert set(data["frames"]) == {"base_link", "a"}
+    assert data["ros"] == {"domain_id": 7}
+    assert list(data["processes"].values()) == [
+        {"run": {"package": "drive", "executable": "node"}, "prefix": ["nice", "-n", "5"]}
+    ]
+    assert places(printed_errors(capsys), "TF020") == [f"start.sh:{line}" for line in (3, 4, 6)]
+
+
+def test_a_text_without_anything_of_ros_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "passwd"
+    source.write_text("root:x:0:0:root:/root:/bin/bash\n", encoding="utf-8")
+    assert main(["import", str(source)]) == 1
+    assert places(printed_errors(capsys), "TF002") == ["passwd:1"]
+
+
+@pytest.mark.parametrize("word", ["x:=1", "more.sh"])
+def test_a_script_takes_neither_arguments_nor_a_second_file(word: str, tmp_path: Path) -> None:
+    source = script(tmp_path, "ros2 run drive node\n")
+    assert main(["import", str(source), word]) == 2
+
+
+def test_a_source_that_starts_nothing_is_refused(tmp_path: Path) -> None:
+    source = script(tmp_path, "echo hello\n")
+    assert main(["import", str(source)]) == 1

@@ -1,0 +1,206 @@
+"""The view of a tree that really runs, beside a tf listener as the oracle."""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import viser
+
+from tests.support.robots import EXTERNAL
+from tests.support.waiting import in_one_of_a_few, until
+from tests.tools.view.test_view import session_of
+from tfcompose.cli.live_view import Following, observers_of
+from tfcompose.compiler.emit.plan import plan_of
+from tfcompose.foundation.geometry import Offset, Pose, offset_of
+from tfcompose.foundation.signals import Stop
+from tfcompose.model.plan.file import write_plan
+from tfcompose.tools.view.panel import Panel
+from tfcompose.tools.view.reload import Files, ReloadedPanel
+from tfcompose.tools.view.server import started, stop
+from tfcompose.tools.view.session import Session
+
+pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
+
+
+@dataclass(frozen=True)
+class View:
+    """A view that follows a tree."""
+
+    server: viser.ViserServer
+    shown: ReloadedPanel
+    following: Following
+    changed: threading.Event
+
+    @property
+    def panel(self) -> Panel:
+        return self.shown.panel
+
+    @property
+    def is_red(self) -> bool:
+        return self.server.scene.get_handle_by_name("/live/wrong") is not None
+
+
+WHEEL = """
+tfcompose: 1
+robot: r
+links: {base_link: {}, wheel: {}}
+joints: {w: {type: continuous, parent: base_link, child: wheel, xyz: [0, 0.2, 0], axis: [0, 1, 0]}}
+"""
+
+
+@contextmanager
+def following(session: Session, *, joints: bool = False) -> Iterator[View]:
+    """Show the robot that runs in the test's domain."""
+    files, changed = Files(lambda one: Path(one).read_text("utf-8")), threading.Event()
+    for file in session.texts:
+        files(file)
+    server, ending = started("127.0.0.1", 0, "test"), Stop()
+    shown = ReloadedPanel(server, session, files, edit=False, joints=joints)
+    follows = Following(server, shown, changed, Offset(1e-3, 1e-3), joints=joints)
+    observers = observers_of(plan_of(session.robot))
+    thread = threading.Thread(target=follows.run, args=(observers, ending))
+    thread.start()
+    try:
+        yield View(server, shown, follows, changed)
+    finally:
+        ending.request()
+        thread.join()
+        stop(server)
+
+
+@pytest.fixture
+def view(tmp_path: Path) -> Iterator[View]:
+    """A view that follows the tree of a rover whose owners are the test's."""
+    file = tmp_path / "rover.yaml"
+    file.write_text(EXTERNAL, "utf-8")
+    with following(session_of(file)) as shown:
+        yield shown
+
+
+def wheel_process(folder: Path, start: Callable[..., Any]) -> Session:
+    """Start what publishes the wheel's frame from joint states; return the robot's session."""
+    file = folder / "rover.yaml"
+    file.write_text(WHEEL, "utf-8")
+    session = session_of(file)
+    (folder / "plan.json").write_text(write_plan(plan_of(session.robot)), "utf-8")
+    (folder / "robot.full.urdf").write_text("<robot name='r'/>", "utf-8")
+    start("tfcompose.launcher.publishers.joints", folder / "plan.json", "joints")
+    return session
+
+
+def pose_in(buffer: Any, parent: str, child: str) -> Pose | None:
+    """Return the newest pose that a tf listener has, or None."""
+    from rclpy.time import Time  # noqa: PLC0415 (as above)
+
+    if not buffer.can_transform(parent, child, Time()):
+        return None
+    found = buffer.lookup_transform(parent, child, Time()).transform
+    xyz, quat = found.translation, found.rotation
+    return Pose((xyz.x, xyz.y, xyz.z), (quat.x, quat.y, quat.z, quat.w))
+
+
+def test_frames_are_where_a_tf_listener_has_them(view: View, nodes: Any) -> None:
+    from tfcompose.tf.tf2 import Buffer, TransformListener  # noqa: PLC0415 (as above)
+
+    panel = view.panel
+    nodes.latched(
+        nodes.node("tfcompose_static"),
+        ("base_link", "lidar", (0.0, 0.0, 0.3), (0.0, 0.0, 0.0, 1.0)),
+    )
+    nodes.moving(nodes.node("diff_drive"), "odom base_link", quat=(0.0, 0.6, 0.0, 0.8))
+    with TransformListener(buffer := Buffer()):
+
+        def is_there() -> bool:
+            pose = pose_in(buffer, "odom", "lidar")
+            if pose is None or panel.published is None:
+                return False
+            shown = panel.published["odom"].inverse() @ panel.published["lidar"]
+            return pose.xyz != (0, 0, 0.3) and max(offset_of(pose, shown)) < 1e-6
+
+        assert until(is_there)
+
+
+def test_a_rogue_publisher_makes_its_edge_red_within_a_second(view: View, nodes: Any) -> None:
+    from tests.support.fake_nodes import sending  # noqa: PLC0415 (as above)
+
+    panel = view.panel
+    nodes.latched(
+        nodes.node("tfcompose_static"),
+        ("base_link", "lidar", (0.0, 0.0, 0.3), (0.0, 0.0, 0.0, 1.0)),
+    )
+    nodes.moving(nodes.node("diff_drive"), "odom base_link", hz=20)
+    assert until(lambda: panel.published is not None and not view.is_red)
+
+    def is_found(number: int) -> bool:
+        """A rogue comes, is found in time, and leaves."""
+        assert until(lambda: not view.is_red)
+        with sending(f"rogue{number}", "odom", "base_link", rate=20) as sent:
+            begun = time.monotonic()
+            assert until(lambda: view.is_red)
+            took_s = time.monotonic() - begun
+            assert sent()
+            assert [one.code for one in view.following.tree.judgement.found] == ["TF801"]
+            assert f"/rogue{number}" in view.following.tree.judgement.found[0].message
+        return took_s < 1
+
+    assert in_one_of_a_few(is_found)
+
+
+def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_moves_it(
+    tmp_path: Path, start: Callable[..., Any], nodes: Any
+) -> None:
+    from sensor_msgs.msg import JointState  # noqa: PLC0415 (as above)
+
+    from tfcompose.tf.tf2 import Buffer, TransformListener  # noqa: PLC0415 (as above)
+
+    session, angle = wheel_process(tmp_path, start), math.radians(40)
+    with following(session, joints=True) as view, TransformListener(buffer := Buffer()):
+
+        def is_at(expected: float) -> bool:
+            pose = pose_in(buffer, "base_link", "wheel")
+            if pose is None or view.panel.published is None:
+                return False
+            shown = view.panel.published["wheel"]
+            return (
+                pose.xyz == shown.xyz == (0, 0.2, 0)
+                and pose.rpy[1] == pytest.approx(expected) == shown.rpy[1]
+            )
+
+        view.panel.set_joint("w", angle)
+        assert until(lambda: is_at(angle))
+        nodes.typed(
+            nodes.node("jsp"),
+            JointState,
+            "/joint_states",
+            lambda _: JointState(name=["w"], position=[-0.5]),
+        )
+        assert until(lambda: [one.state for one in view.following.senders] == ["stopped"])
+        assert until(lambda: view.following.senders[0].others_found == ("/jsp",))
+
+
+def test_a_file_that_changes_is_followed_from_then_on(
+    view: View, nodes: Any, tmp_path: Path
+) -> None:
+    nodes.latched(
+        nodes.node("tfcompose_static"),
+        ("base_link", "lidar", (0.0, 0.0, 0.3), (0.0, 0.0, 0.0, 1.0)),
+    )
+    nodes.moving(nodes.node("diff_drive"), "odom base_link")
+    assert until(lambda: view.panel.published is not None)
+    moved = EXTERNAL.replace("xyz: [0, 0, 0.3]", "xyz: [0, 0, 0.4]")
+    (tmp_path / "rover.yaml").write_text(moved, "utf-8")
+    view.changed.set()
+    assert until(lambda: [one.code for one in view.following.tree.judgement.found] == ["TF846"])
+    assert until(lambda: view.server.scene.get_handle_by_name("/ghost/2") is not None)
+    (tmp_path / "rover.yaml").write_text(EXTERNAL + "  odom2: [\n", "utf-8")
+    view.changed.set()
+    assert until(lambda: "TF" in view.shown.found)
+    (tmp_path / "rover.yaml").write_text(EXTERNAL, "utf-8")
+    view.changed.set()
+    assert until(lambda: not view.following.tree.judgement.found and not view.shown.found)

@@ -1,0 +1,209 @@
+"""Files that change on disk are shown again; a broken one leaves the last good scene."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from tests.support.tables import for_each
+from tests.support.waiting import until
+from tfcompose.cli.parser import parser_of
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.view_session import session_of
+from tfcompose.foundation.geometry import Pose
+from tfcompose.tools.view.reload import Files, ReloadedPanel, Watcher
+from tfcompose.tools.view.server import started, stop
+
+TEXT = """tfcompose: 1
+robot: r
+include: [more.yaml]
+links: {base_link: {}, arm: {}}
+joints: {j: {type: continuous, parent: base_link, child: arm, xyz: [0, 0, 1], axis: [0, 0, 1]}}
+frames: {tool: {parent: arm, xyz: [1, 0, 0]}}
+"""
+BROKEN = {
+    "no YAML": "tfcompose: [1\n",
+    "an unknown key": TEXT.replace("links:", "lnks:"),
+    "no frames": "tfcompose: 1\nrobot: r\n",
+    "empty": "",
+}
+
+
+@pytest.fixture
+def shown(tmp_path: Path) -> Iterator[ReloadedPanel]:
+    (tmp_path / "r.yaml").write_text(TEXT, "utf-8")
+    (tmp_path / "more.yaml").write_text(
+        "frames: {mast: {parent: base_link, xyz: [0, 0, 2]}}\n", "utf-8"
+    )
+    files = Files(read_text)
+    session = session_of(
+        str(tmp_path / "r.yaml"), parser_of("view").parse_args([str(tmp_path / "r.yaml")]), files
+    )
+    server = started("127.0.0.1", 0, "test")
+    yield ReloadedPanel(server, session, files, edit=True, joints=True)
+    stop(server)
+
+
+def replace(path: Path, text: str) -> None:
+    """Replace a file as editors do."""
+    new = path.with_suffix(".new")
+    new.write_text(text, "utf-8")
+    new.replace(path)
+
+
+def test_a_changed_file_is_shown_and_what_the_user_chose_stays(
+    shown: ReloadedPanel, tmp_path: Path
+) -> None:
+    shown.panel.tree.select("tool")
+    shown.panel.set_joint("j", 0.5)
+    replace(
+        tmp_path / "r.yaml",
+        TEXT.replace("[1, 0, 0]}}", "[1, 0, 0]}, hook: {parent: tool, xyz: [0, 0, 1]}}"),
+    )
+    assert shown.reload()
+    assert "hook" in shown.panel.poses()
+    assert shown.panel.selected == "tool"
+    assert shown.panel.positions == {"j": 0.5}
+    assert not shown.reload()
+
+
+def test_what_was_hidden_opened_and_chosen_outlives_reloads_where_it_still_exists(
+    shown: ReloadedPanel, tmp_path: Path
+) -> None:
+    for owner in ("joints", "nobody"):
+        shown.panel.choices.owners[owner] = False
+    shown.panel.choices.is_open["arm"] = False
+    shown.panel.choices.base = "mast"
+    shown.panel.tree.show("arm", shown=False)
+    shown.panel.tree.select("mast")
+    shown.panel.tree.search("a")
+    replace(
+        tmp_path / "r.yaml", TEXT.replace("tool:", "hook: {parent: arm, xyz: [0, 1, 0]}, tool:")
+    )
+    assert shown.reload()
+    assert shown.panel.tree.hidden == {"arm", "tool", "hook"}
+    assert shown.panel.selected == "mast"
+    assert shown.panel.choices.base == "mast"
+    assert shown.panel.choices.search == "a"
+    assert not shown.panel.tree.tree.is_open("arm", shown.panel.choices.is_open)
+    assert not shown.panel.scene.is_owner_shown("joints")
+    assert shown.panel.scene.is_owner_shown("static")
+    (tmp_path / "more.yaml").write_text("{}\n", "utf-8")
+    assert shown.reload()
+    assert shown.panel.selected == "base_link"
+    assert shown.panel.tree.hidden == {"arm", "tool", "hook"}
+
+
+def test_an_included_file_is_one_of_the_robots(shown: ReloadedPanel, tmp_path: Path) -> None:
+    replace(tmp_path / "more.yaml", "frames: {mast: {parent: base_link, xyz: [0, 0, 3]}}\n")
+    assert shown.reload()
+    assert shown.panel.poses()["mast"].xyz == (0, 0, 3)
+
+
+@for_each(BROKEN)
+def test_a_broken_file_leaves_the_last_good_scene_and_is_found_wrong(
+    name: str, shown: ReloadedPanel, tmp_path: Path
+) -> None:
+    before, panel = shown.panel.poses(), shown.panel
+    replace(tmp_path / "r.yaml", BROKEN[name])
+    assert not shown.reload()
+    assert shown.panel is panel
+    assert shown.panel.poses() == before
+    assert "TF" in shown.found
+    replace(tmp_path / "r.yaml", TEXT.replace("[1, 0, 0]}}", "[2, 0, 0]}}"))
+    assert shown.reload()
+    assert not shown.found
+
+
+def test_a_file_that_is_gone_leaves_the_scene(shown: ReloadedPanel, tmp_path: Path) -> None:
+    (tmp_path / "r.yaml").unlink()
+    assert not shown.reload()
+    assert shown.found
+
+
+def test_a_mesh_that_is_changed_is_read_again(shown: ReloadedPanel, tmp_path: Path) -> None:
+    for number, radius in enumerate((1.0, 2.0)):
+        trimesh.creation.icosphere(subdivisions=1, radius=radius).export(tmp_path / "tip.stl")
+        if number == 0:
+            replace(tmp_path / "r.yaml", TEXT.replace("arm: {}", "arm: {visual: {mesh: tip.stl}}"))
+        until(shown.reload)
+        least, most = shown.panel.scene.bounds("arm")
+        assert [*least, *most] == pytest.approx([-radius] * 3 + [radius] * 3, rel=0.2)
+    assert not shown.reload()
+
+
+def test_a_preset_of_the_robot_that_is_changed_is_read_again(
+    shown: ReloadedPanel, tmp_path: Path
+) -> None:
+    preset = tmp_path / "presets" / "own" / "eye.yaml"
+    preset.parent.mkdir(parents=True)
+    text = "preset: 1\nvendor: Own\nmodel: Eye\nkind: imu\nabout: an eye\nmount: '{name}'\n"
+    text += "frames: {'{name}_lens': {parent: '{name}', xyz: [%d, 0, 0]}}\n"
+    preset.write_text(text % 1, "utf-8")
+    sensor = (
+        "preset_path: presets\nsensors: {e: {preset: own/eye, parent: base_link, xyz: [1, 0,"
+        " 0]}}\n"
+    )
+    replace(tmp_path / "r.yaml", TEXT + sensor)
+    assert shown.reload(), shown.found
+    for x in (2, 3):
+        replace(preset, text % x)
+        assert shown.reload(), shown.found
+        edge = shown.session.robot.parent_edge("e_lens")
+        assert edge
+        assert edge.pose.xyz == (x, 0, 0)
+    assert not shown.reload()
+
+
+def test_a_save_is_no_change_on_disk(shown: ReloadedPanel) -> None:
+    shown.panel.tree.select("tool")
+    shown.panel.move(Pose((3, 0, 0)))
+    shown.panel.save()
+    assert "saved" in shown.panel.report.content
+    assert not shown.reload()
+
+
+def test_moves_of_frames_that_stay_are_kept(shown: ReloadedPanel, tmp_path: Path) -> None:
+    shown.session.move("tool", Pose((3, 0, 0)))
+    shown.session.move("mast", Pose((4, 0, 0)))
+    replace(tmp_path / "more.yaml", "{}\n")
+    assert shown.reload()
+    assert shown.session.moved == {"tool": Pose((3, 0, 0))}
+
+
+def test_the_watcher_sees_changes_of_all_files_and_of_those_that_come_later(
+    shown: ReloadedPanel, tmp_path: Path
+) -> None:
+    (tmp_path / "sub").mkdir()
+    with Watcher(shown.files) as watcher:
+        (tmp_path / "other.txt").write_text("x", "utf-8")
+        replace(tmp_path / "r.yaml", TEXT.replace("more.yaml", "sub/more.yaml"))
+        assert until(watcher.changed.is_set)
+        watcher.changed.clear()
+        assert not shown.reload()
+        replace(
+            tmp_path / "sub" / "more.yaml", "frames: {mast: {parent: base_link, xyz: [0, 0, 5]}}\n"
+        )
+        assert until(watcher.changed.is_set)
+        assert until(shown.reload)
+    assert shown.panel.poses()["mast"].xyz == (0, 0, 5)
+
+
+def test_a_robot_that_was_wrong_from_the_begin_is_shown_again_while_it_is_wrong(
+    tmp_path: Path,
+) -> None:
+    wrong = TEXT.replace("parent: arm,", "parent: amr,").replace("include: [more.yaml]\n", "")
+    file = tmp_path / "r.yaml"
+    file.write_text(wrong, "utf-8")
+    files = Files(read_text)
+    session = session_of(str(file), parser_of("view").parse_args([str(file)]), files)
+    server = started("127.0.0.1", 0, "test")
+    try:
+        other = ReloadedPanel(server, session, files, edit=False, joints=False)
+        replace(file, wrong.replace("[0, 0, 1], axis", "[0, 0, 2], axis"))
+        assert other.reload()
+        assert other.panel.poses()["arm"].xyz == (0, 0, 2)
+        assert "TF" in other.found
+    finally:
+        stop(server)

@@ -1,0 +1,17 @@
+"""Judges a ``Robot``: each rule is a function that yields the findings of one code.
+
+A module holds the rules of one family; a rule's docstring is the page that ``tfcompose explain``
+prints. ``check`` runs the rules and applies the comments that allow findings.
+"""
+
+from tfcompose.compiler.check.check import (
+    RULES,
+    apply,
+    check,
+    silenced,
+    unused_allows,
+    with_replaced,
+)
+from tfcompose.compiler.check.rule import Rule
+
+__all__ = ["RULES", "Rule", "apply", "check", "silenced", "unused_allows", "with_replaced"]

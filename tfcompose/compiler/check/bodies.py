@@ -1,0 +1,274 @@
+"""Rules about bodies: inertia, materials, and which description holds them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Material, Robot
+
+
+@rule("TF709", of_urdf=True)
+def inertia_missing(robot: Robot) -> Iterator[Finding]:
+    """A moving body has no mass, but others have.
+
+    Simulators drop a link without inertia and everything attached to it, or refuse the robot;
+    dynamics libraries treat it as massless. Give the link ``inertial: {mass: 0.5 kg}``: the tensor
+    is computed from its shape. Links that are fixed to each other count as one body. A robot in
+    which nothing that moves has a mass, apart from sensors, is for TF only and exempt.
+    """
+    fixed: dict[str, list[str]] = {}
+    for edge in robot.edges:
+        if edge.kind == "static":
+            fixed.setdefault(edge.parent, []).append(edge.child)
+    moving = [
+        edge for edge in robot.edges if (edge.joint or edge.free) and edge.child in robot.links
+    ]
+    masses = {name for name, link in robot.links.items() if link.inertial or link.has_mass}
+    own = masses - {frame for sensor in robot.sensors for frame in (sensor.mount, *sensor.frames)}
+    other = next((edge.child for edge in moving if _has_one(own, fixed, edge.child)), None)
+    for edge in moving if other else ():
+        if not _has_one(masses, fixed, edge.child):
+            at = robot.links[edge.child].at
+            message = f"{edge.child}, moved by {edge.joint_name}, has no mass, but {other} has"
+            advice = '<inertial> with <mass value="…"/> and <inertia …/>'
+            if not robot.is_foreign(at):
+                link = robot.links[edge.child]
+                shape = (
+                    "" if link.visuals or link.collisions else ", visual: {box: [0.1, 0.1, 0.1]}"
+                )
+                advice = f"inertial: {{mass: 0.5 kg}}{shape}"
+            yield finding("TF709", message, at, help=f"add {advice}")
+
+
+def _has_one(names: set[str], fixed: dict[str, list[str]], link: str) -> bool:
+    """Whether the link, or anything that is fixed to it, is one of these."""
+    waiting, passed = [link], set[str]()
+    while waiting:
+        name = waiting.pop()
+        if name in names:
+            return True
+        if name not in passed:
+            passed.add(name)
+            waiting += fixed.get(name, ())
+    return False
+
+
+#: The error of rounding to three digits.
+_ROUNDING = 0.01
+
+
+@rule("TF710", of_urdf=True)
+def impossible_inertia(robot: Robot) -> Iterator[Finding]:
+    """An inertia is physically impossible: not positive definite, or one moment exceeds the sum of the others.
+
+    Simulators refuse it (MuJoCo, Gazebo), or the simulation becomes unstable. Usually a sign was
+    lost, moments and products were swapped, or all are 0. Remove ``inertia`` to have it computed
+    from mass and shape, or take the values from CAD, about the centre of mass.
+    """
+    for link in robot.links.values():
+        inertial = link.inertial
+        if inertial is None or inertial.at is None:
+            continue
+        low, middle, high = _principal(inertial.tensor)
+        why = ""
+        if low <= 0:
+            why = f"smallest principal moment is {low:.3g} kg m²"
+        elif high > (low + middle) * (1 + _ROUNDING):
+            why = f"principal moment {high:.3g} exceeds {low:.3g} + {middle:.3g} kg m²"
+        if why:
+            advice = "remove inertia: it is computed from mass and shape"
+            if robot.is_foreign(inertial.at):
+                advice = "take the tensor from CAD, in kg m² and about the centre of mass"
+            yield finding(
+                "TF710", f"impossible inertia of {link.name}: {why}", inertial.at, help=advice
+            )
+
+
+def _principal(
+    tensor: tuple[float, float, float, float, float, float],
+) -> tuple[float, float, float]:
+    """Return the eigenvalues of the symmetric tensor xx, xy, xz, yy, yz, zz, smallest first (Smith, 1961)."""
+    scale = (
+        max(map(abs, tensor)) or 1.0
+    )  # squares of what a foreign file holds may leave the range of floats
+    xx, xy, xz, yy, yz, zz = (value / scale for value in tensor)
+    mean = (xx + yy + zz) / 3
+    spread = math.sqrt(
+        ((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * (xy**2 + xz**2 + yz**2)) / 6
+    )
+    if spread <= abs(mean) * 1e-12:
+        return (mean * scale, mean * scale, mean * scale)
+    a, b, c, d, e, f = (
+        (xx - mean) / spread,
+        xy / spread,
+        xz / spread,
+        (yy - mean) / spread,
+        yz / spread,
+        (zz - mean) / spread,
+    )
+    half = (a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)) / 2
+    angle = math.acos(max(-1.0, min(1.0, half))) / 3
+    high, low = (
+        mean + 2 * spread * math.cos(angle),
+        mean + 2 * spread * math.cos(angle + math.tau / 3),
+    )
+    return (low * scale, (3 * mean - high - low) * scale, high * scale)
+
+
+_TIMES = 10
+
+
+@rule("TF711", of_urdf=True)
+def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
+    """A link's inertia is at least ten times, or at most a tenth of, what its mass and shape give.
+
+    Usually it is in g mm² or kg cm², about another point than the centre of mass, or copied from
+    another link: in simulation arms swing wildly or hardly move. Remove ``inertia`` to have it
+    computed. The sums of the principal moments are compared, for the visual and the collision
+    shapes at uniform density; the closer one counts.
+    """
+    for link in robot.links.values():
+        inertial = link.inertial
+        if inertial is None or not inertial.of_shapes:
+            continue
+        trace = inertial.tensor[0] + inertial.tensor[3] + inertial.tensor[5]
+        ratios = [trace / of_shape for of_shape in inertial.of_shapes if of_shape > 0]
+        if not ratios or trace <= 0 or any(1 / _TIMES < ratio < _TIMES for ratio in ratios):
+            continue
+        ratio = min(ratios, key=lambda one: abs(math.log(one)))
+        at = inertial.at or link.at
+        message = f"inertia of {link.name} is {ratio:.3g} times what its mass and shape give"
+        advice = "give it in kg m², about the centre of mass"
+        if not robot.is_foreign(at):
+            advice += ", or remove inertia: it is computed"
+        yield finding("TF711", message, at, help=advice)
+
+
+#: Programs that read the description with KDL.
+_KDL_READERS = frozenset({"robot_state_publisher", "moveit_ros_move_group"})
+
+
+@rule("TF712", of_urdf=True)
+def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
+    """The root link has an inertia, which programs that read the URDF with KDL ignore.
+
+    KDL does not support an inertia on the root: it warns at each start, and ignores the mass in
+    dynamics. Add a root without a body: ``base: base_footprint`` with ``base_link: {parent:
+    base_footprint}``. Where nothing uses KDL (tfcompose does not), an inertia on the root is right
+    and not reported; ``robot.urdf``, for the stock robot_state_publisher, is written without it. A
+    URDF is taken to be read by that node, which uses KDL.
+    """
+    root = robot.links.get(robot.base or "")
+    if root is None or root.inertial is None:
+        return
+    if robot.is_foreign(root.at):
+        message = f"root link {root.name} has an inertia, which robot_state_publisher ignores"
+        advice = (
+            "add a root without a body: a link such as base_footprint, and a fixed joint from it"
+            f" to {root.name}"
+        )
+        yield finding("TF712", message, root.at, help=advice)
+        return
+    for process in robot.processes:
+        if (
+            process.package in _KDL_READERS and not process.describes
+        ):  # what tfcompose starts gets a root without one
+            message = f"root link {root.name} has an inertia, which {process.package} ignores"
+            notes = [Note(f"{process.name} is defined here", process.at)]
+            advice = f"give {root.name} a parent without a body, such as base_footprint"
+            yield finding("TF712", message, root.at, help=advice, notes=notes)
+            return
+
+
+@rule("TF713", of_urdf=True)
+def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
+    """Two materials have the same name and different colours.
+
+    URDF readers keep one of them, usually the first, and draw both bodies with it. Rename one of
+    them, or remove its name: then it is named after its colour.
+    """
+    first: dict[str, Material] = {}
+    for link in robot.links.values():
+        for shape in link.visuals:
+            material = shape.material
+            if material is None or not (material.rgba or material.texture):
+                continue
+            other = first.setdefault(material.name, material)
+            if _appearance(other) != _appearance(material):
+                message = f"material {material.name} of {link.name} has another colour than before"
+                notes = [Note(f"{material.name} is first defined here", other.at)]
+                advice = "rename one of them"
+                if not robot.is_foreign(material.at):
+                    advice += ", or give the name only: it then has the colour of the first"
+                yield finding("TF713", message, material.at, help=advice, notes=notes)
+
+
+def _appearance(material: Material) -> tuple[object, ...]:
+    return (material.rgba, material.texture.uri if material.texture else "")
+
+
+@rule("TF714")
+def material_without_colour(robot: Robot) -> Iterator[Finding]:
+    """A material has a name only, and no material of that name has a colour or a texture.
+
+    URDF readers warn about it in their log, and draw the body in a default colour. Give it an
+    ``rgba``, or the name of a material that has one.
+    """
+    shapes = [shape for link in robot.links.values() for shape in link.visuals]
+    used = [shape.material for shape in shapes if shape.material]
+    known = [material.name for material in used if material.rgba or material.texture]
+    for material in dict.fromkeys(used):
+        if not (material.rgba or material.texture) and material.name not in known:
+            advice = did_you_mean(material.name, known, "add rgba: [0.5, 0.5, 0.5, 1]")
+            yield finding(
+                "TF714", f"material {material.name} has no colour", material.at, help=advice
+            )
+
+
+_MOST_LISTED = 5
+
+
+@rule("TF730")
+def body_in_no_urdf(robot: Robot) -> Iterator[Finding]:
+    """A link with a body is not below the base.
+
+    The URDF describes what is below ``base``, so this body is neither drawn nor checked for
+    collisions; its frame is published all the same. Set ``base`` to a frame above it, ``base:
+    map``, or make it a robot of its own: a part with a ``namespace`` has its own description. All
+    such links are one finding.
+    """
+    if robot.base is None:
+        return
+    described = robot.below(robot.base) | {
+        frame for sensor in robot.sensors for frame in sensor.frames
+    }
+    described |= {f"{part.prefix}{name}" for part in robot.parts for name in part.robot.links}
+    bodies = (
+        link for link in robot.links.values() if link.visuals or link.collisions or link.inertial
+    )
+    outside = {link.name: link.at for link in bodies if link.name not in described}
+    tree = next(
+        (robot.below(root) for root in robot.roots() if robot.base in robot.below(root)),
+        set[str](),
+    )
+    first, *others = [name for name in outside if name in tree] or [
+        ""
+    ]  # TF204 is about other trees
+    if first:
+        more = f"; nor {'are' if others[1:] else 'is'} {len(others)} more" if others else ""
+        notes = [Note(f"nor is {name}", outside[name]) for name in others[:_MOST_LISTED]]
+        message = (
+            f"the body of {first} is in no URDF: {first} is not below the base {robot.base}{more}"
+        )
+        advice = (
+            f"set base to a frame above both {first} and {robot.base}, or make {first} a part with"
+            " a namespace"
+        )
+        yield finding("TF730", message, outside[first], help=advice, notes=notes)

@@ -1,0 +1,260 @@
+"""Every rule over one robot, what silences findings, and notes about values that were replaced.
+
+A rule that crashes is a finding, and the others go on. ``# tfcompose: allow TF301 because …``
+silences a finding on its line, or alone on the line above; ``rules`` sets a severity, or ``off``,
+for a whole robot. Findings about text and keys cannot be silenced, since they say that the file
+was not understood; nor can those that leave nothing to build.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check import (
+    bodies,
+    joints,
+    names,
+    optical,
+    ownership,
+    placement,
+    poses,
+    prefixes,
+    processes,
+    sensors,
+    stock,
+    tree,
+)
+from tfcompose.compiler.check.rule import Rule
+from tfcompose.foundation.catalogue import CATALOGUE, can_be_allowed, code_of, similar_words
+from tfcompose.foundation.findings import Allow, Finding, Note, Span, did_you_mean, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from tfcompose.model.robot import Robot
+    from tfcompose.spec.load import Path, Source
+
+    Used = set[tuple[Allow, str]]
+
+
+def by_code(rules: Iterable[Rule]) -> dict[str, Rule]:
+    """Return the rules by code, in the order of codes.
+
+    Raises:
+        ValueError: if two have one code.
+    """
+    table: dict[str, Rule] = {}
+    for rule in sorted(rules, key=lambda rule: rule.code.code):
+        if table.setdefault(rule.code.code, rule) is not rule:
+            raise ValueError(f"two rules have the code {rule.code.code}")
+    return table
+
+
+_FAMILIES = (
+    tree,
+    ownership,
+    stock,
+    prefixes,
+    poses,
+    optical,
+    names,
+    sensors,
+    placement,
+    bodies,
+    joints,
+    processes,
+)
+RULES = by_code(
+    value for family in _FAMILIES for value in vars(family).values() if isinstance(value, Rule)
+)
+
+
+def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]:
+    """Return what the rules find, in no particular order.
+
+    Left out is what merely follows from a value that was refused already, what only this variant
+    of the robot has no use for, and warnings about parts from a URDF: ``lint`` of their files
+    reports them.
+    """
+    found: list[Finding] = []
+    for rule in rules:
+        if rule.idle and robot.is_variant:
+            continue
+        try:
+            found += [
+                _of_part(one, robot)
+                for one in rule.find(robot)
+                if not _is_left_out(one, rule, robot)
+            ]
+        except Exception as error:  # noqa: BLE001 (a rule's fault must not hide the others' findings)
+            message = (
+                f"rule {rule.code.code} {rule.code.name} crashed: {type(error).__name__}: {error}"
+            )
+            found.append(
+                finding(
+                    "TF903",
+                    message,
+                    Span(robot.file),
+                    help="this is a bug in tfcompose: please report it",
+                )
+            )
+    return found
+
+
+def _is_left_out(found: Finding, rule: Rule, robot: Robot) -> bool:
+    at = found.span
+    if at is None:
+        return False
+    if rule.follows == "pose" and any(entry.holds(at) for entry in robot.refused):
+        return True
+    return found.severity == "warning" and at.file in robot.foreign and at.file in robot.part_notes
+
+
+def _of_part(found: Finding, robot: Robot) -> Finding:
+    """Return the finding, with a note for each part whose file it is about."""
+    notes = robot.part_notes.get(found.span.file, ()) if found.span else ()
+    return replace(found, notes=(*found.notes, *notes)) if notes else found
+
+
+def silenced(
+    found: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
+) -> tuple[list[Finding], Used]:
+    """Return what neither a comment nor an entry of ``rules`` silences, and which comments silenced something.
+
+    ``rules`` holds for codes and names a severity, ``off``, or nothing, each with its place; an
+    entry that is neither a code nor a name, or cannot be set, is a finding too.
+    """
+    unknown = _unknown_rules({word: at for word, (_, at) in rules.items()})
+    return apply(
+        [*_with_severities(found, {word: level for word, (level, _) in rules.items()}), *unknown],
+        allows,
+    )
+
+
+def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], Used]:
+    """Return the findings that are not allowed, and which comments silenced something, with the code."""
+    kept: list[Finding] = []
+    used: Used = set()
+    for one in found:
+        allowing = [allow for allow in allows if _covers(allow, one)]
+        if allowing and can_be_allowed(one.code):
+            used.update((allow, one.code) for allow in allowing)
+        else:
+            kept.append(one)
+    return kept, used
+
+
+def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
+    """Return the findings with the severities that the robot's ``rules`` set; those that are ``off`` are left out."""
+    levels = {
+        code: level
+        for word, level in rules.items()
+        if (code := code_of(word)) and can_be_allowed(code)
+    }
+    result = []
+    for one in found:
+        match levels.get(one.code):
+            case "error" | "warning" as severity:
+                result.append(replace(one, severity=severity))
+            case None | "":  # as of an entry that sets a limit only
+                result.append(one)
+    return result
+
+
+def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
+    """Return a finding for each entry of ``rules``, with its place, that is no code or cannot be set."""
+    found = []
+    for word, at in rules.items():
+        code = code_of(word)
+        if code is None:
+            advice = did_you_mean(
+                word, similar_words(word), "write a code that lint prints, such as TF401"
+            )
+            found.append(finding("TF017", f"unknown code {word} under rules", at, help=advice))
+        elif not can_be_allowed(code):
+            found.append(
+                finding(
+                    "TF017",
+                    f"{code} {CATALOGUE[code].name} cannot be set under rules",
+                    at,
+                    help="remove it",
+                )
+            )
+    return found
+
+
+def _covers(allow: Allow, found: Finding) -> bool:
+    at = found.span
+    if at is None or at.file != allow.at.file or found.code not in allow.codes:
+        return False
+    return allow.line <= at.line <= max(allow.line, allow.last)
+
+
+def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
+    """Return a finding for each comment that allows nothing, cannot allow what it names, or gives no reason."""
+    found = []
+    for allow in allows:
+        if not allow.codes:
+            found.append(
+                finding(
+                    "TF012", "allow without a code", allow.at, help="write allow TF401 because …"
+                )
+            )
+        for code in allow.codes:
+            message = ""
+            if code not in CATALOGUE:
+                message = f"allow {code}: unknown code"
+            elif not can_be_allowed(code):
+                message = f"allow {code}: {CATALOGUE[code].name} cannot be allowed"
+            elif (allow, code) not in used:
+                message = f"unused allow {code}: there is no {CATALOGUE[code].name} here"
+            if message:
+                advice = (
+                    did_you_mean(code, CATALOGUE, "remove it")
+                    if code not in CATALOGUE
+                    else "remove it"
+                )
+                found.append(finding("TF012", message, allow.at, help=advice))
+        if allow.codes and not allow.reason:
+            message = f"allow {', '.join(allow.codes)} without a reason"
+            found.append(finding("TF013", message, allow.at, help="add because … after it"))
+    return found
+
+
+_OF_AN_ENTRY = 2  # its section and its name
+
+
+def with_replaced(found: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
+    """Return the findings; one that is about a value which replaced another has a note with the other's place."""
+    overlaid = [source for source in sources if source.replaced]
+    return [replace(one, notes=_with_notes(one, overlaid)) if overlaid else one for one in found]
+
+
+def _with_notes(found: Finding, sources: Iterable[Source]) -> tuple[Note, ...]:
+    notes = found.notes
+    for source in sources:
+        notes = (*notes, *_notes(found, {note.span for note in notes}, source))
+    return notes
+
+
+def _notes(found: Finding, known: set[Span | None], source: Source) -> list[Note]:
+    """Return notes about the value at the finding's place; if none is there, about those of the entry as a whole."""
+    exact, around = [], []
+    for path, (old, *_) in source.replaced.items():
+        now = source.exactly_at(path)
+        if now is None or found.span is None or old in known:
+            continue
+        if now.holds(found.span) or found.span == source.at_key(path):
+            exact.append(Note("it replaces this value", old))
+        elif len(path) > _OF_AN_ENTRY and found.span in _places_of_entry(
+            path[:_OF_AN_ENTRY], source
+        ):
+            name = ".".join(map(str, path[_OF_AN_ENTRY:]))
+            around.append(Note(f"{name} at {now} replaces this value", old))
+    return exact or around
+
+
+def _places_of_entry(entry: Path, source: Source) -> set[Span]:
+    """Return where findings about the whole of an entry are placed: its key, and its parent."""
+    return {source.at_key(entry), source.at((*entry, "parent"))}

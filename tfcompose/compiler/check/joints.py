@@ -1,0 +1,369 @@
+"""Rules about joints: limits, axes, mimics, and what ros2_control does with them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.model.robot import BUILT_IN
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.foundation.catalogue import Severity
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.robot import Joint, Robot
+
+
+@rule("TF701", of_urdf=True)
+def mimic_without_master(robot: Robot) -> Iterator[Finding]:
+    """A joint mimics a joint that does not exist or does not move.
+
+    Its frame would never appear: nobody publishes a position for a joint that is fixed or
+    misspelt. Name a joint that moves, or remove ``mimic``.
+    """
+    joints = [edge.joint for edge in robot.edges if edge.joint]
+    names = {joint.name for joint in joints}
+    fixed = {edge.joint_name for edge in robot.edges if edge.joint_name} - names
+    for joint in joints:
+        if joint.mimic is not None and joint.mimic not in names and not robot.excuses(joint.mimic):
+            message = f"{joint.name}: unknown joint {joint.mimic} under mimic"
+            advice = "name a joint that moves, or remove mimic"
+            if joint.mimic in fixed:
+                message = f"{joint.name} mimics {joint.mimic}, which is fixed"
+            else:
+                advice = did_you_mean(joint.mimic, sorted(names - {joint.name}), advice)
+            yield finding("TF701", message, joint.mimic_at or joint.at, help=advice)
+
+
+@rule("TF702", of_urdf=True)
+def mimic_loop(robot: Robot) -> Iterator[Finding]:
+    """Joints mimic each other in a circle.
+
+    None of them has a position of its own. Remove ``mimic`` from the joint that is actuated.
+    """
+    joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
+    done: set[str] = set()
+    for start in joints:
+        path: dict[str, None] = {}  # in order, and quick to look up
+        name: str | None = start
+        while name in joints and name not in done and name not in path:
+            path[name] = None
+            name = joints[name].mimic
+        if name in path:
+            loop = list(path)[list(path).index(name) :]
+            notes = [Note(f"{other} is defined here", joints[other].at) for other in loop[1:]]
+            message = f"joints mimic each other: {' → '.join([*loop, loop[0]])}"
+            yield finding(
+                "TF702",
+                message,
+                joints[loop[0]].at,
+                notes=notes,
+                help="remove mimic from one of them",
+            )
+        done.update(path)
+
+
+@rule("TF704", of_urdf=True)
+def joint_without_limits(robot: Robot) -> Iterator[Finding]:
+    """A revolute or prismatic joint has no position limits.
+
+    URDF requires limits for these types, and readers refuse the whole robot without them. A joint
+    that turns without limits is ``continuous``. In an existing URDF, limits with effort and
+    velocity only are a warning: readers take lower and upper as 0, so planners and simulators hold
+    the joint there.
+    """
+    for edge in robot.edges:
+        joint = edge.joint
+        if joint is None or joint.type == "continuous":
+            continue
+        ends = (
+            [end for end in (joint.limit.lower, joint.limit.upper) if end is not None]
+            if joint.limit
+            else []
+        )
+        lax = joint.limit is not None and robot.is_foreign(
+            joint.at
+        )  # where one end may be missing
+        if len(ends) == 2 or (lax and ends):  # noqa: PLR2004 (lower and upper)
+            continue
+        usual = (
+            "lower: -90 deg, upper: 90 deg" if joint.type == "revolute" else "lower: 0, upper: 0.1"
+        )
+        advice = f"for example limit: {{{usual}}}"
+        if robot.is_foreign(joint.at):
+            advice = 'for example <limit lower="-1.57" upper="1.57" effort="10" velocity="1"/>'
+        advice += "; a joint without limits is continuous" if joint.type == "revolute" else ""
+        message = f"{joint.type} joint {joint.name} has no lower and upper limit"
+        severity: Severity = "warning" if lax else "error"
+        yield finding("TF704", message, joint.at, help=advice, severity=severity)
+
+
+@rule("TF705", of_urdf=True)
+def inverted_limits(robot: Robot) -> Iterator[Finding]:
+    """A joint's lower limit is above its upper limit.
+
+    No position is valid: planners find no path, and simulators refuse the robot or hold the joint
+    at one limit. Swap the two, or check the sign: ``limit: {lower: -90 deg, upper: 90 deg}``.
+    """
+    for edge in robot.edges:
+        joint = edge.joint
+        if (
+            joint is None
+            or joint.limit is None
+            or joint.limit.lower is None
+            or joint.limit.upper is None
+        ):
+            continue
+        if joint.limit.lower > joint.limit.upper and joint.type != "continuous":
+            unit = "m" if joint.type == "prismatic" else "rad"
+            message = (
+                f"{joint.name}: lower {joint.limit.lower:g} {unit} is above upper"
+                f" {joint.limit.upper:g} {unit}"
+            )
+            yield finding(
+                "TF705", message, joint.at, help="swap lower and upper, or check the sign"
+            )
+
+
+@rule("TF706", of_urdf=True)
+def zero_limit(robot: Robot) -> Iterator[Finding]:
+    """A joint's velocity or effort limit is 0 or negative.
+
+    With velocity 0 the joint never moves: MoveIt cannot time a path, and simulators hold the
+    joint. With effort 0 its motor has no force. Give the motor's values, or remove the key: then
+    there is no limit. Mimic joints and continuous joints, such as free wheels, may have an effort
+    of 0.
+    """
+    for edge in robot.edges:
+        joint = edge.joint
+        if joint is None or joint.limit is None:
+            continue
+        driven = joint.type != "continuous" and joint.mimic is None
+        values = {
+            "velocity": joint.limit.velocity,
+            "effort": joint.limit.effort if driven else None,
+        }
+        for name, value in values.items():
+            if value is not None and value <= 0:
+                message = f"{joint.name}: {name} limit is {value:g}"
+                advice = f"give the motor's {name}, or remove it"
+                yield finding("TF706", message, joint.at, help=advice)
+
+
+#: The error of two decimals: [0.71, 0.71, 0] has length 1.004.
+_AXIS_TOLERANCE = 0.02
+
+
+@rule("TF707", of_urdf=True)
+def axis_not_unit(robot: Robot) -> Iterator[Finding]:
+    """A joint's axis does not have length 1.
+
+    An axis is a direction, and URDF asks for a unit vector. tfcompose normalises it, but other
+    readers, such as yourdfpy, scale a prismatic joint's motion by its length. Often a digit or a
+    sign was lost. Write [0, 0, 1], or [0.7071, 0, 0.7071].
+    """
+    for edge in robot.edges:
+        joint = edge.joint
+        if joint and abs(joint.axis_length - 1) > _AXIS_TOLERANCE:
+            axis = ", ".join(f"{part:.4g}" for part in joint.axis)
+            message = f"{joint.name}: axis has length {joint.axis_length:.4g}, not 1"
+            yield finding("TF707", message, joint.at, help=f"the unit vector is [{axis}]")
+
+
+#: No more joints are followed than this.
+_MOST_MIMICS = 100
+
+
+@rule("TF708", of_urdf=True)
+def mimic_chain(robot: Robot) -> Iterator[Finding]:
+    """A joint mimics a joint that mimics another one.
+
+    tfcompose resolves such chains. The stock robot_state_publisher goes through the joints once,
+    in alphabetical order, so a joint that comes before the one it mimics lags behind or never
+    appears; Gazebo and ros2_control do not support chains at all. Let the joint mimic the last one
+    of the chain directly, with the product of the multipliers.
+    """
+    joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
+    for joint in joints.values():
+        middle = joints.get(joint.mimic or "")
+        if (
+            middle is None
+            or middle.mimic not in joints
+            or middle.mimic in {joint.name, middle.name}
+        ):
+            continue
+        if joints[middle.mimic].mimic is not None and _loops(joints, joint.name):
+            continue
+        multiplier = joint.multiplier * middle.multiplier
+        offset = joint.multiplier * middle.offset + joint.offset
+        end = f", offset: {offset:g}" if offset else ""
+        message = f"{joint.name} mimics {middle.name}, which mimics {middle.mimic}"
+        notes = [Note(f"{middle.name} is defined here", middle.at)]
+        advice = f"write mimic: {{joint: {middle.mimic}, multiplier: {multiplier:g}{end}}}"
+        if robot.is_foreign(joint.at):
+            end = f' offset="{offset:g}"' if offset else ""
+            advice = f'write <mimic joint="{middle.mimic}" multiplier="{multiplier:g}"{end}/>'
+        yield finding("TF708", message, joint.at, help=advice, notes=notes)
+
+
+def _loops(joints: dict[str, Joint], name: str) -> bool:
+    """Whether the joint mimics itself in the end; that is TF702."""
+    passed: set[str] = set()
+    while name in joints and name not in passed and len(passed) < _MOST_MIMICS:
+        passed.add(name)
+        name = joints[name].mimic or ""
+    return name in passed
+
+
+@rule("TF715")
+def joint_without_owner(robot: Robot) -> Iterator[Finding]:
+    """A planar or floating joint has no owner.
+
+    Joint states hold one position for each joint, and these joints need three and six: neither
+    tfcompose nor robot_state_publisher can place the child. Name the process that publishes the
+    edge as its owner: odometry, a simulator, or a simulated process (``simulate: {fixed: {}}``).
+    """
+    for edge in robot.edges:
+        joint = edge.free
+        if joint and edge.owner in BUILT_IN:
+            message = (
+                f"{joint.type} joint {joint.name} has no owner, and joint states cannot place"
+                f" {edge.child}"
+            )
+            advice = "add owner: the process that publishes the edge"
+            if robot.is_foreign(joint.at):  # URDF has no owners
+                advice = (
+                    "convert the file with tfcompose import, and give the joint an owner there"
+                )
+            yield finding("TF715", message, edge.owner_at or joint.at, help=advice)
+
+
+@rule("TF716", of_urdf=True)
+def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
+    """A safety controller's soft limits are not within the joint's limits, or leave no range.
+
+    The controller starts to hold the joint back at the soft limits; if those are beyond the
+    joint's limits it does so too late, or never. The default of both is 0, as in URDF.
+    """
+    for edge in robot.edges:
+        joint = edge.joint
+        safety, limit = (joint.safety, joint.limit) if joint else (None, None)
+        if joint is None or safety is None:
+            continue
+        low, high = safety.soft_lower_limit, safety.soft_upper_limit
+        hard = (limit.lower, limit.upper) if limit else (None, None)
+        inside = (hard[0] is None or hard[0] <= low) and (hard[1] is None or high <= hard[1])
+        if joint.type != "continuous" and not (inside and low < high):
+            message = f"{joint.name}: soft limits {low:g} to {high:g} are not within its limits"
+            advice = "set soft_lower_limit and soft_upper_limit to values between lower and upper"
+            yield finding("TF716", message, joint.at, help=advice)
+
+
+@rule("TF717", of_urdf=True)
+def interface_claimed_twice(robot: Robot) -> Iterator[Finding]:
+    """Two hardware components of ros2_control have the same interface of the same joint.
+
+    The controller manager refuses the second one, and no controller starts. One component drives a
+    joint; a second one may have other interfaces of it.
+    """
+    first: dict[tuple[str, str, str], tuple[str, Span]] = {}
+    for hardware in robot.hardware:
+        for component in hardware.components:
+            for way, interfaces in (("command", component.command), ("state", component.state)):
+                for interface in interfaces:
+                    claim = (component.name, way, interface.name)
+                    other, at = first.setdefault(claim, (hardware.name, component.at))
+                    if at != component.at:
+                        message = (
+                            f"{hardware.name} and {other} both have the {way} interface"
+                            f" {claim[0]}/{claim[2]}"
+                        )
+                        notes = [Note(f"{other} has it here", at)]
+                        yield finding(
+                            "TF717",
+                            message,
+                            component.at,
+                            help="remove it from one of them",
+                            notes=notes,
+                        )
+
+
+@rule("TF718", of_urdf=True)
+def mimic_joint_commanded(robot: Robot) -> Iterator[Finding]:
+    """A mimic joint has a command interface.
+
+    It cannot both mimic a joint and be commanded: ros2_control refuses the whole hardware. Keep
+    its state interfaces only, and command the joint that it mimics.
+    """
+    mimics = {
+        edge.joint.name: edge.joint
+        for edge in robot.edges
+        if edge.joint and edge.joint.mimic is not None
+    }
+    for hardware in robot.hardware:
+        for component in hardware.components:
+            joint = mimics.get(component.name)
+            if joint and component.kind == "joint" and component.command:
+                names = ", ".join(interface.name for interface in component.command)
+                message = (
+                    f"{joint.name} mimics {joint.mimic}, but {hardware.name} commands its {names}"
+                )
+                notes = [Note(f"{joint.name} is defined here", joint.at)]
+                yield finding(
+                    "TF718",
+                    message,
+                    component.at,
+                    help="keep only its state interfaces",
+                    notes=notes,
+                )
+
+
+_MOST_LISTED = 5
+
+
+@rule("TF728", of_urdf=True)
+def joint_named_like_a_frame(robot: Robot) -> Iterator[Finding]:
+    """A joint has the same name as a link or frame.
+
+    URDF allows that. Gazebo converts it to SDF, where links, joints and frames share one
+    namespace, and refuses the robot: the joint "has a name collision". Name the joint after its
+    link, with ``_joint`` at the end. All joints of a robot are one finding.
+    """
+    named = {
+        edge.joint_name: edge.joint_at or edge.at
+        for edge in robot.edges
+        if edge.joint_name in robot.frames
+    }
+    named.pop("", None)
+    if named:
+        first, *others = named
+        kind = "link" if first in robot.links else "frame"
+        notes = [Note(f"the {kind} is defined here", robot.frames[first])]
+        notes += [Note(f"so has {name}", named[name]) for name in others[:_MOST_LISTED]]
+        more = f", and {len(others)} more {'have' if others[1:] else 'has'}" if others else ""
+        message = f"joint {first} has the same name as a {kind}{more}"
+        yield finding(
+            "TF728", message, named[first], help=f"name it {first}_joint, for example", notes=notes
+        )
+
+
+@rule("TF731", of_urdf=True)
+def negative_damping(robot: Robot) -> Iterator[Finding]:
+    """A joint's damping or friction is negative.
+
+    It would drive the joint instead of slowing it down. Drake refuses a robot with negative
+    damping, and pinocchio one with negative friction. The default of both is 0.
+    """
+    for edge in robot.edges:
+        joint = edge.joint
+        if joint is None or joint.dynamics is None:
+            continue
+        for name, value in (
+            ("damping", joint.dynamics.damping),
+            ("friction", joint.dynamics.friction),
+        ):
+            if value < 0:
+                message = f"{joint.name}: {name} is {value:g}"
+                yield finding("TF731", message, joint.at, help="give 0 or more, or remove it")

@@ -1,0 +1,145 @@
+"""Rules about names of frames, joints, processes, nodes and variables."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, Span, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.foundation.catalogue import Severity
+    from tfcompose.model.robot import Robot
+
+
+_GOOD = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
+#: What URDF and TF take, and a person can type.
+_TAKEN = r"[\w.:+@-]+(/[\w.:+@-]+)*"
+#: What no listener can look up, or no XML file can hold.
+_LOST = r"(?s)|/.*|\s.*|.*\s|.*[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff].*"
+_PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
+_LAUNCHER = "tfcompose"
+_NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+
+
+@rule("TF501", of_urdf=True)
+def bad_frame_name(robot: Robot) -> Iterator[Finding]:
+    """The name of a frame, joint, process or node is not valid for tf2, URDF, ROS or the file system.
+
+    tf2 strips a leading slash, the parameter file of a process is named after it, and spaces,
+    quotes and ``&`` break something sooner or later. Use letters, digits and ``_``, and a slash
+    only between a prefix and a name. No part of a node's name begins with a digit. Hyphens, dots,
+    colons and non-ASCII letters, as in ``base_link-base_fixed_joint``, are warnings: URDF and TF
+    accept them, but parameters and topics that are named after the frame or joint cannot have
+    them. In an existing URDF, every name that can be looked up is only a warning.
+    """
+    names: dict[str, Span] = dict(robot.frames)
+    for edge in robot.edges:
+        names.setdefault(edge.child, edge.child_at or edge.at)
+        if edge.joint_name:
+            names.setdefault(edge.joint_name, edge.joint_at or edge.at)
+    for name, at in names.items():
+        if not _GOOD.fullmatch(name):
+            taken = re.fullmatch(_TAKEN, name) or (
+                robot.is_foreign(at) and not re.fullmatch(_LOST, name)
+            )
+            yield _invalid(name, at, "name", "warning" if taken else "error")
+    for process in robot.processes:
+        if not _PROCESS.fullmatch(process.name):
+            yield _invalid(process.name, process.at, "process name")
+        elif process.name == _LAUNCHER:
+            message = (
+                f"a process cannot be called {_LAUNCHER}: logs and findings use that name for the"
+                " launcher"
+            )
+            yield finding("TF501", message, process.at, help="give the process another name")
+        elif (process.package or process.kind != "run" or process.params) and not _NODE.fullmatch(
+            process.node
+        ):
+            yield _invalid(process.node, process.at, "node name")
+
+
+def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Finding:
+    bare = name.lstrip("/")
+    if what == "name" and bare != name and _GOOD.fullmatch(bare):
+        return finding(
+            "TF501",
+            f"invalid {what} {name!r}",
+            at,
+            help=f"write {bare}: tf2 drops a leading slash",
+        )
+    better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
+    advice = (
+        f"for example {better}"
+        if _GOOD.fullmatch(better) and better != name.strip("/")
+        else _ALLOWED
+    )
+    message = f"invalid {what} {name!r}"
+    if severity == "warning":
+        message = f"{what} {name!r} has characters that no parameter or topic can have"
+    return finding("TF501", message, at, help=advice, severity=severity)
+
+
+_ALLOWED = "use letters, digits and _; a node's name does not begin with a digit"
+
+
+@rule("TF503", of_urdf=True)
+def upper_case_name(robot: Robot) -> Iterator[Finding]:
+    """A frame's name has upper case letters.
+
+    ``Base_link`` and ``base_link`` are two frames for tf2 but look alike to people: a lookup
+    fails, and nobody sees why. ROS names are lower case with underscores, ``left_wheel_link``.
+    Frames of presets are exempt, and all frames of a robot are one finding; if the vendor's names
+    are upper case, write ``rules: {TF503: off}``.
+    """
+    presets = [sensor for sensor in robot.sensors if sensor.name == sensor.name.lower()]
+    inside = {frame for sensor in presets for frame in (sensor.mount, *sensor.frames)}
+    bad = {
+        name: at
+        for name, at in robot.frames.items()
+        if name != name.lower() and name not in inside
+    }
+    if bad:
+        first, *others = bad
+        known = {name.lower(): name for name in robot.frames if name == name.lower()}
+        more = f" and {len(others)} more" if others else ""
+        message = f"upper case letters in frame name {first}{more}"
+        notes = [
+            Note(f"{name} and {lower} are two frames", at)
+            for name, at in bad.items()
+            if (lower := known.get(name.lower()))
+        ]
+        notes += [Note(f"also in {name}", bad[name]) for name in others[:_MOST_LISTED]]
+        yield finding("TF503", message, bad[first], help=_lower_case(first), notes=notes)
+
+
+_MOST_LISTED = 5
+
+
+def _lower_case(name: str) -> str:
+    apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    return f"for example {apart}"
+
+
+@rule("TF504", idle=True)
+def unused_variable(robot: Robot) -> Iterator[Finding]:
+    """A variable or an argument is not used.
+
+    Probably its value is still written where the variable was meant to be, and changing the
+    variable has no effect. Use it, ``"${mast}"``, or remove it. Variables that only a profile
+    uses, or that come from an included file, are exempt.
+    """
+    for (section, name), at in robot.unused.items():
+        if at.file == robot.file and (section, name) not in robot.broken:
+            what, expression = (
+                ("argument", f"args.{name}") if section == "args" else ("variable", name)
+            )
+            yield finding(
+                "TF504",
+                f"unused {what} {name}",
+                at,
+                help=f'use it, "${{{expression}}}", or remove it',
+            )

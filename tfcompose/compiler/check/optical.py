@@ -1,0 +1,191 @@
+"""Rules about optical frames: that a camera has one, and that it is rotated as REP-103 has it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.poses import CAMERAS
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.geometry import (
+    IDENTITY_XYZW,
+    OPTICAL_XYZW,
+    angle_between,
+    multiply,
+    quat_from_rpy,
+    rotate,
+)
+from tfcompose.model.robot import OPTICAL_ENDINGS, is_optical
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.foundation.geometry import Quaternion
+    from tfcompose.model.robot import Edge, Robot
+
+_TOLERANCE_RAD = 2e-3
+
+_QUARTERS = (0.0, math.pi / 2, math.pi, -math.pi / 2)
+#: All rotations by right angles, several times over.
+_RIGHT_ANGLES = tuple(quat_from_rpy(*angles) for angles in itertools.product(_QUARTERS, repeat=3))
+
+#: Names of frames with x forward and z up that are no camera's.
+_BASES = frozenset({"base_link", "base_footprint", "base", "chassis_link", "body_link"})
+#: Words in names of camera bodies, of what holds a camera, and of what ends an arm, whose z points
+#: forward.
+_CAMERA_WORDS = frozenset(
+    {"cam", "camera", "color", "colour", "depth", "lens", "rgb", "rgbd", "stereo"}
+)
+_HOLDER_WORDS = frozenset(
+    {"arm", "bar", "base", "bracket", "holder", "mast", "mount", "plate", "pole", "screw"}
+)
+_END_OF_ARM = re.compile(
+    r"(^|_)(tool\d*|flange|tcp|ee|eef|hand|gripper|wrist|palm|link_?\d+)(_|$)"
+)
+#: An optical axis steeper than this looks at the sky.
+_STEEP_RAD = math.radians(45)
+
+
+@rule("TF401", of_urdf=True, follows="pose")
+def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
+    """A frame is named like an optical frame but not rotated like one.
+
+    By REP-103 an optical frame has z forward, x right and y down, and its body frame x forward, y
+    left and z up. The rotation from body to optical frame is rpy [-90 deg, 0, -90 deg]; without it
+    point clouds are turned on their side. It may be divided between several edges of one camera.
+    Rounded constants (−1.57) pass: they are off by 0.0011 rad each. So do frames of presets whose
+    vendor uses other axes (RealSense T265), and measured poses. An optical frame directly on
+    base_link may look anywhere with its image upright; it is reported if it looks at the sky, or
+    by right angles stands on its head or its side. An end of an arm has its own axes, and is no
+    camera body.
+    """
+    above = {edge.child: edge for edge in robot.edges}
+    for edge in robot.edges:
+        is_fixed = edge.kind == "static" and edge.pose_known
+        if (
+            not is_fixed
+            or edge.other_axes
+            or not is_optical(edge.child)
+            or is_optical(edge.parent)
+        ):
+            continue
+        quat_xyzw = edge.pose.quat_xyzw
+        if edge.calibration or _is_optical_in_camera(edge, above) or not _is_wrong(edge, robot):
+            continue
+        off = math.degrees(angle_between(quat_xyzw, OPTICAL_XYZW))
+        message = (
+            f"{edge.child} is named like an optical frame but not rotated like one: it is"
+            f" {off:.2f} deg off"
+        )
+        advice = "rpy: [-90 deg, 0, -90 deg]"
+        if robot.is_foreign(edge.at):
+            advice = '<origin rpy="-1.5707963267948966 0 -1.5707963267948966"/>'
+        advice = f"an optical frame has {advice} in {edge.parent}"
+        edits = edge.optical_edits()
+        if _is_base(edge.parent, robot) and not _is_at(
+            quat_xyzw, IDENTITY_XYZW
+        ):  # where it should look is not known
+            advice, edits = (
+                (
+                    f"{advice}, if that looks forward; give a camera that looks elsewhere a body"
+                    " frame"
+                ),
+                (),
+            )
+        yield finding("TF401", message, edge.at, help=advice, edits=edits)
+
+
+def _is_optical_in_camera(edge: Edge, above: Mapping[str, Edge]) -> bool:
+    """Return whether the frame is optical in its parent, or in a frame of the same camera farther up.
+
+    Passed on the way are frames that are named after the camera, and those that are rotated like
+    optical frames themselves.
+    """
+    quat_xyzw, step, passed = edge.pose.quat_xyzw, edge, {edge.child}
+    while not _is_at(quat_xyzw, OPTICAL_XYZW):
+        upper = above.get(step.parent)
+        if (
+            upper is None
+            or upper.kind != "static"
+            or not upper.pose_known
+            or upper.child in passed
+        ):
+            return False
+        turned = _is_at(upper.pose.quat_xyzw, OPTICAL_XYZW)
+        if not turned and not _is_named_after(edge.child, upper.parent):
+            return False
+        passed.add(upper.child)
+        quat_xyzw, step = multiply(upper.pose.quat_xyzw, quat_xyzw), upper
+    return True
+
+
+def _is_wrong(edge: Edge, robot: Robot) -> bool:
+    """Return whether the rotation in the parent, which is not the optical one, can hardly be meant."""
+    quat_xyzw, parent = edge.pose.quat_xyzw, edge.parent.rpartition("/")[2]
+    if _is_named_after(edge.child, edge.parent):
+        return True
+    if _END_OF_ARM.search(parent):
+        return False
+    by_right_angles = any(_is_at(quat_xyzw, one) for one in _RIGHT_ANGLES)
+    if _is_base(edge.parent, robot):
+        view, down = rotate(quat_xyzw, (0.0, 0.0, 1.0)), rotate(quat_xyzw, (0.0, 1.0, 0.0))
+        level, upright = (
+            abs(view[2]) < math.sin(_TOLERANCE_RAD),
+            down[2] < -math.cos(_TOLERANCE_RAD),
+        )
+        return view[2] > math.sin(_STEEP_RAD) or (by_right_angles and level and not upright)
+    words = {*parent.split("_")}
+    is_camera = bool(words & _CAMERA_WORDS) and not words & _HOLDER_WORDS
+    return _is_at(quat_xyzw, IDENTITY_XYZW) or (is_camera and by_right_angles)
+
+
+def _is_base(frame: str, robot: Robot) -> bool:
+    return frame == robot.base or frame.rpartition("/")[2] in _BASES
+
+
+def _is_at(quat_xyzw: Quaternion, wanted: Quaternion) -> bool:
+    return angle_between(quat_xyzw, wanted) <= _TOLERANCE_RAD
+
+
+def _is_named_after(optical: str, frame: str) -> bool:
+    """Return whether the frame is named as a body of the optical frame's camera."""
+    return _stem(optical).startswith(_stem(frame))
+
+
+def _stem(frame: str) -> str:
+    """Return what a frame and its optical frame have in common: camera_link, camera_optical_frame → camera."""
+    for ending in (*OPTICAL_ENDINGS, "_link", "_frame"):
+        if frame.endswith(ending):
+            return frame.removesuffix(ending)
+    return frame
+
+
+@rule("TF620")
+def camera_without_optical_frame(robot: Robot) -> Iterator[Finding]:
+    """A camera has no optical frame.
+
+    By REP-103 images are stamped with a frame whose z points forward and y down, named
+    ``…_optical_frame``. Without one the driver stamps them with the body frame, and everything
+    that projects pixels is rotated by 90 degrees twice. Give the sensor one: ``frames:
+    {NAME_optical_frame: {parent: NAME_link, rpy: [-90 deg, 0, -90 deg]}}``, or keep the preset's
+    name for it.
+    """
+    children = robot.children()
+    for sensor in robot.sensors:
+        if sensor.kind not in CAMERAS:
+            continue
+        below: set[str] = set()
+        waiting = [sensor.mount]
+        while waiting:
+            frame = waiting.pop()
+            if frame not in below:
+                below.add(frame)
+                waiting += [edge.child for edge in children.get(frame, ())]
+        by_other_names = any(edge.other_axes for edge in robot.edges if edge.child in below)
+        if not by_other_names and not any(is_optical(frame) for frame in below):
+            message = f"camera {sensor.name} has no optical frame"
+            advice = f"add a frame {sensor.name}_optical_frame with rpy: [-90 deg, 0, -90 deg]"
+            yield finding("TF620", message, sensor.at, help=advice)

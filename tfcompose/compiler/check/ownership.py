@@ -1,0 +1,433 @@
+"""Rules about who publishes an edge, how often, and what else may publish it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.text import with_more
+from tfcompose.model.robot import BUILT_IN, left_out_by
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.robot import Edge, MountedSensor, Process, Robot
+
+
+@rule("TF301")
+def edge_with_two_owners(robot: Robot) -> Iterator[Finding]:
+    """Two processes would publish one edge.
+
+    tf2 silently takes the last message, so the frame jumps between two values. Each edge has one
+    owner: leave the edge to the driver, or switch the driver's TF off with ``tf: tfcompose``.
+    """
+    first: dict[tuple[str, str], Edge] = {}
+    for edge in robot.edges:
+        other = first.setdefault((edge.parent, edge.child), edge)
+        if other.owner != edge.owner:
+            message = f"edge {edge.name} has two owners: {other.owner} and {edge.owner}"
+            notes = [Note(f"{other.owner} owns it here", other.owner_at or other.at)]
+            place = edge.owner_at or edge.at
+            yield finding(
+                "TF301",
+                message,
+                place,
+                notes=notes,
+                help="remove one of the two edges, or its owner",
+            )
+
+
+#: ROS's own programs, which tfcompose replaces.
+STOCK = frozenset({"robot_state_publisher", "static_transform_publisher", "joint_state_publisher"})
+
+
+@rule("TF302")
+def unknown_owner(robot: Robot) -> Iterator[Finding]:
+    """An edge names an owner that is not a process.
+
+    An owner is one of the robot's processes: one under ``processes``, a sensor with a driver, or
+    the built-in ``static`` and ``joints``. A process that tfcompose does not start is declared
+    with ``external: true``.
+    """
+    names = {process.name: None for process in robot.processes}
+    lost: dict[
+        tuple[str, Span], list[Edge]
+    ] = {}  # a part's owner owns many edges, and is one typo
+    for edge in robot.edges:
+        if edge.owner not in names and not robot.excuses(edge.owner):
+            lost.setdefault((edge.owner, edge.owner_at or edge.at), []).append(edge)
+    for (owner, at), edges in lost.items():
+        declare = (
+            f"declare it: processes: {{{owner}: {{external: true}}}}, if it is started elsewhere"
+        )
+        message = f"unknown owner {owner} of {with_more(edges[0].name, len(edges) - 1)}"
+        runs = next(
+            (
+                p.name
+                for p in robot.processes
+                if owner in {node.rpartition("/")[2] for node in p.nodes}
+            ),
+            "",
+        )
+        declare = f"did you mean {runs}, the process that runs this node?" if runs else declare
+        if owner in STOCK:
+            declare = "leave owner out: tfcompose publishes fixed frames and joints itself"
+        advice = left_out_by(robot.conditions, owner) or did_you_mean(owner, names, declare)
+        yield finding("TF302", message, at, help=advice)
+
+
+@rule("TF303")
+def owner_cannot_publish(robot: Robot) -> Iterator[Finding]:
+    """The owner does not publish edges of this kind.
+
+    ``static`` publishes fixed edges and ``joints`` those of moving joints; ``guard`` and processes
+    that send joint states publish no edges. Leave the owner out, or name the process that
+    publishes the edge.
+    """
+    processes = {process.name: process for process in robot.processes}
+    for edge in robot.edges:
+        process = processes.get(edge.owner)
+        if process is None or (edge.free and edge.owner in BUILT_IN):  # TF715 says that
+            continue
+        reason = ""
+        if process.kind == "guard":
+            reason = "the guard publishes nothing"
+        elif process.kind == "joints" and not edge.joint:
+            reason = "joints publishes only moving joints"
+        elif process.kind == "static" and edge.joint:
+            reason = "static publishes only fixed edges"
+        elif process.simulate and process.simulate.kind == "joints":
+            reason = f"{process.name} sends joint states, not edges"
+        if reason:
+            message = f"{edge.owner} cannot publish {edge.name}: {reason}"
+            advice = "remove owner, or name the process that publishes the edge"
+            yield finding("TF303", message, edge.owner_at or edge.at, help=advice)
+
+
+@rule("TF305")
+def static_edge_with_rate(robot: Robot) -> Iterator[Finding]:
+    """A fixed edge has a rate.
+
+    Fixed edges are sent once on /tf_static, and every listener keeps them; a rate has no meaning
+    there. Probably the edge's owner is missing. Remove the rate, or name the process that
+    publishes the edge periodically: ``odom: {parent: map, owner: slam, rate: 10 Hz}``.
+    """
+    for edge in robot.edges:
+        refused = robot.excuses(edge.owner) or robot.excuses(edge.child)  # its owner may have been
+        if edge.kind == "static" and edge.rate is not None and not refused:
+            message = (
+                f"{edge.name} is fixed, and sent once: the rate of {edge.rate:g} Hz has no meaning"
+            )
+            advice = (
+                "remove rate"
+                if edge.owner_at
+                else "remove rate, or add the owner that publishes the edge"
+            )
+            yield finding("TF305", message, edge.rate_at or edge.at, help=advice)
+
+
+@rule("TF306")
+def one_node_two_levels(robot: Robot) -> Iterator[Finding]:
+    """One node publishes both map → odom and odom → base_link.
+
+    REP-105 keeps the two apart: odometry is continuous and drifts, localisation corrects it in
+    jumps. If a node computes one pose and splits it, the odometry jumps too, and controllers react
+    to that; with robot_localization it means that one filter does both jobs. Run two, with
+    ``world_frame: odom`` and ``world_frame: map``. Sensor drivers that do both (visual odometry
+    inside a camera) and simulated processes are exempt.
+    """
+    sensors = {sensor.driver for sensor in robot.sensors}
+    owners = {
+        p.name: p
+        for p in robot.processes
+        if p.kind in {"run", "external"} and p.name not in sensors
+    }
+    upper = {edge.child: edge for edge in robot.edges if _is_edge(edge, "map", {"odom"})}
+    for edge in robot.edges:
+        if _is_edge(edge, "odom", {"base_link", "base_footprint"}) and edge.owner in owners:
+            other = upper.get(edge.parent)
+            if other and other.owner == edge.owner:
+                message = f"{edge.owner} publishes both {other.name} and {edge.name}"
+                notes = [Note(f"{other.name} is defined here", other.owner_at or other.at)]
+                advice = "use one process for localisation and another for odometry"
+                yield finding("TF306", message, edge.owner_at or edge.at, help=advice, notes=notes)
+
+
+def _is_edge(edge: Edge, parent: str, children: set[str]) -> bool:
+    return edge.parent.rpartition("/")[2] == parent and edge.child.rpartition("/")[2] in children
+
+
+#: Lowest rates in Hz of the edges that navigation looks up for every scan and every control step.
+_LEAST_HZ = {
+    ("odom", "base_link"): 20.0,
+    ("odom", "base_footprint"): 20.0,
+    ("map", "odom"): 5.0,
+}
+
+
+@rule("TF307")
+def rate_too_low(robot: Robot) -> Iterator[Finding]:
+    """Odometry is published below 20 Hz, or map → odom below 5 Hz.
+
+    tf2 interpolates between two messages and fails after the last one: scans are dropped with
+    "extrapolation into the future", and controllers act on an old pose. Raise the rate of the node
+    that publishes the edge (``publish_rate``, ``frequency``, ``transform_publish_period``), then
+    the one declared here. Simulated processes are exempt.
+    """
+    simulated = {process.name for process in robot.processes if process.kind == "simulate"}
+    for edge in robot.edges:
+        ends = (edge.parent.rpartition("/")[2], edge.child.rpartition("/")[2])
+        least = _LEAST_HZ.get(ends)
+        if least and edge.rate is not None and edge.rate < least and edge.kind != "static":
+            if edge.owner in simulated:
+                continue
+            message = f"{edge.name} has a rate of {edge.rate:g} Hz; it needs at least {least:g} Hz"
+            advice = f"raise the rate of {edge.owner}, then the one declared here"
+            yield finding("TF307", message, edge.rate_at or edge.at, help=advice)
+
+
+@rule("TF308")
+def driver_publishes_too(robot: Robot) -> Iterator[Finding]:
+    """A sensor's driver publishes frames that tfcompose owns, and tfcompose cannot switch them off.
+
+    With ``tf: tfcompose`` tfcompose publishes the frames inside a sensor and switches off those of
+    a driver that it starts itself. It cannot do so for an external driver, or one that has a
+    command of its own: both would publish, and tf2 takes the last message. Set the driver's
+    parameter where it is started and allow this finding, or leave the frames to the driver with
+    ``tf: driver``. The same holds for edges outside the sensor that a driver publishes by default,
+    such as map → laser of sick_scan_xd.
+    """
+    processes = {process.name: process for process in robot.processes}
+    for sensor in robot.sensors:
+        process = processes.get(sensor.driver)
+        if process is None:
+            continue
+        if (
+            sensor.driver_frames
+            and not sensor.publishes
+            and sensor.switch
+            and (sensor.by_default or _is_switched_on(process, sensor.switch))
+            and not _is_switched_off(process, sensor.switch)
+        ):
+            count, first = len(sensor.driver_frames), sensor.driver_frames[0]
+            what = f"{first} and {count - 1} more" if count > 1 else first
+            message = (
+                f"{process.name} publishes {what} by default, which tfcompose owns (tf: tfcompose)"
+            )
+            yield _publishes_too(
+                sensor, process, message, sensor.switch, ", or leave the frames to it: tf: driver"
+            )
+        for edge, off in sensor.claims.items():
+            if not _is_switched_off(process, off):
+                message = f"{process.name} publishes {edge} by default but does not own it"
+                yield _publishes_too(sensor, process, message, off, "")
+
+
+def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
+    """Whether the plan switches it off, or starts nothing that could publish."""
+    words = " ".join(process.argv).lower()
+    return process.kind not in {"run", "external"} or (
+        process.kind == "run"
+        and all(
+            (process.package and process.params.get(key) == value)
+            or f"{key}:={value}".lower() in words
+            for key, value in switch.items()
+        )
+    )
+
+
+def _is_switched_on(process: Process, switch: dict[str, Any]) -> bool:
+    """Return whether a parameter or an argument has another value than the one that switches it off."""
+    words = " ".join(process.argv).lower()
+    others = [
+        process.params[key] != value for key, value in switch.items() if key in process.params
+    ]
+    return any(others) or any(
+        f"{key}:=" in words and f"{key}:={value}".lower() not in words
+        for key, value in switch.items()
+    )
+
+
+def _publishes_too(
+    sensor: MountedSensor, process: Process, message: str, off: dict[str, Any], instead: str
+) -> Finding:
+    switch = ", ".join(f"{key}: {str(value).lower()}" for key, value in off.items())
+    advice = f"start {process.name} with the parameter {switch}{instead}"
+    notes = (
+        [Note(f"{process.name} is declared here", process.at)] if process.at != sensor.at else []
+    )
+    return finding("TF308", message, sensor.tf_at or sensor.at, help=advice, notes=notes)
+
+
+_MOST_STATIC_PUBLISHERS = 50
+
+
+@rule("TF309")
+def many_static_publishers(robot: Robot) -> Iterator[Finding]:
+    """More than 50 processes publish fixed edges.
+
+    A listener keeps the last 100 messages on /tf_static and receives one from each publisher when
+    it starts: with 100 publishers and more, edges are lost, different ones each time
+    (geometry2#398). Each publisher also costs a process and its discovery. Let tfcompose publish
+    fixed edges, all in one message: remove ``owner``, and set ``tf: tfcompose`` on sensors.
+    """
+    first = {edge.owner: edge for edge in reversed(robot.edges) if edge.kind == "static"}
+    if len(first) > _MOST_STATIC_PUBLISHERS:
+        listed = sorted(first)
+        message = f"{len(first)} processes publish fixed edges: {', '.join(listed[:3])}, …"
+        last = max(first.values(), key=lambda edge: (edge.at.line, edge.at.column))
+        advice = "let tfcompose publish them: remove owner, and set tf: tfcompose on sensors"
+        yield finding("TF309", message, last.owner_at or last.at, help=advice)
+
+
+@rule("TF310")
+def switched_edge_without_owner(robot: Robot) -> Iterator[Finding]:
+    """An edge has several parents and no owner that switches between them.
+
+    With ``parent: [tool0, rack_1]`` a tool is sometimes on the arm and sometimes in its rack. One
+    of your processes knows which, and publishes the edge: ``owner: tool_changer``. tfcompose
+    itself publishes one parent only.
+    """
+    for edge in robot.edges:
+        if edge.switched and edge.owner in BUILT_IN:
+            parents = " or ".join((edge.parent, *edge.switched))
+            message = (
+                f"the parent of {edge.child} is {parents}, and {edge.owner} cannot switch between"
+                " them"
+            )
+            advice = "name the process that publishes the edge, owner: …, or keep one parent"
+            yield finding("TF310", message, edge.at, help=advice)
+
+
+@rule("TF311")
+def switched_edge_static(robot: Robot) -> Iterator[Finding]:
+    """An edge whose parent changes is published on /tf_static.
+
+    A transform on /tf_static is valid at all times, also before the change: a lookup in the past
+    finds the tool where it is now. And it never expires: when the tool changer dies, or another
+    publisher takes over, running listeners keep the last parent they received. Publish the edge
+    periodically on /tf, and remove ``static: true``.
+    """
+    for edge in robot.edges:
+        if edge.switched and edge.kind == "static" and edge.owner not in BUILT_IN:
+            parents = ", ".join((edge.parent, *edge.switched))
+            message = (
+                f"{edge.owner} publishes {edge.child} on /tf_static while its parent changes:"
+                f" {parents}"
+            )
+            yield finding(
+                "TF311",
+                message,
+                edge.at,
+                help="publish it on /tf: give it a rate, and remove static: true",
+            )
+
+
+_STOCK = "robot_state_publisher"
+_STOCK_HZ = 20.0
+
+
+@rule("TF314")
+def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
+    """``publish_frequency`` is lower than the rate of the joints.
+
+    It limits how often tfcompose's ``joints`` and the stock robot_state_publisher publish joint
+    states with the same names; they drop the rest, the stock one silently. Without it ``joints``
+    publishes all joint states, and the stock one 20 Hz; the stock one also rounds to whole
+    milliseconds, so give it twice the rate needed. The rate needed is that of the edges, or of a
+    simulated process that sends joint states.
+    """
+    for process in robot.processes:
+        most = _most_hz(process)
+        if most is None:
+            continue
+        wanted = [(edge.rate or 0.0, f"{edge.name} needs", edge.rate_at or edge.at) for edge in robot.edges
+                  if edge.joint and edge.owner == process.name]  # fmt: skip
+        if wanted:
+            wanted += [
+                (one.simulate.rate, f"{one.name} sends", one.at)
+                for one in robot.processes
+                if one.simulate and one.simulate.kind == "joints"
+            ]
+        rate, what, at = max(wanted, default=(0.0, "", process.at), key=lambda each: each[0])
+        if rate > most:
+            message = (
+                f"{process.name} publishes joint states with at most {most:g} Hz, but {what}"
+                f" {rate:g} Hz"
+            )
+            advice = f"set params: {{publish_frequency: {2 * rate:g}}} on {process.name}"
+            if process.package is None:
+                advice = (
+                    f"remove publish_frequency from {process.name}: then it publishes every joint"
+                    " state"
+                )
+            notes = (
+                (Note(f"{process.name} is defined here", process.at),) if at != process.at else ()
+            )
+            yield finding("TF314", message, at, notes=notes, help=advice)
+
+
+def _most_hz(process: Process) -> float | None:
+    """Return the limit on the rate of the joint states that the process publishes, in Hz; None: no limit, or none."""
+    stock = process.package == _STOCK
+    most = process.params.get("publish_frequency", _STOCK_HZ if stock else None)
+    ignores = process.params.get("ignore_timestamp") is True
+    if (not stock and process.kind != "joints") or ignores or isinstance(most, bool):
+        return None
+    return float(most) if isinstance(most, (int, float)) and most > 0 else None
+
+
+_PARAMETERS = "ros__parameters"
+
+
+@rule("TF334")
+def parameters_of_another_node(robot: Robot) -> Iterator[Finding]:
+    """Parameters are given to a node that the process does not have.
+
+    ROS gives a node the parameters under its full name and silently drops all others. In a
+    parameter file, a name without a leading slash is relative to the process's namespace; * stands
+    for one part of a name and ** for any number of them. If none of a process's files has anything
+    for its node, that is a warning: such a file is legal, and sets nothing. Inline parameters do
+    not repeat the node's name and ``ros__parameters``: tfcompose adds these.
+    """
+    for process in robot.processes:
+        for node in process.ros_nodes:
+            for key, value in node.params.items():
+                if key == _PARAMETERS or (isinstance(value, dict) and _PARAMETERS in value):
+                    message = f"the node of {process.name} does not get the parameters under {key}"
+                    advice = (
+                        "write params: {NAME: VALUE, …} without the node's name, or params:"
+                        " {file: …}"
+                    )
+                    yield finding("TF334", message, node.at, help=advice)
+
+
+_TRUE = frozenset({"true", "yes", "on", "y"})
+
+
+@rule("TF335")
+def clocks_mixed(robot: Robot) -> Iterator[Finding]:
+    """A node uses another clock than the robot.
+
+    Transforms are looked up by their stamps. If one node stamps with the system clock and another
+    with /clock, every lookup fails or finds data that is decades old. Set the clock once, ``ros:
+    {clock: sim}``; tfcompose passes use_sim_time to each node.
+    """
+    sim = robot.ros.clock == "sim"
+    for process in robot.processes:
+        for node in process.ros_nodes:
+            value = node.params.get("use_sim_time")
+            if value is None or (str(value).lower() in _TRUE) == sim:
+                continue
+            message = (
+                f"{node.name} has use_sim_time: {str(value).lower()}, but the robot's clock is"
+                f" {robot.ros.clock}"
+            )
+            at, *inside = node.places.get("use_sim_time", (node.at,))
+            notes = [Note("it is set here", place) for place in inside]
+            way_out = f"write use_sim_time: {str(sim).lower()} beside file: it takes precedence"
+            way_out = way_out if inside else "remove use_sim_time"
+            advice = f"{way_out}; or set ros: {{clock: {'wall' if sim else 'sim'}}}"
+            yield finding("TF335", message, at, help=advice, notes=notes)

@@ -1,0 +1,484 @@
+"""Rules about where sensors are: what their own robot hides from them, and what they have to see."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.compiler.rays import (
+    bodies_around,
+    cast,
+    contains,
+    different_streams,
+    fixed_to,
+    is_plane,
+    view_of,
+)
+from tfcompose.foundation.catalogue import CATALOGUE
+from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.geometry import Pose, rotate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from tfcompose.compiler.rays import View
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.robot import MountedSensor, Optics, Robot, Zone
+
+KINDS = ("camera", "lidar", "radar", "ultrasonic")
+
+
+def _limit(robot: Robot, code: str) -> float:
+    known = CATALOGUE[code].limit
+    return robot.limits.get(code, known[0] if known else 0.0)
+
+
+@dataclass(slots=True)
+class _Views:
+    """The views of the robot that was asked for last: several rules need them, one after the other."""
+
+    robot: Robot | None = None
+    of_sensors: dict[str, list[View]] = field(default_factory=dict)
+
+    def of(self, robot: Robot, sensor: MountedSensor) -> list[View]:
+        if self.robot is not robot:
+            self.robot, self.of_sensors = robot, {}
+        if sensor.name not in self.of_sensors:
+            streams = (
+                different_streams(sensor) if robot.links and _is_placed(robot, sensor) else ()
+            )
+            self.of_sensors[sensor.name] = [view_of(robot, sensor, one) for one in streams]
+        return self.of_sensors[sensor.name]
+
+
+def _is_placed(robot: Robot, sensor: MountedSensor) -> bool:
+    """Return whether the sensor has a pose; one at the origin of the base is not mounted yet."""
+    edge = robot.parent_edge(sensor.mount)
+    if edge is None or not edge.pose_known:
+        return False
+    return edge.pose != Pose() or not (
+        edge.parent == robot.base or edge.parent.endswith("base_link")
+    )
+
+
+_VIEWS = _Views()
+
+
+def _views(robot: Robot, sensor: MountedSensor) -> list[View]:
+    return _VIEWS.of(robot, sensor)
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.0f} %"
+
+
+def _some(links: Sequence[str]) -> str:
+    return ", ".join(links[:3]) + (" and others" if len(links) > 3 else "")  # noqa: PLR2004 (as many as one line takes)
+
+
+@rule("TF640")
+def sensor_inside_body(robot: Robot) -> Iterator[Finding]:
+    """A camera, lidar, radar or ultrasonic sensor is inside a body of the robot.
+
+    The origin of what it sees is in a shape of another link, deeper than the limit: it would see
+    nothing. Usually a pose is wrong, or the shape is a box around a part with an opening. Move the
+    sensor, or give the link a shape that leaves the opening out. Shapes for collision count, else
+    those that are seen; a mesh counts where trimesh is installed (``pip install
+    'tfcompose[mesh]'``) and the mesh is closed. ``rules: {TF640: {limit: 5 cm}}``.
+    """
+    limit = _limit(robot, "TF640")
+    for sensor in robot.sensors:
+        deepest: dict[str, tuple[float, str]] = {}
+        for view in _views(robot, sensor):
+            for link, depth in view.inside.items():
+                deepest[link] = max(deepest.get(link, (0.0, "")), (depth, view.optics.frame))
+        for link, (depth, frame) in deepest.items():
+            if depth > limit:
+                message = (
+                    f"{sensor.name} is inside {link}: {frame} is {100 * depth:.1f} cm below its"
+                    " surface"
+                )
+                message += f"; the limit is {100 * limit:g} cm"
+                advice = f"correct the pose, or give {link} a shape with an opening"
+                yield finding("TF640", message, sensor.at, help=advice, notes=_at(robot, link))
+
+
+def _at(robot: Robot, link: str) -> list[Note]:
+    return [Note(f"{link} is defined here", robot.links[link].at)]
+
+
+@rule("TF641")
+def view_blocked(robot: Robot) -> Iterator[Finding]:
+    """The robot's own bodies block a part of what a sensor sees.
+
+    Rays are cast into the field of view of each stream, as far as it reaches, against the bodies
+    that do not move relative to it; wheels count as they stand. The sensor's own body blocks
+    nothing. Move the sensor, turn it, or raise the limit where the rest is enough: ``rules:
+    {TF641: {limit: 30 %}}``. A scanner in one plane has a rule of its own, TF642. Shapes for
+    collision count, else those that are seen. Meshes count where trimesh is installed (``pip
+    install 'tfcompose[mesh]'``); without it nothing is said about them. ``tfcompose presets NAME``
+    prints the field of view; one that is not known is given under ``sensors.NAME.optics``.
+    """
+    limit = _limit(robot, "TF641")
+    for sensor in robot.sensors:
+        views = [
+            one
+            for one in _views(robot, sensor)
+            if not is_plane(one.optics) and not _sees_only_robot(robot, one)
+        ]
+        worst = max(views, key=lambda one: one.blocked, default=None)
+        if worst and worst.blocked > limit:
+            message = (
+                f"{_percent(worst.blocked)} of what {sensor.name} sees ({worst.optics.stream}) is"
+                " blocked by "
+            )
+            message += f"{_some(worst.blocking)}; the limit is {_percent(limit)}"
+            advice = "move or turn the sensor, or raise the limit under rules"
+            yield finding(
+                "TF641", message, sensor.at, help=advice, notes=_at(robot, worst.blocking[0])
+            )
+
+
+@rule("TF642")
+def blind_sector(robot: Robot) -> Iterator[Finding]:
+    """A laser scanner in one plane is blind in a sector: the robot's own bodies block it.
+
+    In that sector the scan shows the robot itself, which navigation takes for an obstacle unless
+    the driver or a filter drops those points. Move the scanner, or raise it. If the driver leaves
+    the sector out, say what the scan still covers, under ``sensors.NAME.optics.STREAM``:
+    ``horizontal: [-120 deg, 120 deg]``; if the rest is enough, raise the limit: ``rules: {TF642:
+    {limit: 120 deg}}``. Angles are those of the LaserScan: counter-clockwise from x of its frame.
+    Bodies count as for TF641.
+    """
+    limit = _limit(robot, "TF642")
+    for sensor in robot.sensors:
+        for view in _views(robot, sensor):
+            sector = _largest_blind(view) if is_plane(view.optics) else None
+            if sector and sector[1] - sector[0] > limit:
+                start, end = (f"{math.degrees(angle):.0f}" for angle in sector)
+                message = (
+                    f"{sensor.name} is blind for {math.degrees(sector[1] - sector[0]):.0f} deg,"
+                    f" from {start} to "
+                )
+                message += (
+                    f"{end} deg: {_some(view.blocking)} is in the way; the limit is"
+                    f" {math.degrees(limit):.0f} deg"
+                )
+                advice = "move the scanner, or raise the limit under rules"
+                yield finding(
+                    "TF642", message, sensor.at, help=advice, notes=_at(robot, view.blocking[0])
+                )
+
+
+def _largest_blind(view: View) -> tuple[float, float] | None:
+    """Return the largest sector in which every ray is blocked, or None; one may go on over the end of a turn."""
+    if view.optics.horizontal is None or not view.rays:
+        return None
+    start, end = view.optics.horizontal
+    step, count = (end - start) / len(view.rays), len(view.rays)
+    blocked = [ray.link is not None for ray in view.rays]
+    is_circle = end - start > math.tau - step / 2
+    if all(blocked):
+        return start, end
+    best, run = (0, 0), 0
+    for index in range(2 * count if is_circle else count):
+        run = run + 1 if blocked[index % count] else 0
+        if run > best[1]:
+            best = (index - run + 1, run)
+    return (start + best[0] * step, start + sum(best) * step) if best[1] else None
+
+
+def _sees_only_robot(robot: Robot, view: View) -> bool:
+    return (
+        view.optics.kind == "camera" and bool(view.rays) and view.blocked >= _limit(robot, "TF643")
+    )
+
+
+@rule("TF643")
+def camera_sees_only_robot(robot: Robot) -> Iterator[Finding]:
+    """The image of a camera shows nothing but the robot itself.
+
+    Usually it is turned the wrong way: an optical frame without its rotation, a pitch with the
+    wrong sign, a yaw of 180 deg. Correct its pose. The limit is the part of the image: ``rules:
+    {TF643: {limit: 99 %}}``. Bodies count as for TF641.
+    """
+    for sensor in robot.sensors:
+        for view in _views(robot, sensor):
+            if _sees_only_robot(robot, view):
+                message = (
+                    f"{sensor.name} ({view.optics.stream}) sees only the robot:"
+                    f" {_percent(view.blocked)} of its "
+                )
+                message += (
+                    f"image is {_some(view.blocking)}; the limit is"
+                    f" {_percent(_limit(robot, 'TF643'))}"
+                )
+                advice = "correct the pose: x of the body frame points where it looks"
+                yield finding(
+                    "TF643", message, sensor.at, help=advice, notes=_at(robot, view.blocking[0])
+                )
+                break
+
+
+#: Cameras that are meant to look at the floor.
+_AT_THE_FLOOR = re.compile(
+    r"(^|_)(down|downward|floor|ground|bottom|belly|line|dock|flow|landing)(_|\d|$)"
+)
+
+
+@rule("TF644")
+def camera_sees_only_floor(robot: Robot) -> Iterator[Finding]:
+    """The image of a camera on wheels shows only the floor close to it.
+
+    No ray reaches farther than the limit before it hits the floor, which is below the wheels.
+    Usually the pitch has the wrong sign or a wrong size: a positive one looks down. A camera whose
+    name says that it looks down (floor, ground, down, bottom, line, dock) is meant so. Set how
+    near is too near: ``rules: {TF644: {limit: 50 cm}}``.
+    """
+    limit = _limit(robot, "TF644")
+    for sensor in robot.sensors:
+        if _AT_THE_FLOOR.search(sensor.name.rpartition("/")[2]):
+            continue
+        for view in _views(robot, sensor):
+            far = _reach_on_floor(robot, view)
+            if far is not None and far < limit:
+                message = (
+                    f"{sensor.name} ({view.optics.stream}) sees only the floor, no farther than"
+                    f" {far:.2g} m"
+                )
+                advice = "correct the pose: a positive pitch looks down"
+                yield finding(
+                    "TF644", f"{message}; the limit is {limit:g} m", sensor.at, help=advice
+                )
+                break
+
+
+def _reach_on_floor(robot: Robot, view: View) -> float | None:
+    """Return the largest distance at which a free ray hits the floor; None if one misses it, or no floor is known."""
+    if view.optics.kind != "camera" or not view.rays:
+        return None
+    poses = fixed_to(robot, view.optics.frame)
+    wheels = [
+        edge.child
+        for edge in robot.edges
+        if edge.joint and edge.joint.type == "continuous" and edge.child in poses
+    ]
+    base = "base_footprint" if "base_footprint" in poses else robot.base
+    if not wheels or base not in poses:
+        return None
+    up = rotate(poses[base].quat_xyzw, (0.0, 0.0, 1.0))
+    floor = min((_lowest(robot, wheel, poses[wheel], up) for wheel in wheels), default=math.inf)
+    if not math.isfinite(floor) or floor >= 0:
+        return None
+    free = [
+        sum(a * b for a, b in zip(ray.direction, up, strict=True))
+        for ray in view.rays
+        if ray.link is None
+    ]
+    if not free or max(free) >= 0:
+        return None
+    return max(floor / down for down in free)
+
+
+def _lowest(robot: Robot, name: str, pose: Pose, up: Vector) -> float:
+    """Return how high the lowest point of a wheel is above the stream, which is less than 0 below it."""
+    link = robot.links.get(name)
+    shapes = (link.collisions or link.visuals) if link else ()
+    radii = [shape.size[0] for shape in shapes if shape.kind in {"cylinder", "sphere"}]
+    return (
+        sum(a * b for a, b in zip(pose.xyz, up, strict=True)) - max(radii) if radii else math.inf
+    )
+
+
+@rule("TF645")
+def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
+    """Two lidars, or two cameras with infrared projectors, look into each other.
+
+    Each is in the other's field of view, nearer than the limit, and no body is between them: their
+    light makes false points, or blinds the imagers. Turn one away, mount them at different
+    heights, or put a shield between them. ``rules: {TF645: {limit: 2 m}}``.
+    """
+    limit = _limit(robot, "TF645")
+    active = [
+        (one, stream)
+        for one in robot.sensors
+        for stream in one.optics
+        if stream.active and _is_light(stream)
+    ]
+    poses = (
+        {stream.frame: fixed_to(robot, stream.frame) for _, stream in active}
+        if len(active) > 1
+        else {}
+    )
+    reported = set()
+    for (one, of_one), (other, of_other) in itertools.combinations(active, 2):
+        if one is other or of_one.kind != of_other.kind or (one.name, other.name) in reported:
+            continue
+        far = _distance_in_sight(robot, (one, of_one), (other, of_other), poses[of_one.frame])
+        if far is None or far > limit:
+            continue
+        if (
+            _distance_in_sight(robot, (other, of_other), (one, of_one), poses[of_other.frame])
+            is not None
+        ):
+            reported.add((one.name, other.name))
+            message = (
+                f"{one.name} and {other.name} look into each other, {far:.2g} m apart; the limit"
+                f" is {limit:g} m"
+            )
+            notes = [Note(f"{one.name} is defined here", one.at)]
+            advice = "turn one away, or mount them at different heights"
+            yield finding("TF645", message, other.at, help=advice, notes=notes)
+
+
+def _is_light(optics: Optics) -> bool:
+    return optics.kind in {"camera", "lidar"}
+
+
+#: How high the window of a scanner is, that another one's plane has to meet.
+_WINDOW_M = 0.03
+
+
+def _distance_in_sight(
+    robot: Robot,
+    viewer: tuple[MountedSensor, Optics],
+    viewed: tuple[MountedSensor, Optics],
+    poses: Mapping[str, Pose],
+) -> float | None:
+    """Return how far the viewed stream's origin is, if the viewer looks at it and nothing is between; else None.
+
+    ``poses`` are those of frames in the viewer's frame.
+    """
+    (sensor, optics), (of_other, other) = viewer, viewed
+    pose = poses.get(other.frame)
+    far = math.dist(pose.xyz, (0.0, 0.0, 0.0)) if pose else 0.0
+    if pose is None or far < _WINDOW_M:
+        return None
+    x, y, z = pose.xyz
+    aim = (x, y, 0.0) if is_plane(optics) and abs(z) <= _WINDOW_M else pose.xyz
+    if not contains(optics, aim):
+        return None
+    own = {of_other.mount, *of_other.frames}
+    bodies = [body for body in bodies_around(robot, sensor, poses) if body.link not in own]
+    view = cast(sensor.name, optics, ((x / far, y / far, z / far),), bodies)
+    return None if view.rays[0].distance < far else far
+
+
+@rule("TF646")
+def zone_not_covered(robot: Robot) -> Iterator[Finding]:
+    """A zone under ``coverage`` is not seen by the sensors that have to see it.
+
+    tfcompose samples points all over the box for each stream of the sensors that ``by`` names: a
+    point is seen if it is in the field of view and in range, and no body of the robot is in
+    between. A scanner in one plane sees a point if its plane goes through the box below or above
+    it. What is not known of a stream does not cover anything: give ``sensors.NAME.optics``. Bodies
+    count as for TF641.
+    """
+    for zone in robot.zones:
+        if zone.frame not in robot.frames:
+            if not robot.excuses(zone.frame):
+                advice = did_you_mean(zone.frame, robot.frames)
+                yield finding(
+                    "TF646",
+                    f"the zone {zone.name}: unknown frame {zone.frame}",
+                    zone.at,
+                    help=advice,
+                )
+            continue
+        names = [sensor.name for sensor in robot.sensors]
+        wrong = [one for one in zone.by if one not in KINDS and one not in names]
+        if wrong:
+            advice = did_you_mean(wrong[0], [*KINDS, *names])
+            yield finding(
+                "TF646", f"the zone {zone.name}: unknown sensor {wrong[0]}", zone.at, help=advice
+            )
+            continue
+        part, unknown = _covered(robot, zone)
+        if part < zone.least - 1e-9:
+            by = f" by {', '.join(zone.by)}" if zone.by else ""
+            message = (
+                f"{_percent(part)} of the zone {zone.name} is seen{by}; at least"
+                f" {_percent(zone.least)} must be"
+            )
+            advice = (
+                f"no field of view is known of {', '.join(unknown)}: give optics"
+                if unknown
+                else ""
+            )
+            yield finding(
+                "TF646",
+                message,
+                zone.at,
+                help=advice or "move or add a sensor, or make the zone smaller",
+            )
+
+
+#: How many points a zone is sampled with along x, y and z.
+_GRID = (10, 10, 4)
+
+
+def _covered(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
+    """Return the part of the zone's points that are seen, and the streams of which nothing is known."""
+    points = [
+        tuple(
+            middle + extent * ((index + 0.5) / count - 0.5)
+            for middle, extent, index, count in zip(
+                zone.center, zone.size, indices, _GRID, strict=True
+            )
+        )
+        for indices in itertools.product(*map(range, _GRID))
+    ]
+    visible, unknown = [False] * len(points), []
+    for sensor in robot.sensors:
+        for optics in different_streams(sensor):
+            if zone.by and optics.kind not in zone.by and sensor.name not in zone.by:
+                continue
+            poses = fixed_to(robot, optics.frame)
+            if zone.frame not in poses:
+                continue
+            if optics.projection == "pinhole" and (
+                optics.horizontal is None or optics.vertical is None
+            ):
+                unknown.append(f"{sensor.name} {optics.stream}")
+                continue
+            bodies = list(bodies_around(robot, sensor, poses))
+            open_ = [index for index, is_visible in enumerate(visible) if not is_visible]
+            aims = {index: _aim(optics, zone, points[index], poses[zone.frame]) for index in open_}
+            into = {index: aim for index, aim in aims.items() if aim and _is_in_reach(optics, aim)}
+            lengths = {index: math.hypot(*aim) for index, aim in into.items()}
+            rays = tuple(
+                (x / lengths[i], y / lengths[i], z / lengths[i]) for i, (x, y, z) in into.items()
+            )
+            for index, ray in zip(into, cast(sensor.name, optics, rays, bodies).rays, strict=True):
+                visible[index] = ray.distance >= lengths[index] - 1e-6
+    return sum(visible) / len(visible), unknown
+
+
+def _aim(optics: Optics, zone: Zone, point: Sequence[float], pose: Pose) -> Vector | None:
+    """Return the point in the stream's frame; for a scanner where its plane meets the zone below or above the point."""
+    x, y, z = point
+    bx, by, bz = rotate(pose.quat_xyzw, (x, y, z))
+    here = (pose.xyz[0] + bx, pose.xyz[1] + by, pose.xyz[2] + bz)
+    if not is_plane(optics):
+        return here
+    up = rotate(pose.quat_xyzw, (0.0, 0.0, 1.0))
+    if abs(up[2]) < 1e-6:  # noqa: PLR2004 (the plane stands upright)
+        return None
+    climb = -here[2] / up[2]
+    if abs(z + climb - zone.center[2]) > zone.size[2] / 2 + 1e-9:
+        return None
+    return (here[0] + climb * up[0], here[1] + climb * up[1], here[2] + climb * up[2])
+
+
+def _is_in_reach(optics: Optics, point: Vector) -> bool:
+    """Return whether the point is in the field of view and in range: of depth along z for a camera."""
+    far = abs(point[2]) if optics.kind == "camera" else math.hypot(*point)
+    return (
+        far > 0
+        and (optics.near or 0.0) <= far <= (optics.far or math.inf)
+        and contains(optics, point)
+    )

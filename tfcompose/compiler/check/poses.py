@@ -1,0 +1,409 @@
+"""Rules about poses: units, conventions of REP-103, and values that look mistyped; and where frames are in the base."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.compiler.rays import fixed_to, sphere_around
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.geometry import Pose, norm, rotate
+from tfcompose.model.robot import is_optical
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.robot import Edge, Link, Robot
+
+
+#: Degrees that people write. Read as radians, all but 5 are more than a full turn, which nobody
+#: means.
+_ROUND_DEG = frozenset(
+    {
+        5.0,
+        10.0,
+        15.0,
+        20.0,
+        30.0,
+        40.0,
+        45.0,
+        50.0,
+        60.0,
+        70.0,
+        75.0,
+        80.0,
+        90.0,
+        100.0,
+        120.0,
+        135.0,
+    }
+)
+_ROUND_LIMITS_DEG = _ROUND_DEG | {
+    150.0,
+    165.0,
+    170.0,
+    175.0,
+    180.0,
+    185.0,
+    190.0,
+    270.0,
+    350.0,
+    360.0,
+    720.0,
+}
+#: A full turn, with a margin for rounding.
+_FULL_CIRCLE_RAD = 6.29
+
+
+@rule("TF410", of_urdf=True)
+def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
+    """An angle without a unit is probably meant in degrees.
+
+    A bare number is in radians: 90 is more than fourteen turns. The frame ends up in some
+    orientation, and nothing else complains. Write the unit, ``90 deg``; an angle in radians may
+    have the unit ``rad``. Limits of revolute joints may exceed a turn: of these only values that
+    people write in degrees are reported.
+    """
+    revolute = {
+        edge.joint.name for edge in robot.edges if edge.joint and edge.joint.type == "revolute"
+    }
+    for value in robot.source_numbers:
+        is_limit = value.key == "limit"
+        if value.key not in {"rpy", "look", "axis_angle", "limit"} or (
+            is_limit and value.name not in revolute
+        ):
+            continue
+        for index, (number, with_unit) in enumerate(
+            zip(value.numbers, value.with_unit, strict=True)
+        ):
+            size = abs(number)
+            if not with_unit and (
+                size in _ROUND_LIMITS_DEG
+                if is_limit
+                else size in _ROUND_DEG or size > _FULL_CIRCLE_RAD
+            ):
+                message = (
+                    f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
+                )
+                at = value.place(index)
+                meant = (
+                    f"{math.radians(number):.17g}" if robot.is_foreign(at) else f"{number:g} deg"
+                )
+                yield finding("TF410", message, at, help=f"if degrees are meant, write {meant}")
+
+
+#: 1.5708 is good enough: it is 0.0002 degrees off, and no mount is that accurate.
+_EXACT_RAD, _ROUNDED_RAD, _NOISE = 5e-6, 2e-3, 2e-9
+_QUARTERS = {1: "pi/2", 2: "pi", 3: "3*pi/2", 4: "2*pi"}
+_MOST_DECIMALS = 6
+
+
+@rule("TF411", of_urdf=True)
+def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
+    """An angle is π/2 or π with too few digits.
+
+    −1.57 is 0.05 degrees off a right angle: 0.8 mm at one metre. Two such frames do not cancel
+    out, and every point cloud is slightly tilted. Write ``-90 deg``, or ``"${-pi/2}"``. Only
+    roundings of right angles are reported: a measured 1.5689 is not.
+    """
+    for value in robot.source_numbers:
+        if value.key not in {"rpy", "look", "axis_angle"}:
+            continue
+        rounded = [(n, index) for index, n in enumerate(value.numbers) if _is_rounded(n)]
+        if rounded:
+            number, first = rounded[0]
+            quarters = round(number / (math.pi / 2))
+            sign = "-" if number < 0 else ""
+            off = math.degrees(abs(number - quarters * math.pi / 2))
+            listed = ", ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
+            message = (
+                f"{value.entry}: {value.key} has {listed}, {off:.2g} deg off {quarters * 90} deg"
+            )
+            at = value.place(first)
+            advice = f'write {quarters * 90} deg, or "${{{sign}{_QUARTERS[abs(quarters)]}}}"'
+            if robot.is_foreign(at):
+                advice = f"write {quarters * math.pi / 2!r}"
+            yield finding("TF411", message, at, help=advice)
+
+
+def _is_rounded(number: float) -> bool:
+    """Whether the number is a rounding, up or down, of a multiple of π/2, and not that multiple itself."""
+    quarters = round(number / (math.pi / 2))
+    exact = quarters * math.pi / 2
+    if (
+        abs(quarters) not in _QUARTERS
+        or not _EXACT_RAD < abs(number - exact) / max(1, abs(quarters)) < _ROUNDED_RAD
+    ):
+        return False
+    return any(
+        abs(number * 10**decimals - rounding(exact * 10**decimals)) < _NOISE
+        for decimals in range(2, _MOST_DECIMALS)
+        for rounding in (math.floor, math.ceil)
+    )
+
+
+#: A rotation with this w or more is smaller than 64 degrees.
+_SMALL_ROTATION_W = 0.85
+
+
+@rule("TF412")
+def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
+    """A quaternion probably has w first; the order is x, y, z, w.
+
+    Eigen's constructor, MATLAB and many papers put w first. [1, 0, 0, 0] is the identity there and
+    a half turn about x here: the sensor is upside down. Move the first number to the end. If the
+    half turn is meant, write ``rpy: [180 deg, 0, 0]``. Reported are [1, 0, 0, 0] itself, and
+    quaternions that are a small pitch or yaw with w first and a large rotation about an odd axis
+    otherwise.
+    """
+    for value in robot.source_numbers:
+        if value.key != "quat_xyzw" or len(value.numbers) != 4:  # noqa: PLR2004 (x, y, z, w)
+            continue
+        first, second, third, fourth = value.numbers
+        identity = abs(first) == 1 and not (second or third or fourth)
+        small = (
+            _SMALL_ROTATION_W < abs(first) < 1 and second == 0 and (third == 0) != (fourth == 0)
+        )
+        if identity or small:
+            rotations = (
+                f"rotates by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
+            )
+            message = f"{value.entry}: quat_xyzw {_listed(value.numbers)} {rotations}"
+            advice = f"if w is first, write {_listed((second, third, fourth, first))}"
+            if identity:
+                advice += "; if the half turn is meant, rpy: [180 deg, 0, 0]"
+            yield finding("TF412", message, value.place(0), help=advice)
+
+
+def _degrees(w: float) -> str:
+    return f"{math.degrees(2 * math.acos(min(1.0, abs(w)))):.0f}"
+
+
+def _listed(numbers: tuple[float, ...]) -> str:
+    return f"[{', '.join(f'{number:g}' for number in numbers)}]"
+
+
+#: Words in a name, the sign of z that they imply, and by how much (sine) the view may contradict
+#: it. "up" and "down" may also mean the upper and the lower camera, so the contradiction must be
+#: clear.
+_VIEWS = {
+    "floor": (-1, 0.1),
+    "ground": (-1, 0.1),
+    "downward": (-1, 0.1),
+    "downwards": (-1, 0.1),
+    "down": (-1, 0.5),
+    "ceiling": (1, 0.1),
+    "upward": (1, 0.1),
+    "upwards": (1, 0.1),
+    "up": (1, 0.5),
+}
+#: Above this a camera named after the ceiling is probably mounted there.
+_OVERHEAD_M = 1.5
+
+
+@rule("TF413", follows="pose")
+def camera_looks_away(robot: Robot) -> Iterator[Finding]:
+    """A camera looks up although its name says floor, or down although its name says ceiling.
+
+    By REP-103 looking down is *positive* pitch, a common mistake. Write what is meant: ``look:
+    {down: 30 deg}``. What counts is the optical axis in the robot's base, for cameras that are
+    fixed to it.
+    """
+    base = (robot.base or "").rpartition("/")[2]
+    poses = placed(robot) if base.startswith("base") and robot.sensors else {}
+    for sensor in robot.sensors:
+        view = next(
+            (_VIEWS[word] for word in reversed(sensor.name.split("_")) if word in _VIEWS), None
+        )
+        if view is None or sensor.kind not in CAMERAS or sensor.mount not in poses:
+            continue
+        optical = next(
+            (frame for frame in sensor.frames if is_optical(frame) and frame in poses), None
+        )
+        pose = poses[optical or sensor.mount]
+        axis = rotate(pose.quat_xyzw, (0.0, 0.0, 1.0) if optical else (1.0, 0.0, 0.0))
+        sign, tolerance = view
+        overhead = "ceiling" in sensor.name and pose.xyz[2] > _OVERHEAD_M
+        if axis[2] * sign < -tolerance and not overhead:
+            angle = math.degrees(math.asin(min(1.0, abs(axis[2]))))
+            up, named = ("up", "down") if axis[2] > 0 else ("down", "up")
+            message = f"{sensor.name} looks {up} by {angle:.0f} deg, but its name says {named}"
+            advice = f"write look: {{{named}: {angle:.0f} deg}}; looking down is positive pitch"
+            yield finding("TF413", message, sensor.at, help=advice)
+
+
+#: No part of an ordinary robot is farther from its mount; larger robots are known by their bodies
+#: and mounts.
+_USUAL_M = 5.0
+#: No robot is larger, unless it has a larger body.
+_LARGEST_M = 100.0
+_TIMES = 3
+
+
+@rule("TF414", of_urdf=True, follows="pose")
+def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
+    """A position or a body is far larger than the robot, and probably in millimetres.
+
+    A bare number is in metres. Drawings are in millimetres, and 250 puts a sensor a quarter of a
+    kilometre away. Write the unit: ``250 mm``. The limit is three times the size of the robot's
+    bodies or typical mounts, and at least 5 m. Values with a unit are not reported.
+    """
+    sizes = {link.name: _sizes(link) for link in robot.links.values()}
+    for link in robot.links.values():
+        largest = max(sizes[link.name], default=0.0)
+        if largest > _LARGEST_M:
+            message = f"the body of {link.name} is {largest:g} m long"
+            meant = f"{largest / 1000:g}" if robot.is_foreign(link.at) else f"{largest:g} mm"
+            yield finding(
+                "TF414", message, link.at, help=f"if millimetres are meant, write {meant}"
+            )
+    body = max((size for one in sizes.values() for size in one if size <= _LARGEST_M), default=0.0)
+    below = placed(robot, moving=True)
+    mounts = [
+        norm(edge.pose.xyz)
+        for edge in robot.edges
+        if edge.given and edge.child in below and any(edge.pose.xyz)
+    ]
+    limit = min(
+        max(_USUAL_M, _TIMES * body, _TIMES * sorted(mounts)[len(mounts) // 2] if mounts else 0.0),
+        max(_LARGEST_M, _TIMES * body),
+    )
+    moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
+    mounted = {sensor.name: sensor.mount for sensor in robot.sensors}
+    named: dict[str | int, dict[str, str]] = {
+        "joints": moved,
+        "sensors": mounted,
+        "parts": robot.mounted,
+    }
+    for value in robot.source_numbers:
+        if (
+            value.path[2:] != ("xyz",)
+            or norm(value.numbers) <= limit
+            or value.path[0] == "processes"
+        ):
+            continue
+        child = named.get(value.path[0], {}).get(value.name, value.name)
+        distance = norm(
+            tuple(n for n, unit in zip(value.numbers, value.with_unit, strict=True) if not unit)
+        )
+        if child in below and distance > limit:
+            message = (
+                f"{value.entry} is {distance:g} m away; the rest of the robot is within"
+                f" {limit:.3g} m"
+            )
+            farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
+            at, number = value.place(farthest), value.numbers[farthest]
+            meant = f"{number / 1000:g}" if robot.is_foreign(at) else f"{number:g} mm"
+            advice = f"a bare number is in metres; if millimetres are meant, write {meant}"
+            yield finding("TF414", message, at, help=advice)
+
+
+def _sizes(link: Link) -> list[float]:
+    """Return the largest size of each shape of the link but meshes, of which the file has only a scale."""
+    return [max(shape.size) for shape in (*link.visuals, *link.collisions) if shape.kind != "mesh"]
+
+
+#: The least and the greatest x, y, z.
+Box = tuple[list[float], list[float]]
+
+#: Kinds of sensors that take images.
+CAMERAS = frozenset({"camera", "mono", "stereo", "rgbd", "tof"})
+
+#: How far from the bodies something still counts as on the robot, in metres: the arm of a mount.
+_REACH_M = 0.2
+
+#: Words in names, the word of the other side, and the axis (0: x, 1: y) on which the two sides
+#: differ (REP-103).
+_SIDES = {
+    "left": ("right", 1),
+    "right": ("left", 1),
+    "front": ("rear", 0),
+    "rear": ("front", 0),
+    "back": ("front", 0),
+}
+_NEAR_M = 1e-6
+#: Nearer to the middle than this, left and right may well be at one place.
+_MIDDLE_M = 0.01
+#: So near to the other one's mirror image, the two are a pair.
+_MIRRORED_M = 0.001
+
+
+def placed(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
+    """Return the pose in the robot's base of each frame fixed to it; ``moving``: also through joints, at zero."""
+    poses = {robot.base: Pose()} if robot.base else {}
+    children = robot.children() if poses else {}
+    waiting = list(poses)
+    while waiting:
+        parent = waiting.pop()
+        for edge in children.get(parent, ()):
+            is_placed = edge.pose_known and (edge.kind == "static" or (moving and edge.joint))
+            if edge.child not in poses and is_placed:
+                poses[edge.child] = poses[parent] @ edge.pose
+                waiting.append(edge.child)
+    return poses
+
+
+def twins(frame: str) -> Iterator[str]:
+    """Yield the names that the frame has on the other side of the robot: left_wheel_link → right_wheel_link."""
+    words = frame.split("_")
+    for index, word in enumerate(words):
+        if word in _SIDES:
+            yield "_".join([*words[:index], _SIDES[word][0], *words[index + 1 :]])
+            if word == "front":
+                yield "_".join([*words[:index], "back", *words[index + 1 :]])
+
+
+def are_swapped(one: Edge, other: Edge) -> bool:
+    """Return whether the two are named after two sides of their parent and each stands, mirrored, on the other one."""
+    axis, sign = side_of(one.child, other.child)
+    here, there = one.pose.xyz, other.pose.xyz
+    mirrored = tuple(-value if index == axis else value for index, value in enumerate(there))
+    return sign * here[axis] < -_MIDDLE_M and math.dist(here, mirrored) < _MIRRORED_M
+
+
+def side_of(frame: str, twin: str) -> tuple[int, int]:
+    """Return the axis on which the frame and its twin differ, and on which side of it the frame's name says it is."""
+    word = next(
+        one for one, other in zip(frame.split("_"), twin.split("_"), strict=True) if one != other
+    )
+    return _SIDES[word][1], 1 if word in {"left", "front"} else -1
+
+
+def are_mirrored(one: Edge, other: Edge) -> bool:
+    """Return whether the two are named after two sides of the robot and yet stand on the same one, at one place."""
+    if one.parent != other.parent or other.child not in twins(one.child):
+        return False
+    axis, _ = side_of(one.child, other.child)
+    apart = math.dist(one.pose.xyz, other.pose.xyz)
+    return apart < _NEAR_M and abs(one.pose.xyz[axis]) > _MIDDLE_M
+
+
+def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None:
+    """Return the least and greatest x, y, z in ``frame`` of the bodies that are fixed to it.
+
+    Each shape counts with the sphere around it. ``without`` names a sensor whose bodies do not
+    count. None: there are no bodies, or one of them is a mesh that cannot be read.
+    """
+    inside = {edge.child for edge in robot.edges if edge.sensor == without} if without else set()
+    least, most = [math.inf] * 3, [-math.inf] * 3
+    for name, pose in fixed_to(robot, frame, only_static=True).items():
+        if name not in robot.links or name in inside:
+            continue
+        for shape in (*robot.links[name].visuals, *robot.links[name].collisions):
+            sphere = sphere_around(shape)
+            if sphere is None:
+                return None
+            middle = (pose @ shape.pose @ Pose(sphere[0])).xyz
+            least = [min(low, value - sphere[1]) for low, value in zip(least, middle, strict=True)]
+            most = [max(high, value + sphere[1]) for high, value in zip(most, middle, strict=True)]
+    return (least, most) if least[0] < math.inf else None
+
+
+def is_near(box: Box, xyz: Vector) -> bool:
+    """Return whether the point is in the box, or within reach of it."""
+    return all(
+        low - _REACH_M <= value <= high + _REACH_M
+        for low, value, high in zip(box[0], xyz, box[1], strict=True)
+    )

@@ -1,0 +1,86 @@
+"""Rules about frame prefixes: nodes that look frames up need the names that frames have on the live tree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Process, Robot
+
+_COSTMAP = {"global_frame": "map", "robot_base_frame": "base_link"}
+_FILTER = {"map_frame": "map", "odom_frame": "odom", "base_link_frame": "base_link"}
+_SLAM = {"map_frame": "map", "odom_frame": "odom", "base_frame": "base_footprint"}
+#: The frames that programs look up where no parameter names others (Nav2, slam_toolbox and
+#: robot_localization, Jazzy).
+_DEFAULTS: dict[str, dict[str, str]] = {
+    "controller_server": _COSTMAP,
+    "planner_server": _COSTMAP,
+    "bt_navigator": _COSTMAP,
+    "behavior_server": {"local_frame": "odom", **_COSTMAP},
+    "collision_monitor": {"base_frame_id": "base_footprint", "odom_frame_id": "odom"},
+    "amcl": {"global_frame_id": "map", "odom_frame_id": "odom", "base_frame_id": "base_footprint"},
+    "async_slam_toolbox_node": _SLAM,
+    "sync_slam_toolbox_node": _SLAM,
+    "localization_slam_toolbox_node": _SLAM,
+    "ekf_node": _FILTER,
+    "ukf_node": _FILTER,
+}
+
+
+@rule("TF318")
+def frame_without_prefix(robot: Robot) -> Iterator[Finding]:
+    """A node is given the name of a frame without the robot's frame prefix.
+
+    With ``isolate: frames`` or a ``frame_prefix`` the frame has another name on the live tree: the
+    node waits for a transform that never comes. Write ``${frame(odom)}`` for the name; tfcompose
+    writes the names itself for nodes with a preset. Known nodes of Nav2, slam_toolbox and
+    robot_localization are reported for their default names too.
+    """
+    for process in robot.processes if robot.ros.frame_prefix else ():
+        if process.kind != "run" or not process.takes_ros_arguments:
+            continue
+        given: set[str] = set()
+        for node in process.ros_nodes:
+            params = node.flat_params
+            given |= {_own_name(key) for key in params}
+            wrong = {
+                key: value
+                for key, value in params.items()
+                if "frame" in _own_name(key)
+                and key not in node.contradicting
+                and _lacks_prefix(value, robot)
+            }
+            if wrong:
+                yield _without_prefix(process, wrong, robot)
+        usual = {} if robot.excuses(process.name) else _DEFAULTS.get(process.executable or "", {})
+        left = {
+            key: frame
+            for key, frame in usual.items()
+            if key not in given and _lacks_prefix(frame, robot)
+        }
+        if left:
+            yield replace(_without_prefix(process, left, robot), severity="warning")
+
+
+def _own_name(parameter: str) -> str:
+    """Return the last part of a parameter's full name."""
+    return parameter.rpartition(".")[2]
+
+
+def _lacks_prefix(value: Any, robot: Robot) -> bool:
+    return isinstance(value, str) and value in robot.frames and robot.final(value) != value
+
+
+def _without_prefix(process: Process, names: dict[str, str], robot: Robot) -> Finding:
+    listed = ", ".join(f"{key}: {value}" for key, value in names.items())
+    message = (
+        f"{process.name} looks frames up without the prefix {robot.ros.frame_prefix}: {listed}"
+    )
+    wanted = ", ".join(f'{key}: "${{frame({value})}}"' for key, value in names.items())
+    return finding("TF318", message, process.at, help=f"params: {{{wanted}}}")

@@ -1,0 +1,273 @@
+"""Rules about processes: what they wait for, and what they are there for."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from graphlib import CycleError, TopologicalSorter
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.units import UNITS
+from tfcompose.model.robot import left_out_by
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Robot
+
+
+@rule("TF812")
+def start_order_loop(robot: Robot) -> Iterator[Finding]:
+    """Processes wait for each other.
+
+    None of them would ever start. Remove one of the entries under ``after``.
+    """
+    waiting = {process.name: process for process in robot.processes}
+    order = TopologicalSorter(
+        {name: waiting.keys() & process.after.keys() for name, process in waiting.items()}
+    )
+    with suppress(CycleError):
+        order.prepare()
+    while order.is_active():
+        free = order.get_ready()
+        order.done(*free)
+        for name in free:
+            del waiting[name]
+    names = list(waiting)
+    if names:
+        notes = [Note(f"{name} is defined here", waiting[name].at) for name in names[1:]]
+        message = f"processes wait for each other: {', '.join(names)}"
+        yield finding(
+            "TF812",
+            message,
+            waiting[names[0]].at,
+            notes=notes,
+            help="remove one of their after entries",
+        )
+
+
+def _needed(robot: Robot) -> set[str]:
+    """Return the processes that own an edge, drive a sensor, publish TF by default, or are waited for."""
+    publishers = {claim.node for claim in robot.claims}
+    return (
+        {edge.owner for edge in robot.edges}
+        | {sensor.driver for sensor in robot.sensors}
+        | {name for process in robot.processes for name in process.after}
+        | {process.name for process in robot.processes if not publishers.isdisjoint(process.nodes)}
+    )
+
+
+@rule("TF815", idle=True)
+def process_without_role(robot: Robot) -> Iterator[Finding]:
+    """An external or simulated process is not used.
+
+    It owns no edge, is no sensor's driver, and nothing waits for it: probably an ``owner`` was
+    meant to name it. Make it the owner of its edge, or remove it. Processes that tfcompose starts
+    are exempt, as is an external process that may send the joint states because no simulated one
+    does.
+    """
+    owners = {edge.owner for edge in robot.edges} | {sensor.driver for sensor in robot.sensors}
+    needed = _needed(robot)
+    if owners - {process.name for process in robot.processes} - {""}:
+        return  # a name is misspelt, which TF302 reports
+    moving = any(edge.joint for edge in robot.edges)
+    states = any(
+        process.simulate and process.simulate.kind == "joints" for process in robot.processes
+    )
+    for process in robot.processes:
+        if (
+            process.kind not in {"external", "simulate"}
+            or process.name in needed
+            or process.loads
+            or robot.excuses(process.name)
+        ):
+            continue
+        if process.kind == "external" and moving and not states:
+            continue
+        if process.simulate and process.simulate.kind == "joints" and moving:
+            continue
+        reason, advice = (
+            "it owns no edge",
+            f"write owner: {process.name} on the edge that it publishes, or remove it",
+        )
+        if process.simulate and process.simulate.kind == "joints":
+            reason, advice = "no joint moves", "remove it"
+        yield finding("TF815", f"unused process {process.name}: {reason}", process.at, help=advice)
+
+
+@rule("TF818")
+def required_without_role(robot: Robot) -> Iterator[Finding]:
+    """A required process owns no edge, and nothing waits for it.
+
+    When it ends, the whole robot stops, although nothing needs it. Remove ``required``, or declare
+    who needs it: ``after: {NAME: ready}`` on that process.
+    """
+    needed = _needed(robot)
+    for process in robot.processes:
+        if process.required and process.name not in needed and not robot.excuses(process.name):
+            message = f"{process.name} is required, but owns no edge, and nothing waits for it"
+            advice = (
+                f"remove required, or write after: {{{process.name}: ready}} on the process that"
+                " needs it"
+            )
+            yield finding("TF818", message, process.at, help=advice)
+
+
+@rule("TF847")
+def needed_but_optional(robot: Robot) -> Iterator[Finding]:
+    """A process that the robot needs waits for one with ``required: false``.
+
+    If the optional process fails, the other one never starts, and the whole robot stops: the
+    process is not optional after all. Write ``required: false`` on both, or on neither.
+    """
+    optional = {process.name: process for process in robot.processes if process.required is False}
+    for process in robot.processes:
+        if process.required is False or process.kind == "external":
+            continue
+        for name, what in process.after.items():
+            if name in optional:
+                message = f"{process.name} waits until {name} is {what}, but {name} is optional"
+                advice = f"write required: false on {process.name} too, or remove it from {name}"
+                notes = [Note(f"{name} is defined here", optional[name].at)]
+                yield finding("TF847", message, process.at, notes=notes, help=advice)
+
+
+@rule("TF848")
+def gate_never_opens(robot: Robot) -> Iterator[Finding]:
+    """A process waits for something that cannot happen before it is ready.
+
+    It owns no edges and waits for them to be live, or it waits for its own exit and always
+    restarts. It never becomes ready, and what waits for it never starts. Choose another ``ready``,
+    remove it, or remove ``restart: always``.
+    """
+    owners = {edge.owner for edge in robot.edges}
+    for process in robot.processes:
+        kind = process.ready.kind if process.ready else ""
+        if kind == "edges" and process.name not in owners:
+            message = f"{process.name} is ready when its edges are live, but it owns none"
+            yield finding(
+                "TF848",
+                message,
+                process.at,
+                help="remove ready, or wait for a topic or a line of output",
+            )
+        elif kind == "exit" and process.restart == "always":
+            message = (
+                f"{process.name} is ready when it has ended, but restart: always starts it again"
+            )
+            yield finding(
+                "TF848", message, process.at, help="write restart: on-failure, or remove restart"
+            )
+
+
+@rule("TF855")
+def component_elsewhere(robot: Robot) -> Iterator[Finding]:
+    """A component is to run on another computer than its container.
+
+    A component has no process of its own: it runs where its container does. Remove its ``host``.
+    """
+    processes = {process.name: process for process in robot.processes}
+    for process in robot.processes:
+        container = processes.get(process.component.container) if process.component else None
+        if container and process.host != container.host:
+            message = (
+                f"{process.name} is on {process.host}, but its container {container.name} is on"
+                f" {container.host}"
+            )
+            if container.host is None:
+                message = (
+                    f"{process.name} is on {process.host}, and its container {container.name}"
+                    " names no host"
+                )
+            notes = [Note(f"{container.name} is defined here", container.at)]
+            yield finding(
+                "TF855", message, process.at, notes=notes, help=f"remove host from {process.name}"
+            )
+
+
+@rule("TF856")
+def container_without_components(robot: Robot) -> Iterator[Finding]:
+    """A container has no components.
+
+    Nothing is ever loaded into it. Name it as the ``container`` of a component, or remove it.
+    Other files that this one is merged with, or profiles, may have its components.
+    """
+    used = {process.component.container for process in robot.processes if process.component}
+    for process in robot.processes:
+        if process.loads and process.name not in used:
+            advice = (
+                f"processes: {{NAME: {{component: PACKAGE/CLASS, container: {process.name}}}}}, or"
+                " remove it"
+            )
+            yield finding(
+                "TF856", f"the container {process.name} has no components", process.at, help=advice
+            )
+
+
+@rule("TF857")
+def host_not_declared(robot: Robot) -> Iterator[Finding]:
+    """A process names a host that is not among ``hosts``.
+
+    Nothing would start it: ``deploy`` goes to the computers under ``hosts``, and each starts what
+    names it. Correct the name, or declare the host. A robot without ``hosts`` may name any.
+    """
+    for process in robot.processes if robot.hosts else ():
+        name = process.host
+        if (
+            name is None
+            or process.host_at is None
+            or name in robot.hosts
+            or ("hosts", name) in robot.broken
+        ):
+            continue
+        otherwise = (
+            left_out_by(robot.conditions, name) or f"hosts: {{{name}: {{ssh: user@address}}}}"
+        )
+        advice = did_you_mean(name, robot.hosts, otherwise)
+        message = f"{process.name} is on {name}, which is not among hosts"
+        yield finding("TF857", message, process.host_at, help=advice)
+
+
+@rule("TF858", idle=True)
+def host_without_processes(robot: Robot) -> Iterator[Finding]:
+    """A host has no process.
+
+    Nothing names it as its ``host``, so nothing is deployed to it. What names no host runs where
+    ``static`` does. Name it, ``processes: {NAME: {host: HOST}}``, or remove it.
+    """
+    used = {process.host for process in robot.processes}
+    for name, host in robot.hosts.items():
+        if name not in used and ("hosts", name) not in robot.broken:
+            advice = (
+                f"processes: {{static: {{host: {name}}}}} runs all that names no other host, or"
+                " remove it"
+            )
+            yield finding("TF858", f"no process runs on the host {name}", host.at, help=advice)
+
+
+#: A number, a space and what may be a unit.
+_WITH_UNIT = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?) +(\S+)")
+
+
+@rule("TF859")
+def parameter_with_unit(robot: Robot) -> Iterator[Finding]:
+    """A parameter of a node is a number with a unit.
+
+    ROS parameters have no units, so the node gets a string, and most nodes end with
+    InvalidParameterTypeException. Write the number in the unit that the node expects:
+    ``wheel_separation: 0.4``. If the node does read such a string, allow the finding.
+    """
+    for process in robot.processes:
+        for node in process.ros_nodes:
+            for name, value in node.params.items():
+                parts = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
+                if parts and parts[2] in UNITS:
+                    at, *_ = node.places.get(name, (node.at,))
+                    message = f"{node.name} gets the parameter {name} as a string: {value}"
+                    advice = (
+                        f"parameters have no units: write {name}: {parts[1]}, in the unit that the"
+                        " node expects"
+                    )
+                    yield finding("TF859", message, at, help=advice)

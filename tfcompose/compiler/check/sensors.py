@@ -1,0 +1,361 @@
+"""Rules about sensors: calibrations, mounts and serial numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.poses import (
+    are_mirrored,
+    are_swapped,
+    envelope,
+    is_near,
+    placed,
+    side_of,
+    twins,
+)
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.geometry import IDENTITY_XYZW, Pose, angle_between, norm
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.foundation.catalogue import Severity
+    from tfcompose.model.robot import Calibration, Edge, MountedSensor, Process, Robot
+
+
+#: How much closer to the nominal pose the inverse must be, and within how many times the limit.
+_NEARER, _NEAR = 0.9, 3.0
+
+
+@rule("TF615")
+def calibration_probably_inverse(robot: Robot) -> Iterator[Finding]:
+    """A calibration is probably inverted.
+
+    It is beyond its limit from the nominal pose, the one in the robot file, and its inverse is
+    closer, within three times the limit; or there is no nominal pose, and the calibration puts the
+    sensor outside the robot while its inverse does not. Calibration tools differ in whether they
+    write the pose of the camera in the base or of the base in the camera. Check which one the file
+    holds, then invert its values, or swap the frames under ``calibration``: ``parent`` and
+    ``child``.
+    """
+    for edge in robot.edges:
+        measured, why = edge.calibration, _why_inverse(robot, edge)
+        if measured and why:
+            message = (
+                f"{measured.name} is probably the pose of {measured.parent} in {measured.child}:"
+                f" {why}"
+            )
+            advice = _if_inverse(measured)
+            note = Note("measured here", measured.at)
+            severity: Severity = "error" if measured.nominal else "warning"
+            yield finding(
+                "TF615", message, measured.named_at, help=advice, notes=[note], severity=severity
+            )
+
+
+def _if_inverse(measured: Calibration) -> str:
+    return (
+        f"if the file holds the pose of {measured.parent}, swap parent and child, or invert its"
+        " values"
+    )
+
+
+def _why_inverse(robot: Robot, edge: Edge) -> str:
+    """Return what shows that the edge's calibration is inverted, or an empty string."""
+    measured = edge.calibration
+    if measured is None or measured.entry == Pose():
+        return ""
+    back = measured.pose.inverse()
+    return (
+        _nearer(measured, back)
+        if measured.nominal
+        else _outside(robot, measured, back, edge.sensor)
+    )
+
+
+def _nearer(measured: Calibration, back: Pose) -> str:
+    times, inverted_times = _times_limit(measured, measured.pose), _times_limit(measured, back)
+    if times > 1 and inverted_times < min(_NEAR, _NEARER * times):
+        direct, inverted = (_distance(*measured.off(pose)) for pose in (measured.pose, back))
+        return f"{direct} from nominal, and {inverted} if inverted"
+    return ""
+
+
+def _times_limit(measured: Calibration, pose: Pose) -> float:
+    """Return how far the pose is from nominal, as a multiple of the limit."""
+    far, turned = measured.off(pose)
+    return max(far / (measured.limit_m or 1e-9), turned / (measured.limit_rad or 1e-9))
+
+
+def _outside(robot: Robot, measured: Calibration, back: Pose, sensor: str | None) -> str:
+    box = envelope(robot, measured.parent, sensor)
+    if box and not is_near(box, measured.pose.xyz) and is_near(box, back.xyz):
+        return f"it is {norm(measured.pose.xyz):.3g} m away, outside the robot; inverted it is not"
+    return ""
+
+
+@rule("TF616")
+def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
+    """A calibration is farther from the nominal pose than its limit.
+
+    The sensor was moved, the file belongs to another robot, the frames are not those meant, or the
+    nominal pose, the one in the robot file, is only approximate. Find out which, and correct the
+    wrong one, or raise the limit: ``limit: {xyz: 5 cm, rot: 5 deg}``.
+    """
+    for edge in robot.edges:
+        measured = edge.calibration
+        if measured is None or _is_all_zero(measured):
+            continue
+        far, turned = measured.off(measured.pose)
+        if far > measured.limit_m or turned > measured.limit_rad:
+            off, limit = _distance(far, turned), _distance(measured.limit_m, measured.limit_rad)
+            message = f"{measured.name} is {off} from nominal; the limit is {limit}"
+            advice = "correct the nominal pose, or raise limit: {xyz: …, rot: …}"
+            x, y, z = measured.pose.xyz
+            if far > measured.limit_m >= measured.off(Pose((x / 1000, y / 1000, z / 1000)))[0]:
+                advice = "the file's positions are probably in millimetres: convert them to metres"
+            elif _why_inverse(robot, edge):
+                advice = _if_inverse(measured)
+            notes = [Note("measured here", measured.at)]
+            yield finding("TF616", message, measured.named_at, help=advice, notes=notes)
+
+
+#: From here on angles are shown rounded to degrees.
+_ROUNDED_FROM_DEG = 10
+
+
+def _distance(metres: float, radians: float) -> str:
+    length = f"{round(metres * 1000, 3):.3g} mm" if metres < 1 else f"{metres:.3g} m"
+    angle_deg = round(math.degrees(radians), 3)
+    return (
+        f"{length} and {angle_deg:.2g} deg"
+        if angle_deg < _ROUNDED_FROM_DEG
+        else f"{length} and {angle_deg:.0f} deg"
+    )
+
+
+@rule("TF617")
+def calibration_all_zero(robot: Robot) -> Iterator[Finding]:
+    """A calibration is all zero, but the nominal pose is not.
+
+    The file was probably prepared and never filled in. Calibrate the sensor, or remove
+    ``calibration``: then the nominal pose, the one in the robot file, is used.
+    """
+    for edge in robot.edges:
+        measured = edge.calibration
+        if measured and _is_all_zero(measured):
+            message = f"{measured.name} is all zero, but its nominal pose is not"
+            advice = "calibrate the sensor, or remove calibration"
+            yield finding(
+                "TF617",
+                message,
+                measured.named_at,
+                help=advice,
+                notes=[Note("measured here", measured.at)],
+            )
+
+
+def _is_all_zero(measured: Calibration) -> bool:
+    """Return whether the calibration is all zero but its nominal pose is not."""
+    return (
+        measured.entry == Pose() and measured.nominal is not None and max(measured.off(Pose())) > 0
+    )
+
+
+@rule("TF618")
+def calibration_copied(robot: Robot) -> Iterator[Finding]:
+    """Two mounts have identical calibration values.
+
+    Two measurements never agree to the last digit: one was copied and not changed, or both name
+    the same entry. Name each mount's own entry, or calibrate the second one.
+    """
+    first: dict[Pose, Calibration] = {}
+    for edge in robot.edges:
+        measured = edge.calibration
+        if measured is None or measured.entry == Pose():
+            continue
+        other = first.setdefault(measured.entry, measured)
+        if other is not measured:
+            message = f"{measured.name} has the same values as that of {other.child}"
+            notes = [
+                Note(f"{other.child} was measured here", other.at),
+                Note("measured here", measured.at),
+            ]
+            advice = "name each mount's own entry, or calibrate the second one"
+            yield finding("TF618", message, measured.named_at, help=advice, notes=notes)
+
+
+#: What is built into other devices, and so may share their pose.
+_BUILT_IN_KINDS = frozenset({"imu", "gnss"})
+_SAME_M, _SAME_RAD = 1e-6, 1e-6
+#: A parent that is turned by more has other sides than the base.
+_TURNED_RAD = 0.02
+
+
+@rule("TF621", follows="pose")
+def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
+    """Two sensors are mounted at exactly the same pose.
+
+    Two bodies cannot be in one place: a mount was copied, and its numbers were not changed.
+    Measure the second one. IMUs and GNSS receivers, which may be inside another sensor, and
+    sensors without a pose are exempt; TF618 is about copied calibrations.
+    """
+    kinds = {sensor.name: sensor.kind for sensor in robot.sensors}
+    mounts = [
+        edge for edge in robot.edges if edge.given and edge.sensor in kinds and edge.pose != Pose()
+    ]
+    first: dict[tuple[object, ...], Edge] = {}
+    for edge in mounts:
+        if edge.calibration or kinds[edge.sensor or ""] in _BUILT_IN_KINDS:
+            continue
+        position = (edge.parent, *(round(part / _SAME_M) for part in edge.pose.xyz))
+        other = first.setdefault(position, edge)
+        turned = angle_between(edge.pose.quat_xyzw, other.pose.quat_xyzw)
+        if other is not edge and turned < _SAME_RAD and not are_mirrored(other, edge):
+            message = f"{edge.sensor} and {other.sensor} are at the same pose in {edge.parent}"
+            notes = [Note(f"{other.sensor} is mounted here", other.at)]
+            yield finding(
+                "TF621", message, edge.at, help="measure the pose of one of them", notes=notes
+            )
+
+
+@rule("TF622", follows="pose")
+def mount_copied(robot: Robot) -> Iterator[Finding]:
+    """A left frame is where the right one is, or a front one where the rear one is.
+
+    Both have the same position in the same parent, away from its middle: the entry was copied, and
+    the sign was not changed. By REP-103 y is positive to the left and x to the front. Example:
+    with ``wheel_left_link`` at y = 0.2, ``wheel_right_link`` is at −0.2.
+    """
+    given: dict[str, Edge] = {}
+    for edge in robot.edges:
+        if not edge.given:
+            continue
+        twin = next((given[name] for name in twins(edge.child) if name in given), None)
+        given.setdefault(edge.child, edge)
+        if twin and are_mirrored(twin, edge):
+            x, y, z = edge.pose.xyz
+            message = (
+                f"{edge.child} and {twin.child} are both at [{x:g}, {y:g}, {z:g}] in {edge.parent}"
+            )
+            notes = [Note(f"{twin.child} is defined here", twin.at)]
+            advice = "change the sign of one: y is positive to the left, x to the front"
+            yield finding("TF622", message, edge.at, help=advice, notes=notes)
+
+
+@rule("TF625", follows="pose")
+def sides_swapped(robot: Robot) -> Iterator[Finding]:
+    """A left frame is on the right of its parent and the right one on the left, or front and rear are swapped.
+
+    The two are each other's mirror image, and each stands where the other's name says. By REP-103
+    y is positive to the left and x to the front. Example: ``left_camera`` is at y = -0.1 and
+    ``right_camera`` at y = 0.1: what the left camera sees appears on the robot's right. Swap the
+    signs, or the names. Fixed frames and wheels are judged, in a parent turned as the base is: on
+    a rack that looks back, left is the robot's right. A gripper's fingers are named as their maker
+    likes.
+    """
+    poses = placed(robot, moving=True)
+    given: dict[str, Edge] = {}
+    for edge in robot.edges:
+        base = poses.get(edge.parent)
+        is_fixed = edge.joint.type == "continuous" if edge.joint else edge.kind == "static"
+        if (
+            not edge.given
+            or not is_fixed
+            or base is None
+            or angle_between(base.quat_xyzw, IDENTITY_XYZW) > _TURNED_RAD
+        ):
+            continue
+        twin = next((given[name] for name in twins(edge.child) if name in given), None)
+        given[edge.child] = edge
+        if twin and twin.parent == edge.parent and are_swapped(twin, edge):
+            axis = "xy"[side_of(edge.child, twin.child)[0]]
+            places = " and ".join(
+                f"{one.child} at {axis} = {one.pose.xyz['xy'.index(axis)]:g}"
+                for one in (twin, edge)
+            )
+            message = f"{places} in {edge.parent}: each is on the other's side"
+            notes = [Note(f"{twin.child} is defined here", twin.at)]
+            advice = "swap the signs, or the names: y is positive to the left, x to the front"
+            yield finding("TF625", message, edge.at, help=advice, notes=notes)
+
+
+#: Parts of parameter names that tell two devices apart as a serial number does.
+_DEVICE_WORDS = ("serial", "usb_port", "device_type", "device_id", "mxid", "guid", "mac", "ip")
+
+
+@rule("TF623")
+def serial_missing(robot: Robot) -> Iterator[Finding]:
+    """Two sensors have the same driver, and one has no serial number.
+
+    Each driver takes the first device that it finds: at the next start left and right may be
+    swapped, or both drivers compete for one device. Give each its serial number: ``options:
+    {serial: "123456789012"}``. Another parameter that identifies the device (``usb_port_id``,
+    ``device_type``) will do. External drivers are exempt.
+    """
+    processes = {
+        process.name: process
+        for process in robot.processes
+        if process.kind == "run" and process.package
+    }
+    groups: dict[tuple[str | None, str | None, str | None], list[MountedSensor]] = {}
+    for sensor in robot.sensors:
+        process = processes.get(sensor.driver)
+        if process and sensor.driver == sensor.name and sensor.serial_option:
+            groups.setdefault(
+                (process.package, process.executable, sensor.serial_option), []
+            ).append(sensor)
+    for group in groups.values():
+        for sensor in group if len(group) > 1 else ():
+            if not (
+                sensor.serial
+                or robot.excuses(sensor.name)
+                or _names_device(processes[sensor.driver])
+            ):
+                other = next(one for one in group if one is not sensor)
+                message = (
+                    f"{sensor.name} has no serial number, and {other.name} has the same driver"
+                )
+                notes = [Note(f"{other.name} is defined here", other.at)]
+                advice = f'add options: {{{sensor.serial_option}: "…"}}'
+                yield finding("TF623", message, sensor.at, help=advice, notes=notes)
+
+
+def _names_device(process: Process) -> bool:
+    """Whether a parameter names the device."""
+    return any(
+        word in re.split(r"[_.]", key) or (len(word) > _SHORT_WORD and word in key)
+        for key in process.params
+        for word in _DEVICE_WORDS
+    )
+
+
+_SHORT_WORD = 3
+
+
+@rule("TF624")
+def serial_used_twice(robot: Robot) -> Iterator[Finding]:
+    """Two sensors have the same serial number.
+
+    There is one such device, and only one of the drivers gets it. Read the number from the device,
+    or with the vendor's tool (``rs-enumerate-devices -s``).
+    """
+    first: dict[tuple[str, str], MountedSensor] = {}
+    for sensor in robot.sensors:
+        if sensor.serial:
+            other = first.setdefault((sensor.preset.partition("/")[0], str(sensor.serial)), sensor)
+            if other is not sensor:
+                message = (
+                    f"{sensor.name} and {other.name} have the same serial number {sensor.serial}"
+                )
+                notes = [Note(f"{other.name} is defined here", other.at)]
+                yield finding(
+                    "TF624",
+                    message,
+                    sensor.at,
+                    help="correct the number of one of the two",
+                    notes=notes,
+                )

@@ -1,0 +1,150 @@
+"""Rules about stock publishers of TF among a robot's processes: what they publish is on their command lines."""
+
+from __future__ import annotations
+
+import itertools
+import posixpath
+import re
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.text import with_more
+from tfcompose.model.robot import JOINTS, STATIC
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Edge, Process, Robot
+
+_STATIC_PUBLISHER, _STATE_PUBLISHER = "static_transform_publisher", "robot_state_publisher"
+#: The child of a joint in a description.
+_CHILD = re.compile(r"<child\s+link\s*=\s*[\"']([^\"']+)[\"']")
+#: The sections whose entries can name an owner.
+_WITH_OWNERS = frozenset({"frames", "links", "joints", "sensors", "parts"})
+#: How many words the forms without options have: a position, angles or a quaternion, and the two
+#: frames.
+_WITH_ANGLES, _WITH_QUATERNION = 8, 9
+
+
+@rule("TF317")
+def stock_publisher_publishes_too(robot: Robot) -> Iterator[Finding]:
+    """A stock static_transform_publisher or robot_state_publisher publishes edges that are not its own.
+
+    tfcompose publishes what it owns itself, so both would, and tf2 takes the last message. Remove
+    the process: fixed edges belong under ``frames`` or ``links``, and ``joints`` reads the joint
+    states. Or name the process as the ``owner`` of the edges. A robot_state_publisher whose
+    description is not in the robot file is taken to publish the robot, unless it owns an edge.
+    """
+    for process in robot.processes:
+        program = _program(process)
+        if program == _STATIC_PUBLISHER:
+            yield from _of_static_publisher(process, robot)
+        elif program == _STATE_PUBLISHER and not process.describes:
+            yield from _of_state_publisher(process, robot)
+
+
+def _program(process: Process) -> str:
+    """Return the name of the program that the process runs, empty if that is not known."""
+    if process.kind != "run" or process.launch is not None:
+        return ""
+    if process.executable is not None:
+        return process.executable
+    return posixpath.basename(process.argv[0]) if process.argv else ""
+
+
+def _of_static_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
+    names = _frames_of(_own_arguments(process))
+    if names is None:
+        return
+    known = {robot.final(frame): frame for frame in robot.frames}
+    parent, child = (known.get(name, name) for name in names)
+    edge = robot.parent_edge(child)
+    if robot.excuses(child) or (edge and edge.owner not in {one.name for one in robot.processes}):
+        return  # it was refused, or its owner was
+    if edge is None:
+        message = f"{process.name} publishes {parent} → {child}, which is not declared"
+        advice = f"replace it by frames: {{{child}: {{parent: {parent}, xyz: […], rpy: […]}}}}"
+        yield finding("TF317", message, process.at, help=advice, severity="warning")
+    elif edge.owner != process.name:
+        yield _publishes_too(process, f"{parent} → {child}", edge)
+
+
+def _own_arguments(process: Process) -> list[str]:
+    """Return the program's own arguments, without ROS's."""
+    words = list(process.argv if process.executable is not None else process.argv[1:])
+    return words[: words.index("--ros-args")] if "--ros-args" in words else words
+
+
+def _frames_of(words: list[str]) -> tuple[str, str] | None:
+    """Return the parent and the child on the command line of a static_transform_publisher, old form or new."""
+    if "--frame-id" in words or any(word.startswith("--frame-id=") for word in words):
+        parent, child = _option(words, "--frame-id"), _option(words, "--child-frame-id")
+        return (_plain(parent), _plain(child)) if parent and child else None
+    if len(words) in {_WITH_ANGLES, _WITH_QUATERNION}:
+        return _plain(words[-2]), _plain(words[-1])
+    return None
+
+
+def _option(words: list[str], name: str) -> str:
+    following = dict(itertools.pairwise(words))
+    joined = (word.partition("=")[2] for word in words if word.startswith(f"{name}="))
+    return following.get(name) or next(joined, "")
+
+
+def _plain(frame: str) -> str:
+    return frame.removeprefix("/")
+
+
+def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
+    params = process.params | _params_on_the_command_line(process)
+    described = params.get("robot_description")
+    text = described if isinstance(described, str) and "<robot" in described else None
+    mine = {edge.child for edge in robot.edges if edge.owner == process.name}
+    refused = any(
+        section in _WITH_OWNERS for section, _ in robot.broken
+    )  # its own edge may be among them
+    if text is None and (mine or refused or robot.excuses(process.name)):
+        return
+    children = {*_CHILD.findall(text)} if text is not None else robot.described()
+    prefix = params.get("frame_prefix", "")
+    known = {robot.final(frame): frame for frame in robot.frames}
+    sent = {
+        known.get(f"{prefix}{name}" if prefix or text is not None else robot.final(name))
+        for name in children
+    }
+    others = [
+        edge
+        for edge in robot.edges
+        if edge.child in sent - mine and edge.owner in {STATIC, JOINTS}
+    ]
+    edges = [edge for edge in others if not robot.excuses(edge.child)]
+    if edges:
+        yield _publishes_too(
+            process, with_more(edges[0].name, len(edges) - 1), edges[0], sure=text is not None
+        )
+
+
+def _params_on_the_command_line(process: Process) -> dict[str, str]:
+    """Return what ``-p NAME:=VALUE`` among ROS's arguments sets, each value as it is written."""
+    words = itertools.dropwhile(lambda word: word != "--ros-args", process.argv)
+    given = [value for option, value in itertools.pairwise(words) if option in {"-p", "--param"}]
+    return {name: value for name, sign, value in (one.partition(":=") for one in given) if sign}
+
+
+def _publishes_too(process: Process, what: str, edge: Edge, *, sure: bool = True) -> Finding:
+    will = "publishes" if sure else "probably publishes"
+    message = f"{process.name} {will} {what}, and so does {edge.owner}, the owner"
+    notes = [Note(f"{edge.name} is defined here", edge.owner_at or edge.at)]
+    advice = (
+        f"remove {process.name}, or write owner: {process.name} on the edges that it is meant to"
+        " publish"
+    )
+    return finding(
+        "TF317",
+        message,
+        process.at,
+        help=advice,
+        notes=notes,
+        severity="error" if sure else "warning",
+    )

@@ -1,0 +1,298 @@
+"""Rules about the tree: parents, cycles, roots, and the order of REP-105's frames."""
+
+from __future__ import annotations
+
+from itertools import count
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, Span, did_you_mean, finding
+from tfcompose.foundation.tree import below, children_of
+from tfcompose.model.robot import left_out_by
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Edge, Robot
+
+
+@rule("TF201", of_urdf=True)
+def two_parents(robot: Robot) -> Iterator[Finding]:
+    """A frame has two parents.
+
+    tf2 keeps one parent for each frame, the one in the newest message, and says nothing: the frame
+    jumps between the two. Decide which one is meant, and check that parent and child of the other
+    edge are not swapped. A camera whose driver publishes frames of its own is mounted by the first
+    of them.
+    """
+    first: dict[str, Edge] = {}
+    for edge in robot.edges:
+        other = first.setdefault(edge.child, edge)
+        if other.parent != edge.parent:
+            message = f"{edge.child} has two parents: {other.parent} and {edge.parent}"
+            notes = [Note(f"{other.name} is defined here, owned by {other.owner}", other.at)]
+            advice = "remove one of the two edges, or swap parent and child of one"
+            yield finding("TF201", message, edge.at, notes=notes, help=advice)
+
+
+@rule("TF202", of_urdf=True)
+def cycle(robot: Robot) -> Iterator[Finding]:
+    """Frames are each other's ancestors.
+
+    A transform tree has no cycles: tf2 finds no way through one, and URDF readers refuse it. One
+    of the edges points the wrong way: swap its parent and child, or give the child another parent.
+    """
+    above = {edge.child: edge for edge in reversed(robot.edges)}
+    done: set[str] = set()
+    for start in above:
+        path: dict[str, None] = {}  # in order, and quick to look up
+        frame = start
+        while frame in above and frame not in done and frame not in path:
+            path[frame] = None
+            frame = above[frame].parent
+        if frame in path:
+            loop = list(path)[list(path).index(frame) :]
+            names = " → ".join([*reversed(loop), loop[-1]])
+            notes = [
+                Note(f"{above[child].name} is defined here", above[child].at) for child in loop[1:]
+            ]
+            advice = (
+                "parent and child of one of these edges are probably swapped: swap them, or remove"
+                " that edge"
+            )
+            if len(loop) == 1:
+                advice = f"remove the parent of {frame}"
+                if frame in robot.mounted.values():
+                    advice += (
+                        f", and let the part share the frame: ros: {{shared_frames: [{frame}]}}"
+                    )
+            yield finding("TF202", f"cycle: {names}", above[loop[0]].at, notes=notes, help=advice)
+        done.update(path)
+    for edge in robot.edges:
+        for parent in edge.switched:
+            path = {}
+            frame = parent
+            while frame != edge.child and frame in above and frame not in path:
+                path[frame] = None
+                frame = above[frame].parent
+            if frame == edge.child:
+                names = " → ".join((frame, *reversed(path), frame))
+                message = f"cycle while {parent} is the parent of {edge.child}: {names}"
+                yield finding(
+                    "TF202",
+                    message,
+                    edge.at,
+                    help=f"remove {parent} from the parents of {edge.child}",
+                )
+
+
+#: For so many names the nearest one is looked for: among thousands that takes long, and thousands
+#: are no typos.
+_MOST_SEARCHES = 50
+
+
+@rule("TF203", of_urdf=True)
+def unknown_frame(robot: Robot) -> Iterator[Finding]:
+    """An edge names a frame that is not declared.
+
+    Frames are declared under ``frames`` or ``links``, or come with a sensor or a part. A misspelt
+    parent would start a second tree, which no lookup reaches.
+    """
+    searches = count(1)
+    moved = {edge.child for edge in robot.edges if edge.joint_name}
+
+    def advice(name: str, at: Span, section: str, child: str = "") -> str:
+        if conditional := left_out_by(robot.conditions, name):
+            return conditional
+        near = robot.frames if next(searches) <= _MOST_SEARCHES else ()
+        declare = (
+            f'add <link name="{name}"/>'
+            if robot.is_foreign(at)
+            else f"declare it: {section}: {{{name}: {{}}}}"
+        )
+        return did_you_mean(name, [one for one in near if one != child], declare)
+
+    for edge in robot.edges:
+        for parent in (edge.parent, *edge.switched) if edge.given else ():
+            if parent not in robot.frames and not robot.excuses(parent):
+                message = f"{edge.child}: unknown parent frame {parent}"
+                section = "links" if parent in moved else "frames"
+                yield finding(
+                    "TF203", message, edge.at, help=advice(parent, edge.at, section, edge.child)
+                )
+        if edge.child not in robot.frames and not robot.excuses(edge.child):
+            at = edge.child_at or edge.at
+            message = f"joint {edge.joint_name}: unknown child link {edge.child}"
+            yield finding("TF203", message, at, help=advice(edge.child, at, "links"))
+
+
+@rule("TF204", of_urdf=True)
+def several_roots(robot: Robot) -> Iterator[Finding]:
+    """The robot consists of several trees.
+
+    There is no transform between frames of two trees. Give every root but one a parent, and remove
+    trees that nobody needs. A part that brings its own ``map`` can share it: ``ros:
+    {shared_frames: [map]}``.
+    """
+    grown = _trees(robot)
+    main = _main_root(robot, grown)
+    for root, frames in grown.items():
+        if root != main and len(frames) > 1 and not robot.excuses(root):
+            at = robot.frames[root]
+            message = (
+                f"{root} is not connected to {main}: it is the root of a separate tree with"
+                f" {len(frames)} frames"
+            )
+            notes = [
+                Note(f"{main}, the root of the robot's tree, is declared here", robot.frames[main])
+            ]
+            advice = f"give {root} a parent"
+            if robot.is_foreign(at):
+                advice = "connect the trees with a fixed joint"
+            elif "/" in root and root in robot.mounted.values():
+                advice += (
+                    f", or share the frame: ros: {{shared_frames: [{root.rpartition('/')[2]}]}}"
+                )
+            yield finding("TF204", message, at, notes=notes, help=advice)
+
+
+@rule("TF205", of_urdf=True)
+def edge_given_twice(robot: Robot) -> Iterator[Finding]:
+    """An edge is defined twice.
+
+    Both definitions would be published, and which one a listener keeps depends on when it starts.
+    Keep the one that was measured.
+    """
+    first: dict[tuple[str, str], Edge] = {}
+    for edge in robot.edges:
+        other = first.setdefault((edge.parent, edge.child), edge)
+        if other is not edge and other.owner == edge.owner:
+            notes = [Note("first defined here", other.at)]
+            yield finding(
+                "TF205",
+                f"edge {edge.name} is defined twice",
+                edge.at,
+                notes=notes,
+                help="remove one",
+            )
+
+
+@rule("TF206", of_urdf=True)
+def no_frames(robot: Robot) -> Iterator[Finding]:
+    """The robot has no frames.
+
+    There is nothing to publish and nothing to describe. A robot has at least a ``base_link``,
+    under ``links``.
+    """
+    if not robot.frames and not robot.broken:
+        at = Span(robot.file)
+        advice = '<link name="base_link"/>' if robot.is_foreign(at) else "links: {base_link: {}}"
+        yield finding(
+            "TF206", f"{robot.name or 'the robot'} has no frames", at, help=f"add {advice}"
+        )
+
+
+#: From the world inwards, as REP-105 orders them. base_footprint and base_link are one level:
+#: TF208 is about the two.
+_LEVELS = {"earth": 0, "map": 1, "odom": 2, "base_footprint": 3, "base_link": 3}
+
+#: No more edges are followed upwards than this.
+_MOST_ANCESTORS = 100
+
+
+@rule("TF207")
+def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
+    """The frames earth, map, odom and base_link are not in the order that REP-105 gives.
+
+    Localisation publishes map → odom and odometry odom → base_link; navigation, SLAM and recorded
+    data rely on it. A node that publishes its edge in a chain of another order gives a frame a
+    second parent. Levels may be left out. Swap parent and child, and invert the pose. Example:
+    ``odom: {parent: map}``, ``base_link: {parent: odom}``.
+    """
+    above = {edge.child: edge for edge in reversed(robot.edges)}
+    for edge in robot.edges:
+        prefix, level = _level(edge.child)
+        passed, parent = {edge.child}, edge.parent
+        while level is not None and parent not in passed and len(passed) < _MOST_ANCESTORS:
+            passed.add(parent)
+            other_prefix, other = _level(parent)
+            if other is not None and other > level and other_prefix in {prefix, ""}:
+                message = (
+                    f"{edge.child} is below {parent}; REP-105 has {parent} below {edge.child}"
+                )
+                advice = (
+                    "the order is earth → map → odom → base_link: swap parent and child, and"
+                    " invert the pose"
+                )
+                yield finding("TF207", message, edge.at, help=advice)
+                break
+            parent = above[parent].parent if parent in above else parent
+
+
+def _level(frame: str) -> tuple[str, int | None]:
+    prefix, _, name = frame.rpartition("/")
+    return prefix, _LEVELS.get(name)
+
+
+@rule("TF208")
+def base_footprint_below_base_link(robot: Robot) -> Iterator[Finding]:
+    """base_footprint is a child of base_link; it should be the parent.
+
+    base_footprint is the robot's position on the ground and stays level while the robot pitches
+    and rolls. As a child of base_link it tilts along, and odometry that publishes base_footprint
+    would give it a second parent. Write ``base_link: {parent: base_footprint, xyz: [0, 0, 0.1]}``,
+    and let odometry move base_footprint. On a robot that never tilts only the name is wrong: allow
+    the finding there.
+    """
+    for edge in robot.edges:
+        prefix, _, name = edge.child.rpartition("/")
+        above, _, parent = edge.parent.rpartition("/")
+        if (name, parent) == ("base_footprint", "base_link") and prefix == above:
+            message = f"{edge.child} is a child of {edge.parent}, so it tilts with the robot"
+            advice = (
+                f"swap the two: {edge.parent}: {{parent: {edge.child}}}, with the inverse pose"
+            )
+            yield finding("TF208", message, edge.at, help=advice)
+
+
+@rule("TF209", of_urdf=True)
+def unused_frame(robot: Robot) -> Iterator[Finding]:
+    """A link or frame has neither a parent nor a child.
+
+    No joint and no mount uses it, no lookup reaches it, and readers refuse a URDF with such a
+    link. Give it a parent, or remove it.
+    """
+    grown = _trees(robot)
+    main = _main_root(robot, grown)
+    for root, frames in grown.items():
+        if root != main and len(frames) == 1 and not robot.excuses(root):
+            at = robot.frames[root]
+            message = (
+                f"{'link' if root in robot.links else 'frame'} {root} has neither a parent nor a"
+                " child"
+            )
+            notes = [
+                Note(f"{main}, the root of the robot's tree, is declared here", robot.frames[main])
+            ]
+            joint = robot.is_foreign(at)
+            advice = (
+                "remove it, or connect it with a joint"
+                if joint
+                else f"give {root} a parent, or remove it"
+            )
+            yield finding("TF209", message, at, notes=notes, help=advice)
+
+
+def _trees(robot: Robot) -> dict[str, set[str]]:
+    """Return the frames of each root's tree, the root too, in the order of declaration.
+
+    A frame with parents in two trees is in both; frames that are each other's ancestors are in
+    none.
+    """
+    children = children_of((edge.parent, edge.child) for edge in robot.edges)
+    return {root: below(children, root) for root in robot.roots()}
+
+
+def _main_root(robot: Robot, grown: dict[str, set[str]]) -> str:
+    """Return the root of the tree that holds the robot's base, or of the largest one; empty where there is none."""
+    return max(grown, key=lambda root: (robot.base in grown[root], len(grown[root])), default="")

@@ -1,0 +1,102 @@
+"""The whole way from text to files, on one screen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check import check, silenced, with_replaced
+from tfcompose.compiler.resolve import Disk, Library, resolve
+from tfcompose.foundation.findings import Allow, Finding, RejectedError, without_duplicates
+from tfcompose.spec.language import (
+    Given,
+    composed,
+    levels_of,
+    profiles_in,
+    validate,
+    with_includes,
+)
+from tfcompose.spec.load import Source, load
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.model.robot import Robot
+
+
+NOTHING = Given()
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """A robot and everything that was found; ``robot`` is None where the text did not get that far.
+
+    ``allows`` are the comments that silence findings, ``used`` those that did, with the code.
+    ``sources`` are what the robot was made from, overlays merged over it: its own file's, and
+    those of the robot files that are parts.
+    """
+
+    robot: Robot | None
+    found: tuple[Finding, ...]
+    allows: tuple[Allow, ...] = ()
+    used: frozenset[tuple[Allow, str]] = frozenset()
+    sources: tuple[Source, ...] = ()
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """The findings that stand in the way of a build."""
+        return tuple(found for found in self.found if found.severity == "error")
+
+
+def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
+    text: str,
+    file: str,
+    library: Library,
+    profiles: Sequence[str] = (),
+    *,
+    overlays: Sequence[Source] = (),
+    read: Callable[[str], str] | None = None,
+    disk: Disk | None = None,
+    given: Given = NOTHING,
+) -> Compiled:
+    """Return the robot that the text describes with profiles and overlays merged over it, and all findings, by place.
+
+    ``read`` gives the text of a file that is included or holds a calibration; without it nothing
+    can be. ``disk`` says which files and packages there are; without it no mesh is looked for.
+    ``given`` are its arguments' values, and the environment, which is empty otherwise.
+    """
+    try:
+        source = load(text, file)
+        source = with_includes(source, read) if read else source
+    except RejectedError as error:
+        return Compiled(None, error.findings)
+    return compile_source(source, library, profiles, overlays, read, disk, given)
+
+
+def compile_source(  # noqa: PLR0913, PLR0917 (as above)
+    source: Source,
+    library: Library,
+    profiles: Sequence[str] = (),
+    overlays: Sequence[Source] = (),
+    read: Callable[[str], str] | None = None,
+    disk: Disk | None = None,
+    given: Given = NOTHING,
+) -> Compiled:
+    """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
+    try:
+        validated = validate(
+            composed(source, profiles, overlays, given), profiles_in(source), given
+        )
+    except RejectedError as error:
+        return Compiled(None, error.findings)
+    resolved = resolve(validated, library, read, disk)
+    source, parts = validated.source, resolved.collected
+    found = without_duplicates([*validated.found, *resolved.found, *check(resolved.robot)])
+    rules = {
+        word: (level, source.at_key(("rules", word)))
+        for word, level in levels_of(validated, resolved.robot.limits)
+    }
+    sources = (source, *parts.sources)
+    kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
+    ordered = sorted(kept, key=lambda one: one.sort_key)
+    return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), sources)

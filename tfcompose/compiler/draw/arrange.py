@@ -1,0 +1,171 @@
+"""Whether a picture goes to the right, down, or in columns.
+
+In columns the subtrees below the frame where the tree first branches stand side by side. The
+frames above it stay in a row on top, from where one line runs along the top of all columns, and
+down on the left of each, so that no edge crosses a box. Subtrees keep their shape and their order:
+down the first column, then the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from tfcompose.compiler.draw.layout import INDENT, PAD, ROW_GAP, Layout, Trunk, layout
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.compiler.draw.graph import Forest, Graph
+    from tfcompose.compiler.draw.layout import Area, Place
+
+Direction = Literal["auto", "right", "down", "columns"]
+
+WIDEST, WIDEST_RATIO = (
+    1600.0,
+    3.0,
+)  # a picture is drawn downwards if it is wider, also in relation to its height
+TALLEST, TALLEST_RATIO = (
+    900.0,
+    1.5,
+)  # and in columns if it is taller, also in relation to its width
+MOST_COLUMNS = 8
+COLUMN_GAP = 24.0
+FROM_LINE = 22.0  # from the line on the left of a column to its frames
+
+
+def arrange(graph: Graph, forest: Forest, direction: Direction = "auto") -> Layout:
+    """Return the position of everything, from (0, 0); ``auto`` goes to the right, unless it is too wide or too tall."""
+    if direction == "down":
+        return layout(graph, forest, is_down=True)
+    flat = layout(graph, forest, is_down=False)
+    if direction == "auto" and flat.width > max(WIDEST, WIDEST_RATIO * flat.height):
+        return layout(graph, forest, is_down=True)
+    is_too_tall = direction == "auto" and flat.height > max(TALLEST, TALLEST_RATIO * flat.width)
+    return in_columns(forest, flat) if direction == "columns" or is_too_tall else flat
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """A subtree: its frames and areas, and its extent in the picture to the right."""
+
+    frames: tuple[str, ...]
+    areas: tuple[Area, ...]
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    @property
+    def height(self) -> float:
+        """The height with the gap to the next one."""
+        return self.bottom - self.top + ROW_GAP
+
+
+def in_columns(forest: Forest, flat: Layout) -> Layout:
+    """Return the layout to the right, ``flat``, in as few columns as make it no taller than wide.
+
+    It stays as it is where there is more than one root, nothing branches, or a group begins above
+    the branches.
+    """
+    stem = _stem(forest)
+    children = forest.children[stem[-1]] if stem else []
+    if len(children) < 2 or any(area.frame in stem for area in flat.areas):  # noqa: PLR2004 (it does not branch)
+        return flat
+    blocks = [_block(forest, flat, child) for child in children]
+    result = flat
+    for count in range(2, min(MOST_COLUMNS, len(blocks)) + 1):
+        result = _placed(forest, flat, stem, _split(blocks, count))
+        if result.height <= result.width:
+            break
+    return result
+
+
+def _stem(forest: Forest) -> list[str]:
+    """Return the frames from the only root to the first with several children; empty where there are several roots."""
+    roots = [frame for frame in forest.order if frame not in forest.up]
+    if len(roots) != 1 or forest.extra:
+        return []
+    stem = roots
+    while len(forest.children[stem[-1]]) == 1:
+        stem = [*stem, forest.children[stem[-1]][0]]
+    return stem
+
+
+def _block(forest: Forest, flat: Layout, child: str) -> _Block:
+    frames, waiting = [], [child]
+    while waiting:
+        frames.append(waiting.pop())
+        waiting += forest.children[frames[-1]]
+    inside = frozenset(frames)
+    places = [flat.places[frame] for frame in frames]
+    areas = tuple(area for area in flat.areas if area.frame in inside)
+    return _Block(
+        tuple(frames),
+        areas,
+        min([place.x for place in places] + [area.x for area in areas]),
+        min([2 * place.y - place.bottom for place in places] + [area.top for area in areas]),
+        max([place.right for place in places] + [area.right for area in areas]),
+        max([place.bottom for place in places] + [area.bottom for area in areas]),
+    )
+
+
+def _split(blocks: Sequence[_Block], count: int) -> list[list[_Block]]:
+    """Return the blocks in their order in at most so many columns, of which the tallest is as low as possible."""
+    low, high = max(block.height for block in blocks), sum(block.height for block in blocks)
+    while high - low > 1:
+        middle = (low + high) / 2
+        low, high = (low, middle) if len(_filled(blocks, middle)) <= count else (middle, high)
+    return _filled(blocks, high)
+
+
+def _filled(blocks: Sequence[_Block], height: float) -> list[list[_Block]]:
+    columns: list[list[_Block]] = [[]]
+    filled = 0.0
+    for block in blocks:
+        if columns[-1] and filled + block.height > height:
+            columns.append([])
+            filled = 0.0
+        columns[-1].append(block)
+        filled += block.height
+    return columns
+
+
+def _placed(
+    forest: Forest, flat: Layout, stem: Sequence[str], columns: Sequence[Sequence[_Block]]
+) -> Layout:
+    places: dict[str, Place] = {}
+    areas: list[Area] = []
+    middle = max(flat.places[frame].height for frame in stem) / 2
+    for frame in stem:
+        places[frame] = replace(flat.places[frame], y=middle)
+    line = 2 * middle + PAD + ROW_GAP
+    lines: dict[str, float] = {}
+    x, width, height = INDENT / 2, places[stem[-1]].right, line
+    for column in columns:
+        y = line + ROW_GAP
+        left = min(block.left for block in column)
+        shift = x + FROM_LINE - left
+        for block in column:
+            lines[block.frames[0]] = x
+            fall = y - block.top
+            for frame in block.frames:
+                place = flat.places[frame]
+                places[frame] = replace(place, x=place.x + shift, y=place.y + fall)
+            areas += (
+                replace(
+                    one,
+                    x=one.x + shift,
+                    right=one.right + shift,
+                    top=one.top + fall,
+                    bottom=one.bottom + fall,
+                )
+                for one in block.areas
+            )
+            y += block.height
+        height = max(height, y - ROW_GAP)
+        right = max(block.right for block in column) + shift
+        width = max(width, right)
+        x = right + COLUMN_GAP
+    ordered = {frame: places[frame] for frame in forest.order}
+    return Layout(ordered, tuple(areas), width, height, trunk=Trunk(stem[-1], line, lines))

@@ -1,0 +1,178 @@
+"""What a picture shows: frames, edges, groups and owners, whether they were declared or observed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Kind = Literal["static", "joint", "dynamic"]
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """An edge: in the child's box, ``detail`` follows its name, and ``pose`` is on a second line.
+
+    An ``alternative`` is a further parent between which an owner switches, as a tool changer does;
+    the layout ignores it.
+    """
+
+    parent: str
+    child: str
+    kind: Kind
+    owner: str
+    detail: str = ""
+    pose: str = ""
+    alternative: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Frames that belong together, such as those of a sensor."""
+
+    label: str
+    frames: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """A tree, or what is there instead: several roots, second parents and cycles are drawn as they are.
+
+    Frames that edges name need not be in ``frames``. The order of frames and edges is that of the
+    picture; ``owners`` are in the order of their colours. ``hidden`` are the edges to frames that
+    are not drawn.
+    """
+
+    title: str
+    frames: tuple[str, ...]
+    arrows: tuple[Arrow, ...]
+    groups: tuple[Group, ...] = ()
+    owners: tuple[str, ...] = ()
+    hidden: tuple[Arrow, ...] = ()
+
+    def all_frames(self) -> list[str]:
+        """Return every frame once: those that were given, then those that only edges and groups name."""
+        ends = (end for arrow in self.arrows for end in (arrow.parent, arrow.child))
+        return list(
+            dict.fromkeys(
+                (*self.frames, *ends, *(frame for group in self.groups for frame in group.frames))
+            )
+        )
+
+    def all_owners(self) -> list[str]:
+        """Return every owner once: those that were given, then those that only edges name."""
+        return list(dict.fromkeys((*self.owners, *(arrow.owner for arrow in self.arrows))))
+
+
+def collapsed(graph: Graph) -> Graph:
+    """Return the graph with each group as the frames that others need: where it begins, and what leads to others."""
+    up = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
+    inside = {frame: group for group in graph.groups for frame in group.frames}
+    first = {
+        frame
+        for frame, group in inside.items()
+        if frame not in up or inside.get(up[frame].parent) != group
+    }
+    needed = set(first)
+    for arrow in graph.arrows:
+        frame = arrow.parent
+        while frame in inside and inside.get(arrow.child) != inside[frame] and frame not in needed:
+            needed.add(frame)
+            frame = up[frame].parent
+    gone = inside.keys() - needed
+    beneath = {
+        frame: sum(one in gone for one in inside[frame].frames)
+        for frame in first
+        if len(inside[frame].frames) > 1
+    }
+    arrows = tuple(
+        (
+            replace(arrow, detail=f"{arrow.detail} +{beneath[arrow.child]}".strip())
+            if beneath.get(arrow.child)
+            else arrow
+        )
+        for arrow in graph.arrows
+        if arrow.child not in gone and arrow.parent not in gone
+    )
+    groups = tuple(
+        replace(group, frames=tuple(one for one in group.frames if one in needed))
+        for group in graph.groups
+    )
+    return replace(
+        graph,
+        frames=tuple(frame for frame in graph.frames if frame not in gone),
+        arrows=arrows,
+        groups=groups,
+        hidden=tuple(
+            arrow for arrow in graph.arrows if arrow.child in gone and not arrow.alternative
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Forest:
+    """A graph as trees: ``order`` holds the frames from top to bottom, each before its descendants.
+
+    ``up`` is the arrow from a frame's parent, ``extra`` are the others, ``group`` the index of a
+    frame's group.
+    """
+
+    order: tuple[str, ...]
+    up: dict[str, Arrow]
+    children: dict[str, list[str]]
+    extra: tuple[Arrow, ...]
+    group: dict[str, int]
+
+    def enters(self, frame: str) -> bool:
+        """Return whether the frame is where its group begins."""
+        group = self.group.get(frame)
+        return group is not None and (
+            frame not in self.up or self.group.get(self.up[frame].parent) != group
+        )
+
+
+def forest_of(graph: Graph) -> Forest:
+    """Return the graph as trees: a frame with several parents is below the first, and a cycle is broken once.
+
+    Children of the same group as their parent come first, so that a group stays together.
+    """
+    group = {frame: index for index, one in enumerate(graph.groups) for frame in one.frames}
+    frames = graph.all_frames()
+    first: dict[str, Arrow] = {}
+    for arrow in graph.arrows:
+        if not arrow.alternative and arrow.parent != arrow.child:
+            first.setdefault(arrow.child, arrow)
+    below: dict[str, list[str]] = {frame: [] for frame in frames}
+    for child, arrow in first.items():
+        below[arrow.parent].append(child)
+    if group:
+        for parent, children in below.items():
+            mine = group.get(parent, -1)
+            children.sort(key=lambda child, mine=mine: group.get(child) != mine)  # type: ignore[misc]
+    order, up = _walk(frames, first, below)
+    kept = {
+        child: [one for one in children if up.get(one) is first[one]]
+        for child, children in below.items()
+    }
+    extra = tuple(arrow for arrow in graph.arrows if up.get(arrow.child) is not arrow)
+    return Forest(order, up, kept, extra, group)
+
+
+def _walk(
+    frames: Iterable[str], first: dict[str, Arrow], below: dict[str, list[str]]
+) -> tuple[tuple[str, ...], dict[str, Arrow]]:
+    """Return the frames in the order of the picture, and the arrow from each one's parent; cycles come last."""
+    order: dict[str, None] = {}
+    up: dict[str, Arrow] = {}
+    for root in (*(frame for frame in frames if frame not in first), *frames):
+        waiting = [root] if root not in order else []
+        while waiting:
+            frame = waiting.pop()
+            order[frame] = None
+            for child in reversed(below[frame]):
+                if child not in order:
+                    up[child] = first[child]
+                    waiting.append(child)
+    return tuple(order), up

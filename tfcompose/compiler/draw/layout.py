@@ -1,0 +1,218 @@
+"""The position of each frame: a tree from left to right, a row for each leaf, a parent in the middle of its children.
+
+Or, downwards, a row for each frame, below its parent and a little to its right: what is long, such
+as an arm, then fits a page. The rows of two subtrees that do not contain one another are apart,
+and a child begins to the right of its parent, or below it, so no two boxes overlap. The cost grows
+with the number of frames.
+
+A group's rectangle is drawn around its own frames, and around their descendants where those are in
+between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.draw.style import STYLES, shortened, width_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.compiler.draw.graph import Forest, Graph
+
+NAME_SIZE, MORE_SIZE, LABEL_SIZE = STYLES["name"].size, STYLES["more"].size, STYLES["label"].size
+BOX_HEIGHT, POSE_HEIGHT = 24.0, 14.0
+ROW_GAP = 8.0
+BADGE_WIDTH = 18.0
+BETWEEN = 8.0  # between a name and its detail
+LABEL_STRIP = 16.0
+TREE_GAP = 10.0
+NEAREST, FARTHEST, STEEPNESS = (
+    28.0,
+    100.0,
+    0.08,
+)  # from a parent to its children: more for a wide fan
+INDENT = 28.0  # downwards, from a parent's left edge to its children's
+PAD = 8.0  # between a text and its box, and between a group and its frames
+
+
+@dataclass(slots=True)
+class Place:
+    """A frame's box: its left edge, the middle of its height, its width and height, in px from the top left corner."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    @property
+    def right(self) -> float:
+        """The box's right edge."""
+        return self.x + self.width
+
+    @property
+    def bottom(self) -> float:
+        """The box's lower edge."""
+        return self.y + self.height / 2
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """The rectangle of a group, with a strip for the label on top; ``frame`` is where the group begins."""
+
+    frame: str
+    x: float
+    top: float
+    right: float
+    bottom: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trunk:
+    """The line from a frame to its children in columns: its y above them, and by child the x where it goes down."""
+
+    frame: str
+    y: float
+    lines: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """All places, the groups' areas (outer ones first), the size of it all, and whether it goes down, or in columns."""
+
+    places: dict[str, Place]
+    areas: tuple[Area, ...]
+    width: float
+    height: float
+    is_down: bool = False
+    trunk: Trunk | None = None
+
+
+def layout(graph: Graph, forest: Forest, *, is_down: bool) -> Layout:
+    """Return the position of everything, from (0, 0), down or to the right."""
+    places = {frame: _box(forest, frame) for frame in forest.order}
+    bands, height = _rows(forest, places, is_down=is_down)
+    (_indented if is_down else _columns)(forest, places)
+    areas, width = _areas(graph, forest, places, bands)
+    return Layout(places, areas, width, height, is_down)
+
+
+def _box(forest: Forest, frame: str) -> Place:
+    arrow = forest.up.get(frame)
+    width = width_of(shortened(frame), NAME_SIZE) + 2 * PAD
+    if arrow is None:
+        return Place(0.0, 0.0, width, BOX_HEIGHT)
+    if arrow.detail:
+        width += BETWEEN + width_of(shortened(arrow.detail), MORE_SIZE)
+    if not arrow.pose:
+        return Place(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT)
+    width = max(width, width_of(shortened(arrow.pose), MORE_SIZE) + 2 * PAD)
+    return Place(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT + POSE_HEIGHT)
+
+
+def _rows(
+    forest: Forest, places: dict[str, Place], *, is_down: bool
+) -> tuple[dict[str, tuple[float, float]], float]:
+    """Give each frame its y; return the top and bottom of each group, by the frame where it begins, and the height."""
+    bands: dict[str, tuple[float, float]] = {}
+    row = max((place.height for place in places.values()), default=0.0)
+    y = 0.0
+    waiting = [(frame, False) for frame in reversed(forest.order) if frame not in forest.up]
+    while waiting:
+        frame, done = waiting.pop()
+        if done:
+            place, children = places[frame], forest.children[frame]
+            if not is_down:
+                place.y = (
+                    round((places[children[0]].y + places[children[-1]].y) / 2)
+                    if children
+                    else y + row / 2
+                )
+                y += 0.0 if children else row + ROW_GAP
+            if frame in bands:
+                bands[frame] = (bands[frame][0], y - ROW_GAP + PAD)
+                y += PAD
+            continue
+        if frame not in forest.up and y:
+            y += TREE_GAP
+        if forest.enters(frame):
+            bands[frame] = (y, y)
+            y += LABEL_STRIP + PAD / 2
+        if is_down:
+            places[frame].y = y + places[frame].height / 2
+            y += places[frame].height + ROW_GAP
+        waiting.append((frame, True))
+        waiting += [(child, False) for child in reversed(forest.children[frame])]
+    return bands, max(0.0, y - ROW_GAP)
+
+
+def _columns(forest: Forest, places: dict[str, Place]) -> None:
+    for frame in forest.order:
+        place, children = places[frame], forest.children[frame]
+        if frame not in forest.up and forest.enters(frame):
+            place.x = PAD
+        if not children:
+            continue
+        span = places[children[-1]].y - places[children[0]].y
+        gap: float = round(min(FARTHEST, NEAREST + STEEPNESS * span))
+        gap += PAD if any(forest.enters(child) for child in children) else 0.0
+        for child in children:
+            places[child].x = round(place.right) + gap
+
+
+def _indented(forest: Forest, places: dict[str, Place]) -> None:
+    for frame in forest.order:
+        place = places[frame]
+        if frame not in forest.up and forest.enters(frame):
+            place.x = PAD
+        for child in forest.children[frame]:
+            places[child].x = place.x + INDENT + (PAD if forest.enters(child) else 0.0)
+
+
+def _areas(
+    graph: Graph, forest: Forest, places: dict[str, Place], bands: dict[str, tuple[float, float]]
+) -> tuple[tuple[Area, ...], float]:
+    """Return the areas, outer ones first, and the total width.
+
+    ``bands`` holds the top and bottom of a frame where a group begins, with its descendants.
+    """
+    order = forest.order
+    reach = {frame: place.right for frame, place in places.items()}
+    count = dict.fromkeys(order, 1)
+    areas = []
+    for index in range(len(order) - 1, -1, -1):
+        frame = order[index]
+        for child in forest.children[frame]:
+            reach[frame] = max(reach[frame], reach[child])
+            count[frame] += count[child]
+        if frame in bands:
+            below = order[index : index + count[frame]]
+            label = places[frame].x + width_of(
+                shortened(graph.groups[forest.group[frame]].label), LABEL_SIZE
+            )
+            own = _own(forest, places, frame, below, label)
+            right, bottom = own or (max(reach[frame], label) + PAD, bands[frame][1])
+            reach[frame] = max(reach[frame], right)
+            areas.append(Area(frame, places[frame].x - PAD, bands[frame][0], right, bottom))
+    return tuple(reversed(areas)), max(reach.values(), default=0.0)
+
+
+def _own(
+    forest: Forest, places: dict[str, Place], begin: str, below: Sequence[str], label: float
+) -> tuple[float, float] | None:
+    """Return the right and lower edge around the group's own frames, or None if other frames are in the way.
+
+    ``label`` is where the group's label ends.
+    """
+    group = forest.group[begin]
+    own = [places[frame] for frame in below if forest.group.get(frame) == group]
+    right = max(label, *(place.right for place in own)) + PAD
+    bottom = max(place.bottom for place in own) + PAD
+    if len(own) < len(below):
+        for frame in below:
+            place = places[frame]
+            near = place.x - PAD < right and place.bottom - place.height - PAD < bottom
+            if near and forest.group.get(frame) != group:
+                return None
+    return right, bottom

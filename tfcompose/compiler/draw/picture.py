@@ -1,0 +1,342 @@
+"""A graph as a drawing: boxes, curves and texts, with a legend, which any format can be written from.
+
+Lengths are in px from the top left corner, y down.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Union
+
+from tfcompose.compiler.draw.arrange import Direction, arrange
+from tfcompose.compiler.draw.graph import forest_of
+from tfcompose.compiler.draw.layout import (
+    BADGE_WIDTH,
+    BETWEEN,
+    INDENT,
+    LABEL_STRIP,
+    PAD,
+    POSE_HEIGHT,
+)
+from tfcompose.compiler.draw.style import STYLES, colour_of, shortened, width_of
+from tfcompose.foundation.text import counted
+
+if TYPE_CHECKING:
+    from tfcompose.compiler.draw.graph import Arrow, Forest, Graph
+    from tfcompose.compiler.draw.layout import Area, Layout, Place
+
+Point = tuple[float, float]
+
+MARGIN = 16.0
+CORNER = 5.0
+BASE = 4.2  # from the middle of a name down to its base line
+MIN_WIDTH = 440.0
+LEGEND_LINE = 22.0
+ITEM_GAP = 20.0
+SAMPLE_WIDTH = 34.0
+#: What each kind of line means, in the order of the legend.
+LINES = {
+    "static": "fixed",
+    "joint": "moved by joint states",
+    "dynamic": "moving",
+    "alternative": "another parent, by turns",
+}
+
+
+@dataclass(slots=True)
+class Box:
+    """A rectangle with rounded corners."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    radius: float
+    style: str
+
+
+@dataclass(slots=True)
+class Curve:
+    """Cubic curves in a row, by their points: four of the first, three more of each further one.
+
+    ``about`` is its description, in formats that can show one.
+    """
+
+    points: tuple[Point, ...]
+    style: str
+    about: str = ""
+
+    @property
+    def straight(self) -> bool:
+        """Whether it is a level line from left to right."""
+        return len({y for _, y in self.points}) == 1
+
+
+def _level(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the curve that leaves and arrives horizontally."""
+    bend = (start[0] + end[0]) / 2
+    return start, (bend, start[1]), (bend, end[1]), end
+
+
+def _falling(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the curve that leaves downwards and arrives horizontally."""
+    corner = (start[0], end[1])
+    return start, corner, corner, end
+
+
+def _along(*corners: Point) -> tuple[Point, ...]:
+    """Return the curves along level and upright lines, with rounded corners between the first and the last point."""
+    points = [corners[0]]
+    for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
+        into, out = _towards(corner, before), _towards(corner, after)
+        points += [into, into, into, corner, corner, out]
+    return (*points, corners[-1], corners[-1], corners[-1])
+
+
+def _towards(corner: Point, other: Point) -> Point:
+    """Return the point where a rounded corner begins, or ends."""
+    x, y = other[0] - corner[0], other[1] - corner[1]
+    part = min(1.0, CORNER / max(abs(x), abs(y), CORNER))
+    return corner[0] + part * x, corner[1] + part * y
+
+
+def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the curve that leaves and arrives from below, and sags more the farther it goes."""
+    sag = 26.0 + 0.08 * (abs(end[0] - start[0]) + abs(end[1] - start[1]))
+    return start, (start[0], start[1] + sag), (end[0], end[1] + sag), end
+
+
+@dataclass(slots=True)
+class Text:
+    """A line of text: the beginning, or the middle, of its base line, and the width that it may take."""
+
+    x: float
+    y: float
+    text: str
+    style: str
+    width: float
+    middle: bool = False
+
+
+Shape = Union[Box, Curve, Text]  # noqa: UP007 (evaluated when it is loaded, by Python 3.10 too)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Shapes, from back to front, and the size of the paper."""
+
+    title: str
+    width: float
+    height: float
+    shapes: tuple[Shape, ...]
+
+
+def draw(graph: Graph, direction: Direction = "auto") -> Drawing:
+    """Return the drawing of the graph: groups at the back, then edges, then frames, and the legend on top."""
+    forest = forest_of(graph)
+    places = arrange(graph, forest, direction)
+    owners = {name: index for index, name in enumerate(graph.all_owners())}
+    head, width, top = _legend(graph, owners, places.width, MARGIN)
+    pen = _Pen(graph, forest, places, owners, MARGIN, top)
+    extras = pen.extras()
+    bottom = max(top + places.height, *(y for curve in extras for _, y in curve.points), 0.0)
+    shapes = (*head, *pen.areas(), *extras, *pen.tree())
+    return Drawing(graph.title, width + 2 * MARGIN, bottom + MARGIN, shapes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Pen:
+    """What is drawn of one graph, moved to where the tree begins."""
+
+    graph: Graph
+    forest: Forest
+    layout: Layout
+    owners: dict[str, int]
+    left: float
+    top: float
+
+    def areas(self) -> list[Shape]:
+        """Return the groups, with their labels."""
+        return [shape for area in self.layout.areas for shape in self._area(area)]
+
+    def _area(self, area: Area) -> tuple[Shape, ...]:
+        label = shortened(self.graph.groups[self.forest.group[area.frame]].label)
+        x, y = area.x + self.left, area.top + self.top
+        return (
+            Box(x, y, area.right - area.x, area.bottom - area.top, 7.0, "group"),
+            _text(label, "label", x + PAD, y + LABEL_STRIP - 2.5),
+        )
+
+    def extras(self) -> list[Curve]:
+        """Return the edges that are not of the trees: forward as all others, and back from below to below."""
+        curves = []
+        for arrow in self.forest.extra:
+            parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
+            is_forward = not self.layout.is_down and parent.right < child.x
+            curves.append(self._edge(arrow) if is_forward else self._back(arrow))
+        return curves
+
+    def tree(self) -> list[Shape]:
+        """Return each frame with the edge from its parent."""
+        shapes: list[Shape] = []
+        for frame in self.forest.order:
+            place, arrow = self.layout.places[frame], self.forest.up.get(frame)
+            if arrow:
+                shapes.append(self._edge(arrow))
+            shapes += self._frame(frame, place, arrow)
+        return shapes
+
+    def _edge(self, arrow: Arrow) -> Curve:
+        parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
+        end = (child.x + self.left, child.y + self.top)
+        if self.layout.is_down:
+            start = (parent.x + INDENT / 2 + self.left, parent.bottom + self.top)
+            return self._curve(arrow, _falling(start, end))
+        trunk = self.layout.trunk
+        if trunk and arrow.parent == trunk.frame:
+            start = (parent.x + INDENT / 2 + self.left, parent.bottom + self.top)
+            line, above = trunk.lines[arrow.child] + self.left, trunk.y + self.top
+            return self._curve(
+                arrow, _along(start, (start[0], above), (line, above), (line, end[1]), end)
+            )
+        return self._curve(arrow, _level((parent.right + self.left, parent.y + self.top), end))
+
+    def _back(self, arrow: Arrow) -> Curve:
+        parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
+        start = (parent.x + 0.7 * parent.width + self.left, parent.bottom + self.top)
+        return self._curve(
+            arrow,
+            _sagging(start, (child.x + 0.3 * child.width + self.left, child.bottom + self.top)),
+        )
+
+    def _curve(self, arrow: Arrow, points: tuple[Point, ...]) -> Curve:
+        kind = "alternative" if arrow.alternative else arrow.kind
+        about = f"{arrow.parent} → {arrow.child}: {', '.join(_facts(arrow))}"
+        return Curve(points, f"edge{colour_of(self.owners[arrow.owner])} {kind}", about)
+
+    def _frame(self, frame: str, place: Place, arrow: Arrow | None) -> list[Shape]:
+        x, y = place.x + self.left, place.y + self.top
+        if arrow is None:
+            box = Box(x, y - place.height / 2, place.width, place.height, CORNER, "root")
+            return [box, _text(shortened(frame), "name", x + PAD, y + BASE)]
+        owner = self.owners[arrow.owner]
+        colour, number = colour_of(owner), str(owner + 1)
+        base = y + BASE - (POSE_HEIGHT / 2 - 1.0 if arrow.pose else 0.0)
+        left = x + BADGE_WIDTH + PAD
+        name = _text(shortened(frame), "name", left, base)
+        shapes: list[Shape] = [
+            Box(x, y - place.height / 2, place.width, place.height, CORNER, f"box{colour}"),
+            Box(x, y - place.height / 2, BADGE_WIDTH, place.height, CORNER, f"badge{colour}"),
+            Text(
+                x + BADGE_WIDTH / 2,
+                y + 3.6,
+                number,
+                f"number{colour}",
+                _width(number, f"number{colour}"),
+                middle=True,
+            ),
+            name,
+        ]
+        if arrow.detail:
+            shapes.append(
+                _text(shortened(arrow.detail), "more", left + name.width + BETWEEN, base)
+            )
+        if arrow.pose:
+            shapes.append(_text(shortened(arrow.pose), "more", left, base + POSE_HEIGHT))
+        return shapes
+
+
+def _text(text: str, style: str, x: float, y: float) -> Text:
+    return Text(x, y, text, style, _width(text, style))
+
+
+def _width(text: str, style: str) -> float:
+    font = STYLES[style]
+    return width_of(text, font.size, bold=font.bold)
+
+
+def _facts(arrow: Arrow) -> list[str]:
+    kind = f"{arrow.kind}, by turns" if arrow.alternative else arrow.kind
+    return [fact for fact in (kind, f"by {arrow.owner}", arrow.detail, arrow.pose) if fact]
+
+
+def _legend(
+    graph: Graph, owners: dict[str, int], width: float, margin: float
+) -> tuple[list[Shape], float, float]:
+    """Return the title and the legend, the width of everything without margins, and the y where the tree begins."""
+    edges = Counter(
+        arrow.owner for arrow in (*graph.arrows, *graph.hidden) if not arrow.alternative
+    )
+    title = shortened(graph.title)
+    frames = len(graph.all_frames())
+    totals = f"{counted(frames + len(graph.hidden), 'frame')} · {counted(edges.total(), 'edge')}"
+    totals += (
+        f" · {counted(len(graph.hidden), 'frame')} inside sensors not shown"
+        if graph.hidden
+        else ""
+    )
+    title_width = width_of(title, STYLES["title"].size, bold=True)
+    totals_width = width_of(totals, STYLES["label"].size)
+    base = margin + 14.0
+    shapes: list[Shape] = [
+        Text(margin, base, title, "title", title_width),
+        Text(margin + title_width + 12.0, base, totals, "label", totals_width),
+    ]
+    width = max(width, MIN_WIDTH, title_width + 12.0 + totals_width)
+    y = base + LEGEND_LINE
+    for row in (_owner_items(owners, edges), _line_items(graph)):
+        more, y, width = _wrapped(row, margin, y, width)
+        shapes += more
+    return shapes, width, y + 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """What a kind of line, or else the number and colour of an owner, means."""
+
+    text: str
+    kind: str = ""
+    owner: int = 0
+
+
+def _owner_items(owners: dict[str, int], edges: Counter[str]) -> list[_Item]:
+    return [
+        _Item(f"{shortened(name)} ({counted(edges[name], 'edge')})", owner=index)
+        for name, index in owners.items()
+        if edges[name]
+    ]
+
+
+def _line_items(graph: Graph) -> list[_Item]:
+    used = {"alternative" if arrow.alternative else arrow.kind for arrow in graph.arrows}
+    return [_Item(text, kind=kind) for kind, text in LINES.items() if kind in used]
+
+
+def _wrapped(
+    items: list[_Item], margin: float, y: float, width: float
+) -> tuple[list[Shape], float, float]:
+    """Return the items in lines that fit ``width``, the y of the next line, and the width, if one alone is wider."""
+    shapes: list[Shape] = []
+    x = margin
+    for item in items:
+        text_width = width_of(item.text, STYLES["label"].size)
+        item_width = (SAMPLE_WIDTH if item.kind else BADGE_WIDTH) + 6.0 + text_width
+        if x > margin and x + item_width > margin + width:
+            x, y = margin, y + LEGEND_LINE
+        width = max(width, item_width)
+        shapes += _symbol(item, x, y)
+        shapes.append(Text(x + item_width - text_width, y, item.text, "label", text_width))
+        x += item_width + ITEM_GAP
+    return shapes, y + (LEGEND_LINE if items else 0.0), width
+
+
+def _symbol(item: _Item, x: float, y: float) -> list[Shape]:
+    if item.kind:
+        return [Curve(_level((x, y - 3.8), (x + SAMPLE_WIDTH, y - 3.8)), f"sample {item.kind}")]
+    colour, text = colour_of(item.owner), str(item.owner + 1)
+    middle = x + BADGE_WIDTH / 2
+    number = Text(
+        middle, y - 0.2, text, f"number{colour}", width_of(text, 10.0, bold=True), middle=True
+    )
+    return [Box(x, y - 11.8, BADGE_WIDTH, 16.0, 4.0, f"badge{colour}"), number]

@@ -1,0 +1,129 @@
+"""Colours, lines and fonts in one table, from which SVG takes its style sheet and PDF its operators; widths of text.
+
+The colours of owners are those of Okabe and Ito, which people with any kind of colour blindness
+tell apart; each owner has a number as well, for print without colour and for robots with more
+owners than colours.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+from tfcompose.foundation.text import visible
+
+SANS = "Arial, Helvetica, 'Liberation Sans', sans-serif"
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """Colours as six hexadecimal digits, in light and dark mode; empty: none. Lengths in px."""
+
+    fill: tuple[str, str] = ("", "")
+    stroke: tuple[str, str] = ("", "")
+    width: float = 0.0
+    dash: tuple[float, ...] = ()
+    size: float = 0.0
+    bold: bool = False
+
+
+PAPER = ("ffffff", "14181d")
+INK = ("1b1f24", "e8ebee")
+SOFT = ("57606a", "a3adb8")
+
+#: Of each colour, in light and dark mode: the line, the box, and text on the line's colour.
+_OWNERS = (
+    (
+        ("66707c", "8d98a5"),
+        ("f1f3f5", "242a31"),
+        ("ffffff", "14181d"),
+    ),  # grey: static, as most edges are
+    (("0072b2", "4ba3da"), ("e3f0f8", "152a3a"), ("ffffff", "14181d")),  # blue
+    (("d55e00", "ef8235"), ("fbeadd", "38220f"), ("ffffff", "14181d")),  # vermilion
+    (("008a64", "2bb58c"), ("e0f3ed", "10302a"), ("ffffff", "14181d")),  # green
+    (("b8578c", "d98bb5"), ("f8e8f1", "38202e"), ("ffffff", "14181d")),  # purple
+    (("b87800", "e6a52e"), ("fcf1d9", "352a10"), ("ffffff", "14181d")),  # orange
+    (("2f93cf", "7cc4ef"), ("e5f4fc", "12303f"), ("ffffff", "14181d")),  # sky
+)
+
+
+def colour_of(owner: int) -> int:
+    """Return the number of the owner's colour, from 0: the first has grey to itself, the others share the rest."""
+    return 1 + (owner - 1) % (len(_OWNERS) - 1) if owner else 0
+
+
+def _of_owner(index: int) -> dict[str, Style]:
+    line, box, on_line = _OWNERS[index]
+    return {
+        f"box{index}": Style(fill=box, stroke=line, width=1.2),
+        f"badge{index}": Style(fill=line),
+        f"number{index}": Style(fill=on_line, size=10.0, bold=True),
+        f"edge{index}": Style(stroke=line, width=1.4),
+    }
+
+
+#: By name; a shape names one or two, the second for what is different.
+STYLES: dict[str, Style] = {
+    "paper": Style(fill=PAPER),
+    "group": Style(fill=("f7f8fa", "1b2027"), stroke=("c4cbd3", "434c57"), width=1.0),
+    "root": Style(fill=PAPER, stroke=INK, width=1.4),
+    "sample": Style(stroke=INK, width=1.4),
+    "name": Style(fill=INK, size=12.0),
+    "more": Style(fill=SOFT, size=10.0),
+    "label": Style(fill=SOFT, size=10.5),
+    "title": Style(fill=INK, size=16.0, bold=True),
+    **{name: style for index in range(len(_OWNERS)) for name, style in _of_owner(index).items()},
+    "static": Style(),
+    "joint": Style(width=2.0, dash=(7.0, 3.0)),
+    "dynamic": Style(width=2.2, dash=(2.2, 2.8)),
+    "alternative": Style(width=1.2, dash=(1.2, 3.6, 6.0, 3.6)),
+}
+
+
+def style_of(names: str) -> Style:
+    """Return the style of one or two names: width and dash of the second count, where it has them."""
+    first, _, second = names.partition(" ")
+    style = STYLES[first]
+    if not second:
+        return style
+    over = STYLES[second]
+    return Style(
+        style.fill, style.stroke, over.width or style.width, over.dash, style.size, style.bold
+    )
+
+
+#: Widths of Helvetica, which Arial, Liberation Sans and Nimbus Sans share, in thousandths of the
+#: font's size, from the space to the tilde (Adobe's metrics).
+_ASCII = (
+    278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278,
+    556, 556, 556, 556, 556, 556, 556, 556, 556, 556, 278, 278, 584, 584, 584, 556,
+    1015, 667, 667, 722, 722, 667, 611, 778, 722, 278, 500, 667, 556, 833, 722, 778,
+    667, 778, 722, 667, 611, 722, 667, 944, 667, 667, 611, 278, 278, 278, 469, 556,
+    333, 556, 556, 500, 556, 556, 278, 556, 556, 222, 222, 500, 222, 833, 556, 556,
+    556, 556, 333, 500, 278, 556, 500, 722, 500, 500, 500, 334, 260, 334, 584,
+)  # fmt: skip
+_WIDTHS = {chr(32 + index): width for index, width in enumerate(_ASCII)} | {"·": 278, "°": 400}
+_OTHER_WIDTH = 1000
+_BOLD = 1.08
+
+_MAX_CHARACTERS = 72
+
+
+@lru_cache(maxsize=1 << 14)
+def width_of(text: str, size: float, *, bold: bool = False) -> float:
+    """Return how wide the text is, in the unit of ``size``, to a tenth.
+
+    Characters beyond ASCII count as wide as they are high.
+    """
+    thousandths = sum([_WIDTHS.get(character, _OTHER_WIDTH) for character in text])
+    return math.ceil(thousandths * size * (_BOLD if bold else 1.0) / 100) / 10
+
+
+def shortened(text: str) -> str:
+    """Return the text as it is drawn: invisible characters as escapes, and of a long one its beginning and end."""
+    text = visible(text)
+    if len(text) <= _MAX_CHARACTERS:
+        return text
+    half = _MAX_CHARACTERS // 2
+    return f"{text[: half - 1]}…{text[-half:]}"

@@ -1,0 +1,8 @@
+"""Turns a ``Robot`` without errors into files, as text: plan.json, URDF, xacro, parameters and pictures.
+
+The same robot gives the same bytes.
+"""
+
+from tfcompose.compiler.emit.emit import described, emit
+
+__all__ = ["described", "emit"]

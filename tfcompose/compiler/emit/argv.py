@@ -1,0 +1,214 @@
+"""The words that start a process, with the ROS arguments of nodes, and the nodes' parameter files."""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.model.plan import known_at_launch
+from tfcompose.model.robot import AsInFile
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Process, Robot
+
+
+#: The modules behind tfcompose's own processes.
+MODULES = {
+    "static": "tfcompose.launcher.publishers.static",
+    "joints": "tfcompose.launcher.publishers.joints",
+    "simulate": "tfcompose.launcher.publishers.simulate",
+    "guard": "tfcompose.guard",
+}
+#: The file of parameters, which is named once.
+_PARAMS_FILE = "${params_file}"
+_TF_TOPICS = frozenset({"/tf", "/tf_static"})
+
+
+def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> tuple[str, ...]:
+    """Return the process's command.
+
+    ``owns`` says that it has edges, ``has_params`` that a file of parameters is written for it.
+    """
+    if process.kind in {"external", "component"}:
+        return ()
+    if process.kind != "run":
+        arguments = [
+            word
+            for name, value in _own_params(process)
+            for word in ("-p", f"{name}:={json.dumps(value)}")
+        ]
+        own = ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
+        return (*own, "--ros-args", *arguments) if arguments else own
+    if process.launch is not None:
+        return (f"${{launch:{process.launch}}}", *process.argv)
+    if process.package is None and not _is_node(process, owns=owns):
+        return process.argv
+    arguments = _ros_arguments(process, robot, has_params=has_params)
+    if process.package is None:
+        names = _names(process, robot)
+        if "--params-file" in arguments:  # which is keyed by the node's name
+            arguments = [*names, *arguments]
+        elif process.namespace is not None or (robot.ros.namespace and (arguments or owns)):
+            arguments = [*names[-2:], *arguments]
+        return (*process.argv, "--ros-args", *arguments) if arguments else process.argv
+    program = f"${{executable:{process.package}/{process.executable}}}"
+    return (program, *process.argv, "--ros-args", *_names(process, robot), *arguments)
+
+
+def _is_node(process: Process, *, owns: bool) -> bool:
+    """Whether a plain command is surely a ROS node: it owns an edge, or has settings that only nodes have.
+
+    What follows a text that a shell reads, or a launch file, does not reach the program.
+    """
+    if not process.takes_ros_arguments:
+        return False
+    has_node_settings = (
+        process.log_level is not None
+        or process.namespace is not None
+        or bool(file_params(process))
+    )
+    return (
+        owns
+        or has_node_settings
+        or bool(process.remap.keys() - _TF_TOPICS)
+        or "--ros-args" in process.argv
+    )
+
+
+def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[str]:
+    """Return the ROS arguments but for names; a parameter file is named once."""
+    ros_args = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
+    if process.log_level is not None:
+        ros_args += ["--log-level", process.log_level]
+    if robot.ros.clock == "sim":
+        ros_args += ["-p", "use_sim_time:=true"]
+    if has_params and not any(
+        _PARAMS_FILE in word for word in (*process.argv, *process.env.values())
+    ):
+        ros_args += ["--params-file", _PARAMS_FILE]
+    for name, value in _launch_time_params(process.params):
+        ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
+    return ros_args
+
+
+def _own_params(process: Process) -> list[tuple[str, Any]]:
+    """Return the parameters of one of tfcompose's own processes; a number is a double, as its parameter is."""
+    return [
+        (name, value if isinstance(value, bool) else float(value))
+        for name, value in sorted(process.params.items())
+    ]
+
+
+def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the parameters, by their full names, with paths that only the launcher knows."""
+    for key, value in params.items():
+        if isinstance(value, dict):
+            yield from _launch_time_params(value, f"{above}{key}.")
+        elif known_at_launch(value):
+            yield f"{above}{key}", value
+
+
+def _names(process: Process, robot: Robot) -> list[str]:
+    """Return what gives the node its name and namespace; those that are listed as several have names of their own.
+
+    A name on the command line would rename every node of the process, also those that are not
+    listed.
+    """
+    if len(process.nodes) > 1 or process.ros_nodes[0].path[2:3] == ("nodes",):
+        return [
+            "-r",
+            f"__ns:=/{robot.ros.namespace if process.namespace is None else process.namespace}",
+        ]
+    namespace, _, node = process.node.rpartition("/")
+    return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]
+
+
+#: What JSON lets stand in a text and YAML takes for the end of a line, or does not allow at all.
+_ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+
+
+def file_params(process: Process) -> dict[str, dict[str, Any]]:
+    """Return what the process's parameter file holds, by node: all but the paths that only the launcher knows."""
+    if process.kind != "run":
+        return {}
+    nodes = {node.name: _known(node.params) for node in process.ros_nodes}
+    return {node: params for node, params in nodes.items() if params}
+
+
+def component_params(process: Process, robot: Robot) -> dict[str, Any]:
+    """Return the parameters of a component, by their full names, as values that ROS has."""
+    clock = {"use_sim_time": True} if robot.ros.clock == "sim" else {}
+    return clock | {name: _typed(value) for name, value in process.ros_nodes[0].flat_texts.items()}
+
+
+def _typed(value: Any) -> Any:
+    """Return the value of a parameter; a word of a parameter file is what ROS reads there."""
+    if isinstance(value, list):
+        items = [_typed(item) for item in value]
+        return (
+            [float(item) for item in items]
+            if {type(item) for item in items} == {int, float}
+            else items
+        )
+    if not isinstance(value, AsInFile):
+        return value
+    if value.lower() in _TRUTH:
+        return _TRUTH[value.lower()]
+    for kind in (lambda text: int(text, 0), float):
+        with suppress(ValueError):
+            return kind(str(value))
+    return str(value)
+
+
+#: The words that ROS reads as true and false in a parameter file.
+_TRUTH = dict.fromkeys(("true", "yes", "on", "y"), True) | dict.fromkeys(
+    ("false", "no", "off", "n"), False
+)
+
+
+def _known(params: dict[str, Any]) -> dict[str, Any]:
+    kept = {}
+    for key, value in params.items():
+        if not known_at_launch(value):
+            kept[key] = value
+        elif isinstance(value, dict) and (rest := _known(value)):
+            kept[key] = rest
+    return kept
+
+
+def params_file(nodes: dict[str, dict[str, Any]]) -> str:
+    """Return the file's text. Texts are always quoted, so that ROS cannot take one for a number or a bool."""
+    lines = []
+    for node, params in nodes.items():
+        lines += [f"{_text(node)}:", "  ros__parameters:", *_mapping(params, "    ")]
+    return "\n".join([*lines, ""])
+
+
+def _mapping(values: dict[str, Any], indent: str) -> list[str]:
+    """Return the mapping as lines of YAML; lists and texts as JSON, which is YAML as well."""
+    lines = []
+    for key, value in values.items():
+        if isinstance(value, dict) and value:
+            lines += [f"{indent}{_text(key)}:", *_mapping(value, indent + "  ")]
+        else:
+            lines.append(f"{indent}{_text(key)}: {_text(value)}")
+    return lines
+
+
+#: A word that YAML takes for one, wherever it stands.
+_PLAIN = re.compile(r"[A-Za-z0-9_.+-]+")
+
+
+def _text(value: Any) -> str:
+    """Return the value as JSON that is YAML as well; a word of a parameter file as it was there."""
+    if isinstance(value, AsInFile) and _PLAIN.fullmatch(value):
+        return str(value)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
+    return _ESCAPED.sub(
+        lambda found: f"\\u{ord(found[0]):04x}", json.dumps(value, ensure_ascii=False)
+    )

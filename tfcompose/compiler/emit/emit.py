@@ -1,0 +1,72 @@
+"""From a right robot to its files, as text."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.draw.picture import draw
+from tfcompose.compiler.draw.svg import svg
+from tfcompose.compiler.emit.argv import file_params, params_file
+from tfcompose.compiler.emit.plan import plan_of
+from tfcompose.compiler.render.tree import graph_of, tree
+from tfcompose.compiler.urdf.macro import MACRO, caller, macro
+from tfcompose.compiler.urdf.write import urdf
+from tfcompose.model.files import AS_IN_SOURCE, File, Target
+from tfcompose.model.plan import DESCRIPTION
+from tfcompose.model.plan.file import write_plan
+
+if TYPE_CHECKING:
+    from tfcompose.model.robot import Process, Robot
+
+
+def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
+    """Return the robot's files; the same robot gives the same bytes. There must be no errors in it.
+
+    ``target`` says where they are written and how they address meshes.
+    """
+    live = robot.with_final_names()
+    descriptions = {
+        part: _descriptions(robot_of, target, f"{part}/" if part else "")
+        for part, robot_of in described(robot)
+    }
+    stock = {part: files[1].text for part, files in descriptions.items()}
+    return (
+        File("plan.json", write_plan(plan_of(live, target))),
+        *(file for files in descriptions.values() for file in files),
+        File("tree.txt", tree(live)),
+        File("tree.svg", svg(draw(graph_of(live)))),
+        *(
+            _params(process, nodes, stock)
+            for process in robot.processes
+            if (nodes := file_params(process))
+        ),
+    )
+
+
+def described(robot: Robot) -> list[tuple[str, Robot]]:
+    """Return what has a description of its own: the robot, and each part that is a robot, by its name."""
+    return [("", robot), *((part.name, part.robot) for part in robot.parts)]
+
+
+def _params(process: Process, nodes: dict[str, dict[str, Any]], stock: dict[str, str]) -> File:
+    """Return the process's parameters; a stock publisher's with the description that is meant for it."""
+    if process.describes:
+        nodes = {
+            node: params | {"robot_description": stock[process.part]}
+            for node, params in nodes.items()
+        }
+    return File(f"params/{process.name}.yaml", params_file(nodes))
+
+
+def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, ...]:
+    """Return what describes the robot, or a part that is a robot of its own, in a folder of its own."""
+    target = replace(target, folder=posixpath.join(target.folder, folder))
+    full, stock = urdf(robot, target)
+    return (
+        File(f"{folder}{DESCRIPTION}", full),
+        File(f"{folder}robot.urdf", stock),
+        File(f"{folder}robot.urdf.xacro", caller(robot)),
+        File(f"{folder}{MACRO}", macro(robot, target)),
+    )

@@ -1,0 +1,230 @@
+"""The plan: what the robot's processes are started with, and which edges each of them owns."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import posixpath
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.emit.argv import argv_of, component_params, file_params
+from tfcompose.foundation.numbers import clean
+from tfcompose.model.files import AS_IN_SOURCE, Target
+from tfcompose.model.plan import DESCRIPTION, Driven, Joint, Plan, SourceLine
+from tfcompose.model.plan.codec import narrowed
+from tfcompose.model.robot import JOINTS, STATIC
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.plan import PlanEdge, PlanProcess, PoseKnowledge
+    from tfcompose.model.robot import Edge, MountedSensor, Process, Robot
+
+_FILE = re.compile(r"\$\{file:([^{}]*)\}")
+
+_PUBLISHERS = frozenset({"static", "joints"})
+
+#: The order of processes: who has fixed edges and descriptions first, who watches last.
+_ORDER = {"static": 0, "joints": 1, "guard": 3}
+
+
+def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
+    """Return the plan of a right robot; ``target`` says where it will be written."""
+    nodes = {process.name: process.node for process in robot.processes}
+    needed = _needed(robot)
+    names = frozenset(process.name for process in needed)
+    relative = {
+        file: _relative(file, robot.file) for file in {edge.at.file for edge in robot.edges}
+    }
+    prefixes = {f"{part.name}/{JOINTS}": part.prefix for part in robot.parts}
+    edges = tuple(
+        [
+            _edge(
+                edge,
+                edge.node or nodes[edge.owner],
+                relative[edge.at.file],
+                prefixes.get(edge.owner, ""),
+            )
+            for edge in robot.edges
+        ]
+    )
+    main = next((process.host for process in robot.processes if process.name == STATIC), None)
+    owned: dict[str, list[tuple[str, str]]] = {}
+    for edge in edges:
+        owned.setdefault(edge.owner, []).append((edge.parent, edge.child))
+    return Plan(
+        robot=robot.name,
+        spec_digest=_digest(robot),
+        base=robot.base,
+        ros=robot.ros,
+        edges=edges,
+        processes=tuple(
+            _on(main, _at(target, _process(process, robot, owned.get(process.name, []), names)))
+            for process in needed
+        ),
+        guard=robot.guard,
+        claims=tuple(claim.planned() for claim in robot.claims),
+        args=robot.args,
+        environment=robot.environment,
+        hosts={name: host.planned() for name, host in robot.hosts.items()},
+    )
+
+
+def _needed(robot: Robot) -> list[Process]:
+    """Return the processes that have something to do: ``joints`` where joints move, else ``static`` at least.
+
+    That holds for the robot, and for each part that is a robot of its own.
+    """
+    owners = {edge.owner for edge in robot.edges}
+    idle = {
+        process.name
+        for process in robot.processes
+        if process.kind in _PUBLISHERS and process.name not in owners
+    }
+    own = {process.name for process in robot.processes if process.kind == "joints"} - idle
+    for name in {_below(process.part, STATIC) for process in robot.processes}:
+        if _below(name.removesuffix(STATIC).rstrip("/"), JOINTS) not in own:
+            idle.discard(name)
+    return sorted(
+        (p for p in robot.processes if p.name not in idle),
+        key=lambda process: _ORDER.get(process.kind, 2),
+    )
+
+
+def _below(part: str, name: str) -> str:
+    return f"{part}/{name}" if part else name
+
+
+def _digest(robot: Robot) -> str:
+    """Return the digest of what was written: it changes when a key or value does, and not with layout or comments."""
+    text = json.dumps(robot.source_data, sort_keys=True, ensure_ascii=False)
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
+    """Return the edge; its joint without the ``prefix`` that joint states do not have."""
+    moving = edge.joint
+    joint = None
+    if moving:
+        name, mimic = (
+            moving.name.removeprefix(prefix),
+            moving.mimic and moving.mimic.removeprefix(prefix),
+        )
+        joint = narrowed(Joint, moving, name=name, mimic=mimic)
+    return edge.planned(
+        node=node, pose=clean(edge.pose), source=SourceLine(file, edge.at.line), joint=joint
+    )
+
+
+def _relative(file: str, to: str) -> str:
+    """Return where ``file`` is, seen from the robot's file: the same wherever the robot's folder is."""
+    return posixpath.relpath(file, posixpath.dirname(to) or ".")
+
+
+def _process(
+    process: Process, robot: Robot, owned: list[tuple[str, str]], names: frozenset[str]
+) -> PlanProcess:
+    has_params = process.kind == "run" and bool(file_params(process))
+    simulation = process.simulate
+    if simulation:
+        simulation = replace(simulation, pose=clean(simulation.pose))
+    return process.planned(
+        argv=argv_of(process, robot, has_params=has_params, owns=bool(owned)),
+        params_file=f"params/{process.name}.yaml" if has_params else None,
+        after={name: when for name, when in process.after.items() if name in names},
+        owns=tuple(owned),
+        simulate=simulation,
+        description=(
+            f"{process.part}/{DESCRIPTION}"
+            if process.part and process.kind in _PUBLISHERS
+            else None
+        ),
+        drives=driven_of(process, robot),
+        switches=switches_of(process, robot),
+        component=process.component
+        and replace(process.component, params=component_params(process, robot)),
+    )
+
+
+def _at(target: Target, process: PlanProcess) -> PlanProcess:
+    """Return the process with each file's place seen from the plan's folder."""
+
+    def placed(text: str) -> str:
+        return _FILE.sub(lambda found: f"${{build_dir}}/{target.from_folder(found[1])}", text)
+
+    def placed_in(value: Any) -> Any:
+        return placed(value) if isinstance(value, str) else value
+
+    env = {name: placed(value) for name, value in process.env.items()}
+    component = process.component
+    if component:
+        component = replace(
+            component, params={name: placed_in(one) for name, one in component.params.items()}
+        )
+    cwd = process.cwd and placed(process.cwd)
+    return replace(
+        process,
+        argv=tuple(placed(word) for word in process.argv),
+        env=env,
+        cwd=cwd,
+        component=component,
+    )
+
+
+def _on(main: str | None, process: PlanProcess) -> PlanProcess:
+    """Return the process on its host: what names none runs where ``static`` does. The guard runs everywhere."""
+    if process.host or process.kind in ("external", "guard"):
+        return process
+    return replace(process, host=main)
+
+
+def driven_of(process: Process, robot: Robot) -> tuple[Driven, ...]:
+    """Return the sensors that the process drives, where their driver publishes anything unless it is kept from it."""
+    return tuple(_driven(sensor, robot) for sensor in _sensors(process, robot))
+
+
+def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
+    """Return, by node, the parameters that are written for it and decide what it publishes."""
+    keys = {key for sensor in _sensors(process, robot) for key in _switch(sensor)}
+    found = {}
+    for node in process.ros_nodes if process.kind in {"run", "external", "component"} else ():
+        wanted = keys | {
+            key for claim in robot.claims if claim.node == node.name for key in claim.off
+        }
+        switches = {key: value for key, value in node.params.items() if key in wanted}
+        if switches:
+            found[node.name] = switches
+    return found
+
+
+def _sensors(process: Process, robot: Robot) -> Iterator[MountedSensor]:
+    for sensor in robot.sensors:
+        if sensor.driver == process.name and (sensor.driver_frames or sensor.claims):
+            yield sensor
+
+
+def _switch(sensor: MountedSensor) -> dict[str, Any]:
+    """Return what keeps the driver from publishing anything, whether or not it is kept from it."""
+    inside = sensor.switch if sensor.driver_frames else None
+    return _claimed(sensor) | (inside or {})
+
+
+def _claimed(sensor: MountedSensor) -> dict[str, Any]:
+    return {key: value for off in sensor.claims.values() for key, value in off.items()}
+
+
+def _driven(sensor: MountedSensor, robot: Robot) -> Driven:
+    switch = _claimed(sensor) if sensor.publishes else _switch(sensor)
+    inside = (edge for edge in robot.edges if edge.sensor == sensor.name and not edge.given)
+    frames: dict[str, PoseKnowledge] = {
+        edge.child: _knowledge(edge) for edge in inside if edge.owner == sensor.driver
+    }
+    return Driven(sensor.name, sensor.preset, sensor.publishes, switch, frames)
+
+
+def _knowledge(edge: Edge) -> PoseKnowledge:
+    if not edge.pose_known:
+        return "unknown"
+    return "nominal" if edge.nominal else "exact"

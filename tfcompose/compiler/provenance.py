@@ -1,0 +1,83 @@
+"""Where the values stand that an edge was made of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from tfcompose.model.robot import Edge
+    from tfcompose.spec.load import Path, Source
+
+#: What says where an edge is, and who sends it.
+_KEYS = (
+    *(
+        "parent",
+        "child",
+        "type",
+        "axis",
+        "xyz",
+        "rpy",
+        "quat_xyzw",
+        "axis_angle",
+        "matrix",
+        "look",
+    ),
+    *("relative_to", "place", "calibration", "owner", "rate", "static"),
+)
+
+
+def values_of(edge: Edge, sources: Sequence[Source]) -> list[str]:
+    """Return a line for each value that the edge was made of: key, value, place, and the places of what it replaced.
+
+    ``sources`` are the robot's own, and those of its parts.
+    """
+    lines = []
+    for source, path, value in _given_values(edge, sources):
+        over = ", over ".join(str(old) for old in source.replaced.get(path, ()))
+        place = f"{source.at(path)}, over {over}" if over else str(source.at(path))
+        lines.append(f"{path[-1]}: {_shown(value)}  {place}")
+    return lines
+
+
+def _given_values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Source, Path, Any]]:
+    for source in sources:
+        for entry in _entries(edge, source):
+            data: Any = source.data
+            for step in entry:
+                data = data.get(step) if isinstance(data, dict) else None
+            if isinstance(data, dict) and (
+                source.at((*entry, "parent")) == edge.at or not edge.given
+            ):
+                yield from ((source, (*entry, key), data[key]) for key in _KEYS if key in data)
+                return
+
+
+def _entries(edge: Edge, source: Source) -> Iterator[Path]:
+    """Yield where the edge may be given; in a part without the prefix that its names have in the robot."""
+    named = (
+        {"joints": edge.joint_name, "sensors": edge.sensor}
+        if edge.sensor
+        else {"joints": edge.joint_name}
+    )
+    for section, name in (named | dict.fromkeys(("frames", "links", "parts"), edge.child)).items():
+        entries = source.data.get(section)
+        if not isinstance(entries, dict):
+            continue
+        ends = (name[begin:] for begin in range(len(name) + 1))
+        known = (
+            sorted(entries, key=len, reverse=True)
+            if section == "parts"
+            else filter(entries.__contains__, ends)
+        )
+        for one in known:
+            yield (section, one) if edge.given else (section, one, "frames", edge.child)
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key}: {_shown(item)}' for key, item in value.items())}}}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_shown, value))}]"
+    return str(value).lower() if isinstance(value, bool) else str(value)

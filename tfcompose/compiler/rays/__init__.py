@@ -1,0 +1,24 @@
+"""What sensors see of their own robot: rays from a stream's frame, and the bodies that they hit.
+
+Pure functions of a ``Robot``; boxes, cylinders, spheres and capsules need no library, and meshes
+are hit where trimesh is installed.
+"""
+
+from tfcompose.compiler.rays.bodies import Body, bodies_around, fixed_to, sphere_around
+from tfcompose.compiler.rays.cast import Ray, View, cast, view_of
+from tfcompose.compiler.rays.directions import contains, different_streams, directions, is_plane
+
+__all__ = [
+    "Body",
+    "Ray",
+    "View",
+    "bodies_around",
+    "cast",
+    "contains",
+    "different_streams",
+    "directions",
+    "fixed_to",
+    "is_plane",
+    "sphere_around",
+    "view_of",
+]

@@ -1,0 +1,203 @@
+"""Findings for programs: a JSON list, annotations of a GitHub workflow, SARIF, and JUnit's XML."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from tfcompose.foundation.catalogue import CATALOGUE
+from tfcompose.foundation.text import visible
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from tfcompose.foundation.findings import Finding, Span
+
+
+def render_json(found: Sequence[Finding]) -> str:
+    """Return the findings as a JSON list; a place that is not known is null."""
+    return json.dumps([_entry(one) for one in found], indent=2, ensure_ascii=False) + "\n"
+
+
+def _entry(found: Finding) -> dict[str, Any]:
+    end = (
+        {"end_line": found.span.end_line, "end_column": found.span.end_column}
+        if found.span
+        else {}
+    )
+    return {
+        "code": found.code,
+        "name": found.name,
+        "severity": found.severity,
+        "message": found.message,
+        **_place(found.span),
+        **({"end_line": None, "end_column": None} | end),
+        "help": found.help,
+        "notes": [{"message": note.message} | _place(note.span) for note in found.notes],
+    }
+
+
+def _place(span: Span | None) -> dict[str, Any]:
+    if span is None:
+        return {"file": None, "line": None, "column": None}
+    return {"file": span.file, "line": span.line, "column": span.column}
+
+
+def render_github(found: Sequence[Finding]) -> str:
+    """Return the findings as workflow commands."""
+    return "".join(_annotation(one) for one in found)
+
+
+def _annotation(found: Finding) -> str:
+    properties: dict[str, object] = {"title": found.label}
+    if found.span:
+        at = found.span
+        properties = {"file": at.file, "line": at.line, "col": at.column} | properties
+        if at.end_line == at.line:
+            properties["endColumn"] = at.end_column
+    notes = [f"{note.span}: {note.message}" if note.span else note.message for note in found.notes]
+    lines = [found.message, *notes, *([f"help: {found.help}"] if found.help else [])]
+    message = "\n".join(map(visible, lines))
+    listed = ",".join(
+        f"{name}={_escaped_property(visible(str(value)))}" for name, value in properties.items()
+    )
+    return f"::{found.severity} {listed}::{_escaped(message)}\n"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _escaped_property(text: str) -> str:
+    return _escaped(text).replace(":", "%3A").replace(",", "%2C")
+
+
+SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+
+
+def render_sarif(found: Sequence[Finding], version: str, pages: Mapping[str, str]) -> str:
+    """Return the findings as one run of tfcompose; ``pages`` holds the page of each code."""
+    codes = sorted({one.code for one in found})
+    run = {
+        "tool": {
+            "driver": {
+                "name": "tfcompose",
+                "version": version,
+                "rules": [_rule(code, pages) for code in codes],
+            }
+        },
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(one, codes.index(one.code)) for one in found],
+    }
+    return (
+        json.dumps(
+            {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2, ensure_ascii=False
+        )
+        + "\n"
+    )
+
+
+def _rule(code: str, pages: Mapping[str, str]) -> dict[str, Any]:
+    rule: dict[str, Any] = {"id": code, "name": CATALOGUE[code].name}
+    page = pages.get(code, "")
+    if page:
+        rule["shortDescription"] = {"text": page.partition("\n")[0]}
+        rule["fullDescription"] = {"text": page}
+        rule["help"] = {
+            "text": page,
+            "markdown": page,
+        }  # no helpUri: the pages are at no address of the web
+    return rule
+
+
+def _result(found: Finding, index: int) -> dict[str, Any]:
+    advice = f"\n{found.help}" if found.help else ""
+    result: dict[str, Any] = {
+        "ruleId": found.code,
+        "ruleIndex": index,
+        "level": found.severity,
+        "message": {"text": f"{found.message}{advice}"},
+    }
+    if found.span:
+        result["locations"] = [{"physicalLocation": _location(found.span)}]
+    related = [
+        {"physicalLocation": _location(note.span), "message": {"text": note.message}}
+        for note in found.notes
+        if note.span
+    ]
+    return result | ({"relatedLocations": related} if related else {})
+
+
+def _location(span: Span) -> dict[str, Any]:
+    region = {
+        "startLine": span.line,
+        "startColumn": span.column,
+        "endLine": span.end_line,
+        "endColumn": span.end_column,
+    }
+    return {
+        "artifactLocation": {"uri": quote(span.file, errors="surrogateescape")},
+        "region": region,
+    }
+
+
+# XML 1.0 has no place for these, not even escaped.
+_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_XML_ESCAPES = {
+    "&": "&amp;",
+    "<": "&lt;",
+    ">": "&gt;",
+    '"': "&quot;",
+    "\n": "&#10;",
+    "\r": "&#13;",
+    "\t": "&#9;",
+}
+_ESCAPED = re.compile('[&<>"\n\r\t]')
+
+
+def render_junit(
+    suite: str,
+    cases: Iterable[tuple[str, str, tuple[Finding, ...]]],
+    *,
+    failing: frozenset[str],
+    seconds: float,
+) -> str:
+    """Return a test suite of cases (group, name, findings); one fails if a finding has a ``failing`` severity.
+
+    The other findings are in its output.
+    """
+    rows, failed, count = [], 0, 0
+    for group, name, found in cases:
+        count += 1
+        fatal = [one for one in found if one.severity in failing]
+        failed += bool(fatal)
+        body = "".join(
+            f'    <failure type="{one.code}"'
+            f' message="{_xml(one.message)}">{_xml(_details(one))}</failure>\n'
+            for one in fatal[:1]
+        )
+        others = [*fatal[1:], *(one for one in found if one not in fatal)]
+        if others:
+            body += f"    <system-out>{_xml(chr(10).join(map(_details, others)))}</system-out>\n"
+        head = f'  <testcase classname="{_xml(f"{suite}.{group}")}" name="{_xml(name)}" time="0"'
+        rows.append(f"{head}>\n{body}  </testcase>\n" if body else f"{head}/>\n")
+    counts = f'tests="{count}" failures="{failed}" errors="0" time="{seconds:.3f}"'
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<testsuites {counts}>\n'
+        f'<testsuite name="{_xml(suite)}" {counts}>\n{"".join(rows)}</testsuite>\n</testsuites>\n'
+    )
+
+
+def _details(found: Finding) -> str:
+    where = f"{found.span}: " if found.span else ""
+    lines = [
+        f"{where}{found.severity}[{found.code}] {found.message}",
+        *(f"note: {note.message}" for note in found.notes),
+    ]
+    return "\n".join([*lines, f"help: {found.help}"] if found.help else lines)
+
+
+def _xml(text: str) -> str:
+    return _ESCAPED.sub(lambda match: _XML_ESCAPES[match[0]], _NOT_XML.sub("?", text))

@@ -1,0 +1,95 @@
+"""Findings for people: the place, the line with a caret under it, notes and help."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.text import counted, visible
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.foundation.findings import Finding, Span
+
+RED, YELLOW, BLUE, GREEN, BOLD, PLAIN = (
+    "\033[31m",
+    "\033[33m",
+    "\033[34m",
+    "\033[32m",
+    "\033[1m",
+    "\033[0m",
+)
+
+_LONGEST_LINE = 160
+_LONGEST_MESSAGE = 1000
+
+
+def render_text(
+    found: Sequence[Finding], line_of: Callable[[str, int], str | None], *, colour: bool
+) -> str:
+    """Return the findings as text; ``line_of`` returns a line of a file (from 1), or None if it cannot be read."""
+    return "".join(_one(one, line_of, _Paint(colour=colour)) for one in found)
+
+
+class _Paint:
+    def __init__(self, *, colour: bool) -> None:
+        self.colour = colour
+
+    def __call__(self, text: str, *codes: str) -> str:
+        return f"{''.join(codes)}{text}{PLAIN}" if self.colour else text
+
+
+def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
+    shade = RED if found.severity == "error" else YELLOW
+    place = _printable(f"{found.span}: ") if found.span else ""
+    message = _printable(found.message)
+    head = (
+        f"{paint(place, BOLD)}{paint(f'{found.severity}[{found.code}]', shade, BOLD)}"
+        f" {paint(message, BOLD)}"
+    )
+    lines = [head]
+    if found.span:
+        lines += _excerpt(found.span, line_of, paint, shade)
+    for note in found.notes:
+        at = f"{note.span}: " if note.span else ""
+        lines.append(f"   {paint('note', BLUE)}: {_printable(at + note.message)}")
+    if found.help:
+        lines.append(f"   {paint('help', GREEN)}: {_printable(found.help)}")
+    return "\n".join(lines) + "\n"
+
+
+def _printable(text: str) -> str:
+    """Return the text on one line of bounded length, without control characters."""
+    shown = text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]}…"
+    return visible(shown)
+
+
+def _excerpt(
+    span: Span, line_of: Callable[[str, int], str | None], paint: _Paint, shade: str
+) -> list[str]:
+    line = line_of(span.file, span.line)
+    if line is None or not line.strip():
+        return []
+    start = span.column - 1
+    end = span.end_column - 1 if span.end_line == span.line else len(line.rstrip())
+    shown, skipped = line, max(0, start - _LONGEST_LINE // 2)
+    if len(line) > _LONGEST_LINE:
+        shown = line[skipped : skipped + _LONGEST_LINE]
+    else:
+        skipped = 0
+    width = max(1, min(end, skipped + len(shown)) - start)
+    lead = "".join("\t" if character == "\t" else " " for character in shown[: start - skipped])
+    shown = "".join(c if c.isprintable() or c == "\t" else "?" for c in shown.rstrip())
+    return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
+
+
+def summary(found: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
+    """Return the last line: the number of findings and of files, and why warnings alone exit 0, if they do."""
+    errors = sum(one.severity == "error" for one in found)
+    warnings = len(found) - errors
+    where = f"in {counted(files, 'file')}"
+    if not found:
+        return f"no findings {where}\n"
+    parts = [counted(n, word) for n, word in ((errors, "error"), (warnings, "warning")) if n]
+    exits = "" if errors or warnings_fail else " (exit code 0; --fail-on warning makes it 1)"
+    return f"{' and '.join(parts)} {where}{exits}\n"

@@ -1,0 +1,179 @@
+"""A robot's tree as text, and as a graph to be drawn: frames, and at each edge its kind, owner, rate and pose."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.draw import Arrow, Graph, Group
+from tfcompose.foundation.numbers import clean_rpy, clean_xyz, number
+from tfcompose.foundation.tree import drawn
+from tfcompose.model.robot import JOINTS, STATIC
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator, Sequence
+
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.model.robot import Edge, Robot
+
+
+#: Between the facts of a line.
+GAP = "  "
+
+
+def tree(robot: Robot, columns: int | None = None) -> str:
+    """Return the tree, one frame a line: kind, owner, rate; position in metres and rpy in degrees where not zero.
+
+    Where that is wider than ``columns``, the facts follow each name at once, without the kinds
+    that owners imply; then without ``static`` where somebody else is the owner; and at last they
+    go on in the next line.
+    """
+    children = robot.children()
+    rows = [
+        row
+        for root in robot.roots()
+        for row in (
+            ("", root, None),
+            *((lines, edge.child, edge) for lines, edge in drawn(children, root, _child)),
+        )
+    ]
+    width = max((len(lines) + len(name) for lines, name, _ in rows), default=0)
+    owners = max((len(edge.owner) for _, _, edge in rows if edge), default=0)
+    lines = [_row(lines + name, edge, width, owners) for lines, name, edge in rows]
+    if columns is not None and _widest(lines) > columns:
+        lines = _fitted(rows, columns)
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _child(edge: Edge) -> str:
+    return edge.child
+
+
+def _widest(lines: Iterable[str]) -> int:
+    return max(map(len, lines), default=0)
+
+
+def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
+    if edge is None:
+        return name
+    rest = "  ".join(fact for fact in (pose_text(edge), _switched(edge)) if fact)
+    return f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {_rate(edge):<6}  {rest}".rstrip()
+
+
+def _fitted(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:
+    """Return the rows as lines of at most so many columns, where names are no longer than that."""
+    for kinds in ({"static", "joints", "dynamic"}, {"dynamic"}):
+        facts = [_facts(edge, kinds) if edge else [] for _, _, edge in rows]
+        drawing = [(lines, name, some) for (lines, name, _), some in zip(rows, facts, strict=True)]
+        found = [GAP.join([lines + name, *some]) for lines, name, some in drawing]
+        if _widest(found) <= columns:
+            return found
+    return [line for some in wrapped(drawing, columns) for line in some]
+
+
+def wrapped(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> list[list[str]]:
+    """Return lines of at most so many columns for each row of a drawing, where names are no longer than that.
+
+    A row is the lines that lead to a name, the name, and facts; those for which there is no room
+    follow below. Where names have no room either, a level takes two columns.
+    """
+    if _widest(lines + name for lines, name, _ in rows) > columns:
+        rows = [(_narrow(lines), name, facts) for lines, name, facts in rows]
+    below = [*(lines for lines, _, _ in rows[1:]), ""]
+    return [
+        list(_wrapped(lines, name, facts, columns, has_children=len(after) > len(lines)))
+        for (lines, name, facts), after in zip(rows, below, strict=True)
+    ]
+
+
+def _facts(edge: Edge, kinds: Collection[str]) -> list[str]:
+    """Return what is said of an edge; its kind if it is among these, and its owner does not say as much."""
+    kind = edge.kind if edge.kind in kinds and edge.owner not in {STATIC, JOINTS} else ""
+    facts = (kind, edge.owner, _rate(edge), *pose_text(edge).split(GAP), _switched(edge))
+    return [fact for fact in facts if fact]
+
+
+def _narrow(lines: str) -> str:
+    """Return the lines of a drawing with two columns a level, which are four."""
+    return lines.replace("│   ", "│ ").replace("    ", "  ").replace("── ", " ")
+
+
+def _wrapped(
+    lines: str, name: str, facts: Iterable[str], columns: int, *, has_children: bool
+) -> Iterator[str]:
+    line = lines + name
+    more = lines.replace("├──", "│  ").replace("├ ", "│ ").replace("└", " ").replace("─", " ")
+    more += "│   " if has_children else "    "
+    for fact in facts:
+        if len(line) + len(GAP) + len(fact) > columns:
+            yield line
+            line = more + fact
+        else:
+            line += GAP + fact
+    yield line
+
+
+def _rate(edge: Edge) -> str:
+    return f"{number(edge.rate)} Hz" if edge.rate else ""
+
+
+def pose_text(edge: Edge) -> str:
+    """Return the edge's pose as ``short_pose`` has it, or that only its owner knows it."""
+    return short_pose(edge.pose) if edge.pose_known else "pose unknown"
+
+
+def edge_facts(edge: Edge) -> str:
+    """Return kind, owner, rate and pose of an edge, in one line."""
+    facts = (edge.kind, f"by {edge.owner}", _rate(edge), pose_text(edge), _switched(edge))
+    return GAP.join(fact for fact in facts if fact)
+
+
+def _switched(edge: Edge) -> str:
+    return f"or on {', '.join(edge.switched)}" if edge.switched else ""
+
+
+def short_pose(pose: Pose) -> str:
+    """Return position in metres and rotation (rpy) in degrees, as far as they are not zero."""
+    parts = []
+    xyz = clean_xyz(pose.xyz)
+    if any(xyz):
+        parts.append(f"xyz {' '.join(number(round(value, 6)) for value in xyz)}")
+    rpy = clean_rpy(pose.quat_xyzw)
+    if any(rpy):
+        parts.append(f"rpy {' '.join(number(round(math.degrees(value), 4)) for value in rpy)} deg")
+    return GAP.join(parts)
+
+
+def graph_of(robot: Robot, *, poses: bool = False) -> Graph:
+    """Return the tree of a robot with final names: sensors are groups, owners are in the order of the tree."""
+    presets = {sensor.name: sensor.preset for sensor in robot.sensors}
+    groups: dict[str, list[str]] = {}
+    for edge in robot.edges:
+        if edge.sensor:
+            groups.setdefault(edge.sensor, []).append(edge.child)
+    owners = dict.fromkeys(edge.owner for edge in robot.edges)
+    built_in = [name for name in (STATIC, JOINTS) if name in owners]
+    return Graph(
+        robot.name,
+        tuple(robot.frames),
+        tuple(arrow for edge in robot.edges for arrow in _arrows(edge, poses=poses)),
+        tuple(Group(_label(name, presets), tuple(frames)) for name, frames in groups.items()),
+        tuple(dict.fromkeys((*built_in, *owners))),
+    )
+
+
+def _label(sensor: str, presets: dict[str, str]) -> str:
+    return f"{sensor} · {presets[sensor]}" if sensor in presets else sensor
+
+
+def _arrows(edge: Edge, *, poses: bool) -> Iterator[Arrow]:
+    yield Arrow(
+        edge.parent,
+        edge.child,
+        edge.kind,
+        edge.owner,
+        _rate(edge),
+        pose_text(edge) if poses else "",
+    )
+    for parent in edge.switched:
+        yield Arrow(parent, edge.child, edge.kind, edge.owner, alternative=True)

@@ -1,0 +1,129 @@
+"""``ros2_control`` and ``xml``: what a URDF holds next to links and joints, checked against the robot.
+
+The places of a raw block are lines of the robot file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.urdf.blocks import faults_of, read_block, unexpanded, unknown_joints
+from tfcompose.foundation.findings import Finding, RejectedError, Span
+from tfcompose.model.robot.hardware import Block, Component, Hardware, Interface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from tfcompose.model.robot import Robot
+    from tfcompose.spec.language.robot import ComponentSpec, HardwareSpec, RobotSpec
+    from tfcompose.spec.load import Path, Source
+
+
+@dataclass(frozen=True, slots=True)
+class _Known(Collection[str]):
+    """Names, which count as known too where ``excuses`` says that they may be missing only for a refused entry."""
+
+    names: Sequence[str]
+    excuses: Callable[[str], bool]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names or (isinstance(name, str) and self.excuses(name))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+    """Return the robot with its hardware and raw blocks."""
+    moving = [edge.joint.name for edge in robot.edges if edge.joint]
+    hardware = _hardware_of(spec.ros2_control, source)
+    children = {edge.child for edge in robot.edges}
+    frames = [frame for frame in robot.frames if frame in robot.links or frame in children]
+    joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
+    blocks, found = _blocks_of(
+        spec.xml, source, _Known(frames, robot.excuses), _Known(joints, robot.excuses)
+    )
+    found += unknown_joints(hardware, _Known(moving, robot.excuses))
+    return (
+        replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)),
+        found,
+    )
+
+
+def _hardware_of(specs: dict[str, HardwareSpec], source: Source) -> tuple[Hardware, ...]:
+    """Return the hardware components with the places of their joints."""
+    return tuple(_hardware(name, spec, source) for name, spec in specs.items())
+
+
+def _hardware(name: str, spec: HardwareSpec, source: Source) -> Hardware:
+    at: Path = ("ros2_control", name)
+    kinds = (("joint", spec.joints), ("sensor", spec.sensors), ("gpio", spec.gpios))
+    components = tuple(
+        _component(kind, inner, one, source.at_key((*at, f"{kind}s", inner)))
+        for kind, several in kinds
+        for inner, one in several.items()
+    )
+    return Hardware(
+        name,
+        spec.plugin,
+        spec.type,
+        source.at_key(at),
+        spec.params,
+        components,
+        spec.rw_rate,
+        spec.is_async,
+    )
+
+
+def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component:
+    command, state = (
+        [Interface(i, params) for i, params in one.items()] for one in (spec.command, spec.state)
+    )
+    return Component(kind, name, at, tuple(command), tuple(state), spec.params)
+
+
+def _blocks_of(
+    texts: dict[str, str], source: Source, frames: Collection[str], joints: Collection[str]
+) -> tuple[tuple[Block, ...], list[Finding]]:
+    """Return the raw blocks, and what is wrong with them. ``joints`` are the names of all joints of the robot."""
+    found: list[Finding] = []
+    blocks = []
+    for name, text in texts.items():
+        at: Path = ("xml", name)
+        try:
+            root = read_block(text, source.file)
+        except RejectedError as error:
+            found += [
+                replace(one, span=_in_file(one.span, text, source, at)) for one in error.findings
+            ]
+            continue
+        blocks.append(Block(name, source.at(at), text))
+        for one in (*faults_of(root, frames, joints), *unexpanded(text, source.file)):
+            found.append(replace(one, span=_in_file(one.span, text, source, at)))
+    return tuple(blocks), found
+
+
+def _in_file(span: Span | None, text: str, source: Source, at: Path) -> Span:
+    """Return the place in the robot file of a place in the block, in which its text begins at line 2.
+
+    Only in a literal block (``|``) are the lines those of the file; elsewhere it is the whole
+    value.
+    """
+    value, key = source.at(at), source.at_key(at)
+    lines = text.rstrip("\n").count("\n") + 1
+    if span is None or value.end_line - value.line < lines:
+        return value
+    line = value.line + min(max(span.line - 1, 1), lines)
+    indent = key.column + 1  # as most people write it: two more than the key
+    return Span(
+        value.file,
+        line,
+        span.column + indent,
+        line,
+        max(span.end_column, span.column + 1) + indent,
+    )

@@ -1,0 +1,210 @@
+"""Bodies: shapes, colours, the files of meshes, and the inertia that follows from shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.resolve.poses import pose_of, rotation_of
+from tfcompose.compiler.urdf.inertia import (
+    Moments,
+    UnmeasurableError,
+    inertial,
+    joined,
+    of_primitive,
+    trace,
+    traces,
+)
+from tfcompose.compiler.urdf.packages import Packages
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.robot import Inertial, Link, Material, Shape, colour_name, materials
+from tfcompose.spec.language.values import COLOURS
+
+if TYPE_CHECKING:
+    from tfcompose.foundation.findings import Span
+    from tfcompose.spec.language import bodies as specs
+    from tfcompose.spec.load import Path, Source
+
+FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
+
+
+@dataclass(slots=True)
+class Bodies:
+    """Makes links of what is written; ``found`` holds what is wrong with the files of meshes and textures."""
+
+    source: Source
+    packages: Packages = field(default_factory=Packages)
+    found: list[Finding] = field(default_factory=list)
+    _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(
+        default_factory=dict
+    )
+
+    def link(self, name: str, body: specs.LinkSpec) -> Link:
+        """Return the link with its shapes and, where it has a mass, its inertia."""
+        place = self.source.at_key(("links", name))
+        if (
+            id(body) not in self._known
+        ):  # aliases of one anchor are one object, and have the same shapes
+            self._known[id(body)] = self._parts(body, ("links", name))
+        visuals, collisions, inertial = self._known[id(body)]
+        if inertial and inertial.at:
+            inertial = replace(inertial, at=place)
+        return Link(name, place, visuals, collisions, inertial, has_mass=body.inertial is not None)
+
+    def _parts(
+        self, body: specs.LinkSpec, at: Path
+    ) -> tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]:
+        visuals = self._shapes(body.visual, (*at, "visual"))
+        collisions = (
+            visuals
+            if body.collision == "same"
+            else self._shapes(body.collision, (*at, "collision"))
+        )
+        inertial = None
+        if body.inertial:
+            inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))
+        return visuals, collisions, inertial
+
+    def shape(self, shape: specs.Shape, at: Path) -> Shape:
+        """Return the shape, which must have a form."""
+        material = None
+        if shape.material:
+            material = self._material(shape.material, (*at, "material"))
+        elif shape.color:
+            material = Material(
+                colour_name(shape.color), shape.color, at=self.source.at((*at, "color"))
+            )
+        pose = pose_of(shape)
+        if shape.box:
+            return Shape("box", shape.box, pose, material)
+        if shape.cylinder:
+            return Shape(
+                "cylinder", (shape.cylinder.radius, shape.cylinder.length), pose, material
+            )
+        if shape.sphere:
+            return Shape("sphere", (shape.sphere.radius,), pose, material)
+        if shape.capsule:
+            return Shape("capsule", (shape.capsule.radius, shape.capsule.length), pose, material)
+        if shape.mesh:
+            place = self.source.at((*at, "mesh", "uri"))
+            mesh, wrong = self.packages.asset(shape.mesh.uri, place)
+            self.found += [wrong] if wrong else []
+            return Shape("mesh", shape.mesh.scale, pose, material, mesh)
+        raise ValueError("a shape without a form")
+
+    def _shapes(self, shapes: tuple[specs.Shape, ...], at: Path) -> tuple[Shape, ...]:
+        return tuple(
+            self.shape(shape, (*at, index) if self.source.has((*at, index)) else at)
+            for index, shape in enumerate(shapes)
+            if any(getattr(shape, form) for form in FORMS)
+        )
+
+    def _material(self, given: specs.Material, at: Path) -> Material:
+        """Return the colour with its name; one without is named after its parts, so that URDF keeps them apart."""
+        texture = None
+        if given.texture is not None:
+            texture, wrong = self.packages.asset(given.texture, self.source.at((*at, "texture")))
+            self.found += [wrong] if wrong else []
+        name, rgba = given.name, given.rgba
+        if name is None:
+            rgba = rgba if rgba or texture else (0.5, 0.5, 0.5, 1.0)
+            name = colour_name(rgba or ())
+            name = name if texture is None else f"{name}_{_word(texture.uri)}"
+        return Material(name, rgba, texture, self.source.at(at))
+
+    def _inertial(
+        self,
+        given: specs.Inertial,
+        visuals: tuple[Shape, ...],
+        collisions: tuple[Shape, ...],
+        at: Path,
+    ) -> Inertial | None:
+        shapes, place = collisions or visuals, self.source.at_key(at[:2])
+        pose = Pose(given.xyz or (0.0, 0.0, 0.0), rotation_of(given) or Pose().quat_xyzw)
+        if given.inertia and given.mass:
+            i = given.inertia
+            tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
+            return Inertial(
+                given.mass, pose, tensor, traces(given.mass, visuals, collisions), place
+            )
+        moments = self.moments(shapes, self.source.at_key(at)) if shapes else None
+        if moments is None:
+            return None
+        density = given.density or (given.mass or 0.0) / moments.volume
+        if given.inertia:
+            i = given.inertia
+            tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
+            return Inertial(
+                density * moments.volume, pose, tensor, (density * trace(moments.tensor),), place
+            )
+        computed = inertial(moments, density, given.mass)
+        return replace(computed, pose=Pose(given.xyz)) if given.xyz else computed
+
+    def moments(self, shapes: tuple[Shape, ...], at: Span) -> Moments | None:
+        """Return the moments of the shapes at density 1 in the link's axes, or None after saying why there are none."""
+        parts: list[Moments] = []
+        for shape in shapes:
+            if shape.mesh is None:
+                parts.append(of_primitive(shape))
+                continue
+            measure = self.packages.disk.moments if self.packages.disk else None
+            if measure is None or (
+                shape.mesh.path and self._is_missing(shape.mesh.path)
+            ):  # that has been said
+                return None
+            if not shape.mesh.path:
+                message = f"{shape.mesh.uri}: it is not found here, and has no volume"
+                advice = "say where it is, give a collision shape, or give mass and inertia"
+                self.found.append(finding("TF725", message, at, help=advice))
+                return None
+            try:
+                x, y, z = shape.size
+                parts.append(measure(shape.mesh.path, (x, y, z)).at(shape.pose))
+            except UnmeasurableError as error:
+                self.found.append(
+                    finding(error.code, f"{shape.mesh.uri}: {error}", at, help=error.advice)
+                )
+                return None
+        return joined(parts)
+
+    def _is_missing(self, path: str) -> bool:
+        return self.packages.disk is not None and not self.packages.disk.is_file(path)
+
+
+def with_colours(links: dict[str, Link]) -> dict[str, Link]:
+    """Return the links in which a material that is a name alone has the colour of the first one by that name.
+
+    Where no other has one, it may be the name of a colour.
+    """
+    known: dict[str, Material] = {}
+    for material in materials(links):
+        if material.rgba or material.texture:
+            known.setdefault(material.name, material)
+    for material in materials(links):
+        if material.name in COLOURS:
+            known.setdefault(material.name, replace(material, rgba=(*COLOURS[material.name], 1.0)))
+    bare = {
+        one.name for one in materials(links) if not (one.rgba or one.texture) and one.name in known
+    }
+    return {name: _coloured(link, known, bare) for name, link in links.items()} if bare else links
+
+
+def _coloured(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
+    def shape(one: Shape) -> Shape:
+        is_bare = (
+            one.material
+            and one.material.name in bare
+            and not (one.material.rgba or one.material.texture)
+        )
+        return replace(one, material=known[one.material.name]) if one.material and is_bare else one
+
+    return replace(
+        link,
+        visuals=tuple(map(shape, link.visuals)),
+        collisions=tuple(map(shape, link.collisions)),
+    )
+
+
+def _word(uri: str) -> str:
+    return "".join(char if char.isascii() and char.isalnum() else "_" for char in uri)

@@ -1,0 +1,454 @@
+"""What nodes publish by themselves: switched off where another process owns the edge, under the names of its frames.
+
+A claim that cannot be settled by parameters of a process that tfcompose starts is a finding, with
+the exact switch.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
+from tfcompose.foundation.findings import Finding, RejectedError, Span, did_you_mean, finding
+from tfcompose.model.plan import switch_text
+from tfcompose.model.robot import BUILT_IN, Claim, Edge, Node, Process
+
+if TYPE_CHECKING:
+    from tfcompose.model.robot import Edge, Robot
+    from tfcompose.spec.language.node_preset import ClaimSpec, NodePresetSpec
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Path, Source
+
+
+def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+    """Return the robot whose nodes have the parameters that settle what they publish, and what cannot be settled."""
+    work = _Work(robot, spec, source)
+    processes = tuple(work.process(process) for process in robot.processes)
+    edges = tuple(work.edge(edge) for edge in robot.edges)
+    return (
+        replace(robot, processes=processes, edges=edges, claims=(*robot.claims, *work.claims)),
+        work.found,
+    )
+
+
+@dataclass(slots=True)
+class _Work:
+    robot: Robot
+    spec: RobotSpec
+    source: Source
+    found: list[Finding] = field(default_factory=list)
+    claims: list[Claim] = field(default_factory=list)
+    publishers: dict[tuple[str, str], str] = field(default_factory=dict)
+    known: set[str] = field(default_factory=set)
+
+    def process(self, process: Process) -> Process:
+        """Return the process with the parameters of its nodes."""
+        if process.name not in self.spec.processes or process.kind not in {
+            "run",
+            "external",
+            "component",
+        }:
+            return process
+        claimants = [self._node(process, node) for node in process.ros_nodes]
+        if all(one is not None for one in claimants):
+            self.known.add(process.name)
+        nodes = (
+            one.settled() if one else node
+            for node, one in zip(process.ros_nodes, claimants, strict=True)
+        )
+        return replace(process, ros_nodes=tuple(nodes))
+
+    def edge(self, edge: Edge) -> Edge:
+        """Return the edge with its publisher; an owner of whose nodes none is known to publish it is a finding."""
+        node = self.publishers.get((edge.owner, edge.child))
+        if node is not None:
+            return replace(edge, node=node)
+        owner = next(
+            (process for process in self.robot.processes if process.name == edge.owner), None
+        )
+        if owner is None or owner.name in BUILT_IN or owner.name not in self.spec.processes:
+            return edge
+        at = edge.owner_at or edge.at
+        if owner.name in self.known and owner.kind != "simulate":
+            message = f"{owner.name} is not known to publish {edge.name}"
+            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
+            advice = (
+                f"if it does, add {entry} to {owner.name}; off can name the parameter that"
+                " stops it"
+            )
+            self.found.append(finding("TF332", message, at, help=advice))
+        elif len(owner.nodes) > 1:
+            message = (
+                f"{owner.name} has {len(owner.nodes)} nodes, and none is known to publish"
+                f" {edge.name}"
+            )
+            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
+            advice = f"add to the node that does: {entry}"
+            self.found.append(finding("TF332", message, at, help=advice))
+        return edge
+
+    def _node(self, process: Process, node: Node) -> Claimant | None:
+        """Return what is known of a node and its parameters, or None where nothing is."""
+        declared = self.spec.processes[process.name]
+        inner = declared.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
+        name = (
+            inner.preset
+            if inner
+            else declared.node.preset
+            if declared.node and not declared.nodes
+            else None
+        )
+        by_hand = inner.publishes if inner else declared.publishes
+        preset = (
+            self._preset(name, (*node.path, *(() if inner else ("node",)), "preset"))
+            if name
+            else None
+        )
+        if preset is None and not by_hand:
+            return None
+        claims = (*(preset.publishes if preset else ()), *by_hand)
+        roles = Roles(self.robot, process.name, preset, claims)
+        claimant = Claimant(process, node, claims, preset, roles, node.flat_params)
+        self._set_names(claimant)
+        for claim in self._of_one(claimant) if preset and preset.one_of else claims:
+            self._settle(claimant, claim)
+        return claimant
+
+    def _preset(self, name: str, path: Path) -> NodePresetSpec | None:
+        try:
+            return node_preset(name)
+        except KeyError:
+            names = node_preset_names()
+            advice = did_you_mean(name, names, f"there is {', '.join(names)}")
+            self.found.append(
+                finding("TF601", f"unknown node preset {name}", self.source.at(path), help=advice)
+            )
+        except RejectedError as error:
+            self.found += error.findings
+        return None
+
+    def _of_one(self, claimant: Claimant) -> tuple[ClaimSpec, ...]:
+        """Return the claim that a node makes which makes one out of several: its own, or the one that is chosen."""
+        for claim in claimant.claims:
+            if self._is_own(claimant, claim):
+                return (claim,)
+        for claim in claimant.claims:
+            if claimant.has(
+                {key: claimant.roles.final(value) for key, value in claim.chosen_by.items()}
+                or claim.on
+            ):
+                return (claim,)
+        return claimant.claims[:1]
+
+    def _set_names(self, claimant: Claimant) -> None:
+        """Write the parameters that hold frames' names, and those without which they would mean something else."""
+        preset = claimant.preset
+        if preset is None:
+            return
+        for role, described in preset.frames.items():
+            frame = claimant.roles.frames.get(role)
+            if described.parameter is None or frame is None:
+                continue
+            given = claimant.given.get(described.parameter)
+            if given is not None and not claimant.roles.is_bound(role) and self._is_frame(given):
+                continue  # the tree leaves it open
+            self._set(claimant, described.parameter, self.robot.final(frame))
+        for key, value in preset.set.items():
+            self._set(claimant, key, value)
+
+    def _is_frame(self, name: Any) -> bool:
+        return any(name == self.robot.final(frame) for frame in self.robot.frames)
+
+    def _set(self, claimant: Claimant, key: str, value: Any) -> None:
+        given = claimant.given.get(key)
+        if given is None:
+            claimant.computed[key] = value
+        elif given != value:
+            claimant.contradicting.add(key)
+            message = (
+                f"{key} of {claimant.process.name} is {given!r}, but in the tree it is {value!r}"
+            )
+            advice = "remove it: tfcompose writes it"
+            if not claimant.takes_parameters:
+                advice = (
+                    f"set {key}: {_shown(value)} where {claimant.process.name} is started, and"
+                    " here"
+                )
+            self.found.append(finding("TF333", message, self._at(claimant, key), help=advice))
+
+    def _is_own(self, claimant: Claimant, claim: ClaimSpec) -> bool:
+        edge = self._edge(*claimant.ends(claim))
+        return edge is not None and edge.owner == claimant.process.name
+
+    def _edge(self, parent: str, child: str) -> Edge | None:
+        edges = (edge for edge in self.robot.edges if edge.child == child)
+        return next((edge for edge in edges if parent in {edge.parent, *edge.switched}), None)
+
+    def _settle(self, claimant: Claimant, claim: ClaimSpec) -> None:
+        parent, child = claimant.ends(claim)
+        if "*" in parent + child:
+            self._settle_pattern(claimant, claim, parent, child)
+            return
+        edge = self._edge(parent, child)
+        if edge is not None and edge.owner == claimant.process.name:
+            self._own(claimant, claim, edge)
+            return
+        if claimant.is_published(claim) or claim.by_default:
+            self.claims.append(Claim(claimant.node.name, parent, child, off=claim.off))
+        if not claimant.is_published(claim):
+            return
+        other = edge or self.robot.parent_edge(child)
+        if other is None:
+            self._undeclared(claimant, claim, parent, child)
+        else:
+            self._foreign(claimant, claim, f"{parent} → {child}", other)
+
+    def _own(self, claimant: Claimant, claim: ClaimSpec, edge: Edge) -> None:
+        self.publishers[claimant.process.name, edge.child] = claimant.node.name
+        for key, value in claim.chosen_by.items():
+            self._set(claimant, key, claimant.roles.final(value))
+        for key, value in claim.on.items() if not claim.by_default else ():
+            self._set(claimant, key, value)
+        if claimant.has(claim.off):
+            message = (
+                f"{claimant.process.name} owns {edge.name}, but a parameter turns that off:"
+                f" {switch_text(claim.off)}"
+            )
+            place = self._at(claimant, next(iter(claim.off)))
+            self.found.append(
+                finding("TF333", message, place, help="remove it, or name another owner")
+            )
+
+    def _foreign(self, claimant: Claimant, claim: ClaimSpec, name: str, other: Edge) -> None:
+        """Write the switch, or say that it cannot be written."""
+        against = next(
+            (key for key, off in claim.off.items() if claimant.given.get(key, off) != off), None
+        )
+        if against is not None and claimant.takes_parameters and not claimant.has(claim.on):
+            value = claimant.given[against]
+            message = (
+                f"{against} of {claimant.process.name} is {value!r}, and {other.owner} owns"
+                f" {other.name}"
+            )
+            advice = "remove it: tfcompose writes the switch"
+            self.found.append(finding("TF333", message, self._at(claimant, against), help=advice))
+            return
+        needed = any(
+            self._is_own(claimant, own) and set(own.off) & set(claim.off)
+            for own in claimant.claims
+        )
+        if claim.off and claimant.takes_parameters and not needed and not claimant.has(claim.on):
+            claimant.computed |= claim.off
+            return
+        owner = f"{other.owner} owns" if other.name == name else f"{other.owner} owns {other.name}"
+        message = f"{claimant.process.name} publishes {name} by default, which {other.owner} owns"
+        if other.name != name:
+            message = f"{claimant.process.name} publishes {name} by default, and {owner}"
+        self.found.append(
+            finding(
+                "TF330",
+                message,
+                claimant.node.at,
+                help=self._way_out(claimant, claim, needed=needed),
+            )
+        )
+
+    def _way_out(self, claimant: Claimant, claim: ClaimSpec, *, needed: bool) -> str:
+        hint = f"; {claimant.preset.hint}" if claimant.preset and claimant.preset.hint else ""
+        if not claim.off:
+            return f"it has no switch: name {claimant.process.name} as the owner{hint}"
+        if needed:
+            return (
+                f"its switch, {switch_text(claim.off)}, stops its own edge too: name it as the"
+                f" owner of both{hint}"
+            )
+        return (
+            f"set {switch_text(claim.off)} where {claimant.process.name} is started, or name it as"
+            f" the owner{hint}"
+        )
+
+    def _undeclared(self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str) -> None:
+        static = ", static: true" if claim.static else ""
+        advice = (
+            f"frames: {{{child}: {{parent: {parent}, owner: {claimant.process.name}{static}}}}}"
+        )
+        if claim.off:
+            advice += f"; or params: {{{switch_text(claim.off)}}}"
+        message = (
+            f"{claimant.process.name} publishes {parent} → {child} by default, which nobody"
+            " declared"
+        )
+        self.found.append(finding("TF331", message, claimant.node.at, help=advice))
+
+    def _settle_pattern(
+        self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str
+    ) -> None:
+        self.claims.append(Claim(claimant.node.name, parent, child, off=claim.off))
+        guard = self.robot.guard
+        owns = any(edge.owner == claimant.process.name for edge in self.robot.edges)
+        allowed = any(
+            fnmatchcase(one.child, child) or fnmatchcase(child, one.child) for one in guard.allow
+        )
+        if owns or allowed or guard.unknown_edges == "ignore" or not claimant.is_published(claim):
+            return
+        message = (
+            f"{claimant.process.name} publishes {parent} → {child} by default, which the guard"
+            " does not allow"
+        )
+        advice = f'guard: {{allow: [{{child: "{child}"}}]}}'
+        self.found.append(finding("TF331", message, claimant.node.at, help=advice))
+
+    def _at(self, claimant: Claimant, key: str) -> Span:
+        return self.source.at((*claimant.node.path, "params", *key.split(".")))
+
+
+@dataclass(slots=True)
+class Claimant:
+    """One node that may publish TF: what is known of it, the parameters a user gave it, and those tfcompose adds."""
+
+    process: Process
+    node: Node
+    claims: tuple[ClaimSpec, ...]
+    preset: NodePresetSpec | None
+    roles: Roles
+    given: dict[str, Any]
+    computed: dict[str, Any] = field(default_factory=dict)
+    contradicting: set[str] = field(default_factory=set)
+
+    def settled(self) -> Node:
+        """Return the node with the parameters that tfcompose adds, where they reach it."""
+        node = replace(self.node, contradicting=frozenset(self.contradicting))
+        return replace(node, params=node.params | self.computed) if self.takes_parameters else node
+
+    def ends(self, claim: ClaimSpec) -> tuple[str, str]:
+        """Return the frames that the claim is about, parent and child."""
+        return self.roles.fill(claim.parent), self.roles.fill(claim.child)
+
+    def has(self, params: dict[str, Any]) -> bool:
+        """Return whether the user gave exactly these parameters."""
+        return bool(params) and all(self.given.get(key) == value for key, value in params.items())
+
+    def is_published(self, claim: ClaimSpec) -> bool:
+        """Return whether the node publishes the edge as the user has set it."""
+        return (claim.by_default or self.has(claim.on)) and not self.has(claim.off)
+
+    @property
+    def takes_parameters(self) -> bool:
+        """Return whether parameters that tfcompose writes reach the node: launch files and shells have to pass them."""
+        process = self.process
+        if process.kind != "run":
+            return process.component is not None
+        return process.takes_ros_arguments or "${params_file}" in " ".join(process.argv)
+
+
+def _shown(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+_HOLE = re.compile(r"\{(\w+)\}")
+
+
+class Roles:
+    """A node's frames by role.
+
+    First come the ends of the edges that its process owns; then frames with the names that the
+    node expects; for the base what hangs on its odom, else the robot's base. What is nowhere in
+    the tree has the node's own name for it.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        process: str,
+        preset: NodePresetSpec | None,
+        claims: tuple[ClaimSpec, ...],
+    ) -> None:
+        self._robot = robot
+        self._usual = (
+            {role: declared.default for role, declared in preset.frames.items()} if preset else {}
+        )
+        self._bound: dict[str, str] = {}
+        self.frames: dict[str, str] = {}
+        """role → frame of the tree"""
+        for edge in robot.edges:
+            if edge.owner == process:
+                self._bind(edge, claims)
+        self.frames |= self._bound
+        for role, usual in self._usual.items():
+            frame = self._bound.get(role) or self._open(role, usual)
+            if frame is not None:
+                self.frames[role] = frame
+
+    def is_bound(self, role: str) -> bool:
+        """Return whether the role follows from an edge that the process owns."""
+        return role in self._bound
+
+    def fill(self, template: str) -> str:
+        """Return a name with roles in it as a name of the tree."""
+        return _HOLE.sub(
+            lambda hole: self.frames.get(hole[1], self._usual.get(hole[1], hole[0])), template
+        )
+
+    def final(self, value: Any) -> Any:
+        """Return a parameter's value; a role in it is the frame's name on the live tree."""
+        hole = _HOLE.fullmatch(value) if isinstance(value, str) else None
+        if hole is None:
+            return value
+        frame = self.frames.get(hole[1])
+        return self._robot.final(frame) if frame else self._usual.get(hole[1], value)
+
+    def _bind(self, edge: Edge, claims: tuple[ClaimSpec, ...]) -> None:
+        """Give an owned edge's ends the roles of the claim that fits it best."""
+        fitting = [(self._fit(edge, claim), -index, claim) for index, claim in enumerate(claims)]
+        fitting = [one for one in fitting if one[0] >= 0]
+        if not fitting:
+            return
+        claim = max(fitting, key=lambda one: one[:2])[2]
+        for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
+            hole = _HOLE.fullmatch(template)
+            if hole:
+                self._bound.setdefault(hole[1], frame)
+
+    def _fit(self, edge: Edge, claim: ClaimSpec) -> int:
+        """Return how well an edge fits a claim: by its ends' names, and by what hangs below; negative if not at all."""
+        score = 0
+        for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
+            hole = _HOLE.fullmatch(template)
+            usual = self._usual.get(hole[1]) if hole else None
+            if hole is None and _HOLE.sub("", template) == template and template != frame:
+                return -1
+            if hole is None and _HOLE.search(template) and self.fill(template) != frame:
+                return -1
+            score += 4 * (usual == frame)
+        ends = _HOLE.fullmatch(claim.child)
+        moves_on = any(
+            below.parent == edge.child and below.kind == "dynamic" for below in self._robot.edges
+        )
+        return score + (ends is not None and (ends[1] == "odom") == moves_on)
+
+    def _open(self, role: str, usual: str) -> str | None:
+        robot = self._robot
+        if role == "base":
+            odom = self._bound.get("odom") or self.frames.get("odom")
+            below = (
+                edge.child
+                for edge in robot.edges
+                if edge.parent == odom and edge.kind == "dynamic"
+            )
+            taken = {self._bound.get("map"), odom, self.frames.get("map")}
+            base = usual if usual in robot.frames else robot.base
+            return next(below, None) or (base if base not in taken else None)
+        if role == "odom" and usual not in robot.frames:
+            above = self._bound.get("map")
+            return next(
+                (
+                    edge.child
+                    for edge in robot.edges
+                    if edge.parent == above and edge.kind == "dynamic"
+                ),
+                None,
+            )
+        return usual if usual in robot.frames else None

@@ -1,0 +1,137 @@
+"""Containers and the components in them: programs of rclcpp_components, and the nodes that they load.
+
+Facts of rclcpp_components (ROS 2 Jazzy): ``component_container`` has one executor with one thread
+for all components, ``component_container_mt`` one with several threads;
+``component_container_isolated`` has one for each component, with several threads after
+``--use_multi_threaded_executor``. Each offers ``~/_container/load_node``. A component takes
+nothing from the container's command line, neither remappings nor parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.resolve.processes import full_name, how, namespace_of
+from tfcompose.foundation.findings import Finding, did_you_mean, finding
+from tfcompose.model.plan import Component, Ready
+from tfcompose.model.plan.components import LOAD
+from tfcompose.model.robot import Node, Process
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.plan import ProcessKind, StartCondition
+    from tfcompose.spec.language import Validated
+    from tfcompose.spec.language.process import ContainerSpec, Started
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Path
+
+#: The program, by isolation and executor, and its arguments.
+_PROGRAMS = {
+    ("shared", "single"): ("component_container", ()),
+    ("shared", "multi"): ("component_container_mt", ()),
+    ("isolated", "single"): ("component_container_isolated", ()),
+    ("isolated", "multi"): ("component_container_isolated", ("--use_multi_threaded_executor",)),
+}
+
+
+def container_process(name: str, declared: ContainerSpec, validated: Validated) -> Process:
+    """Return the process of a container; it is ready when it can load."""
+    spec, source = validated.spec, validated.source
+    at: Path = ("containers", name)
+    namespace = namespace_of(declared, spec.ros.namespace)
+    node = Node(
+        full_name(namespace, declared.node or name), source.at_key(at), at, declared.params
+    )
+    kind: ProcessKind = "external" if declared.external else "run"
+    process = Process(name, kind, at=source.at_key(at), ros_nodes=(node,), loads=True)
+    process = replace(
+        process, **how(declared, namespace, "external" if declared.external else "container")
+    )
+    process = replace(process, ready=process.ready or Ready("service", f"{node.name}/{LOAD}"))
+    if declared.external:
+        return process
+    program, arguments = _PROGRAMS[declared.isolation, declared.executor]
+    return replace(
+        process,
+        package=declared.package,
+        executable=declared.executable or program,
+        argv=((*arguments, *declared.args) if declared.executable is None else declared.args),
+    )
+
+
+def component_process(process: Process, declared: Started, spec: RobotSpec) -> Process:
+    """Return the process as a component of the container that it names: it runs where, and is as needed as, that is."""
+    package, _, plugin = (declared.component or "").partition("/")
+    loaded: dict[str, StartCondition] = {declared.container or "": "ready"}
+    name = declared.container or ""
+    container = spec.containers.get(name)
+    return replace(
+        process,
+        component=Component(name, package, plugin, extra_arguments=declared.extra_arguments),
+        after=loaded | process.after,
+        host=process.host or (container.host if container else None),
+        required=(
+            container.required if container and process.required is None else process.required
+        ),
+    )
+
+
+def component_findings(path: Path, process: Process, validated: Validated) -> Iterator[Finding]:
+    """Yield what is wrong with a component, whose keys are at the path: no such container, and what it cannot have."""
+    spec, source = validated.spec, validated.source
+    component = process.component
+    if component is None:
+        return
+    name, known = component.container, spec.containers
+    if name not in known and ("containers", name) not in validated.broken:
+        otherwise = f"containers: {{{name}: {{}}}}"
+        if any(name in section for section in (spec.processes, spec.sensors)):
+            otherwise = (
+                f"name a container: {', '.join(known)}" if known else "containers: {NAME: {}}"
+            )
+        advice = did_you_mean(name, known, otherwise)
+        message = f"the container of {process.name} is {name}, which is not a container"
+        yield finding("TF813", message, source.at((*path, "container")), help=advice)
+    if process.ready and process.ready.kind in {"exit", "log"}:
+        what = "end" if process.ready.kind == "exit" else "output"
+        message = f"{process.name} is a component, and has no {what} of its own"
+        place = source.at_key((*path, "ready", process.ready.kind))
+        yield finding(
+            "TF107", message, place, help="wait for edges, a topic, a service or a lifecycle state"
+        )
+    for where, values in (
+        ("params", process.ros_nodes[0].flat_params),
+        ("extra_arguments", component.extra_arguments),
+    ):
+        for key, value in values.items():
+            if (wrong := _not_a_parameter(value)) and source.has((*path, where)):
+                exact: Path = (*path, where, *key.split("."))
+                at = exact if source.has(exact) else (*path, where)
+                yield finding(
+                    "TF103", f"{process.name}: {key} is {wrong}", source.at(at), help=_KINDS
+                )
+
+
+_KINDS = "a parameter is true or false, a number, a string, or a list of one of these"
+
+
+def _not_a_parameter(value: object) -> str:
+    """Return why ROS has no parameter of this kind; empty if it has."""
+    if not isinstance(value, list):
+        return (
+            ""
+            if isinstance(value, (bool, int, float, str))
+            else "nothing"
+            if value is None
+            else "a mapping"
+        )
+    kinds = {
+        float if type(one) is int else str if isinstance(one, str) else type(one) for one in value
+    }
+    if not value:
+        return "an empty list, which has no type"
+    if len(kinds) > 1 or not kinds <= {bool, float, str}:
+        return "a list of several kinds"
+    return ""

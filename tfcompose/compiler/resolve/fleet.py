@@ -1,0 +1,124 @@
+"""The robot as one of a fleet: the process that shares its edges, and what of the fleet's file is not this robot's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.resolve.processes import added, says_how
+from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
+from tfcompose.foundation.text import listed
+from tfcompose.model.plan.fleet import SHARE_COMMAND
+from tfcompose.model.robot import Process
+from tfcompose.spec.language.validate import validate_fleet
+from tfcompose.spec.load import load, path_named
+from tfcompose.tools.fleet.check import check_fleet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.model.robot import Robot
+    from tfcompose.spec.language.fleet import FleetSpec
+    from tfcompose.spec.language.process import ProcessSpec
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Source
+
+#: The process that shares a robot's edges with its fleet.
+SHARE = "fleet_share"
+_NAMED_AT_MOST = 8
+
+
+def is_own_share(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> bool:
+    """Return whether a process is what shares edges, and tfcompose's own: what stands under its name adds to it."""
+    return spec.fleet is not None and name == SHARE and not says_how(declared)
+
+
+def own_share(spec: RobotSpec, source: Source) -> list[Process]:
+    """Return the process that shares the robot's edges, if it is one of a fleet and has none of its own.
+
+    It is ready once it is started, and its failure ends nothing: no robot needs the others to run.
+    """
+    declared = spec.processes.get(SHARE)
+    if spec.fleet is None or not is_own_share(SHARE, declared, spec):
+        return []
+    file = path_named(spec.fleet.file, source.at(("fleet", "file")))
+    words = (*SHARE_COMMAND, _name(spec), f"${{file:{file}}}", *_below(spec))
+    process = Process(
+        SHARE,
+        "run",
+        at=source.at_key(("processes", SHARE) if declared else ("fleet",)),
+        argv=words,
+        restart="on-failure",
+        required=False,
+    )
+    return [added(process, declared, spec)]
+
+
+def _name(spec: RobotSpec) -> str:
+    return (spec.fleet and spec.fleet.robot) or spec.robot
+
+
+def _below(spec: RobotSpec) -> tuple[str, ...]:
+    """Return what says where the robot's TF topics are: below its namespace, where they are isolated."""
+    namespace = spec.ros.namespace.strip("/")
+    return (
+        ("--namespace", namespace) if spec.ros.isolate in {"topics", "both"} and namespace else ()
+    )
+
+
+def wrong_membership(
+    robot: Robot, spec: RobotSpec, source: Source, read: Callable[[str], str] | None
+) -> list[Finding]:
+    """Return what is wrong with the fleet's file for this robot: it cannot be read, or names what the robot is not."""
+    if spec.fleet is None:
+        return []
+    at = source.at(("fleet", "file"))
+    path = path_named(spec.fleet.file, at)
+    if read is None:
+        return [finding("TF001", f"{path}: files cannot be read here", at)]
+    try:
+        fleet_source = load(read(path), path)
+        fleet = validate_fleet(fleet_source)
+        wrong = [one for one in check_fleet(fleet, fleet_source) if one.severity == "error"]
+    except RejectedError as error:
+        wrong = list(error.findings)
+    if wrong:
+        return [replace(one, notes=(*one.notes, Note("named here", at))) for one in wrong]
+    name = _name(spec)
+    if name not in fleet.robots:
+        place = source.at(("fleet", "robot") if spec.fleet.robot else ("robot",))
+        known = (
+            f"there is {listed(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
+            " NAME}"
+        )
+        advice = did_you_mean(name, fleet.robots, known)
+        return [finding("TF886", f"no robot {name} in {path}", place, help=advice)]
+    return _unknown_edges(robot, name, fleet, fleet_source, source)
+
+
+def _unknown_edges(
+    robot: Robot, name: str, fleet: FleetSpec, fleet_source: Source, source: Source
+) -> list[Finding]:
+    """Return a finding for each edge that the fleet's file has the robot share, and that the robot does not have.
+
+    Where entries of the robot were refused, or a key stands twice, nobody knows which edges it was
+    meant to have.
+    """
+    if robot.broken or any(one.code == "TF003" for one in source.found):
+        return []
+    edges = {(robot.final(edge.parent), robot.final(edge.child)) for edge in robot.edges}
+    named = [f"{parent} → {child}" for parent, child in edges]
+    inside = ("share",) if fleet.robots[name].share is None else ("robots", name, "share")
+    found = []
+    for index, shared in enumerate(fleet.edges_of(name)):
+        if shared.ends in edges:
+            continue
+        message = f"the fleet has {name} share {' → '.join(shared.ends)}, which is no edge of it"
+        notes = [Note("it is shared here", fleet_source.at((*inside, index)))]
+        advice = did_you_mean(
+            " → ".join(shared.ends), named, "an edge is a parent and its child on the live tree"
+        )
+        found.append(
+            finding("TF887", message, source.at(("fleet", "file")), notes=notes, help=advice)
+        )
+    return found

@@ -1,0 +1,261 @@
+"""Parts that are a URDF or a xacro file, or what one macro of such a file makes."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, TypeGuard
+
+from tfcompose.compiler.resolve.isolation import topics_below
+from tfcompose.compiler.resolve.poses import pose_of
+from tfcompose.compiler.resolve.processes import full_name
+from tfcompose.compiler.resolve.stock import with_stock
+from tfcompose.compiler.urdf.blocks import read_block, with_hardware
+from tfcompose.compiler.urdf.convert import robot_of
+from tfcompose.compiler.urdf.read import read_expansion, read_xml
+from tfcompose.compiler.urdf.xacro import Use, macros_in
+from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
+from tfcompose.foundation.geometry import Pose, rpy_from_quat
+from tfcompose.model.robot import BUILT_IN, Node, Process, Robot
+from tfcompose.spec.language.robot import Origin
+from tfcompose.spec.language.variables import OF_FILES
+from tfcompose.spec.load import path_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.compiler.resolve.part import PartEntry
+    from tfcompose.compiler.urdf.packages import Disk, Packages
+    from tfcompose.compiler.urdf.xacro import Expansion
+    from tfcompose.model.plan import RosSettings
+    from tfcompose.spec.load import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Foreign:
+    """The robot of a URDF or xacro file. ``files`` are what it is written in.
+
+    ``found`` is what is wrong with it: errors, and the files that it names and that are not found.
+    Other warnings are for those who wrote it.
+
+    ``implied`` are the frames that its joints hang on and that it does not have: the holder's,
+    where a macro makes it.
+    """
+
+    robot: Robot
+    files: tuple[str, ...]
+    found: tuple[Finding, ...]
+    implied: frozenset[str] = frozenset()
+
+
+def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> Foreign:
+    """Return the robot of a part that is a URDF or xacro file.
+
+    Raises:
+        RejectedError: if the file is not there, is none, or xacro refuses it.
+    """
+    spec = part.declared
+    key = "urdf" if spec.urdf is not None else "xacro"
+    at = part.source.at((*part.at, key))
+    file = packages.path_of(spec.urdf or spec.xacro or "", at)
+    files: tuple[str, ...] = (file,)
+    bolted = _bolted(part, read(file)) if spec.macro is not None else {}
+    if spec.urdf is not None:
+        text = read(file)
+        root = read_xml(text, file)
+    else:
+        expansion = _expanded(part, file, at, packages, bolted)
+        text, files = expansion.text, tuple(dict.fromkeys((file, *expansion.files)))
+        root = read_expansion(expansion, file, read)
+    converted = robot_of(root, file, packages.asset, files)
+    robot = converted.robot
+    if not robot.frames:
+        macros = macros_in(read(file))
+        advice = (
+            f"it defines macros; call one with xacro: and macro: {', '.join(macros)}"
+            if macros
+            else ""
+        )
+        raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
+    robot = with_hardware(robot)
+    if bolted:
+        robot = _loose(robot, bolted, part)
+    parents = {edge.parent for edge in robot.edges}
+    implied = (
+        frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
+    )
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    found = [
+        one for one in (*converted.of_elements, *converted.of_blocks) if one.severity == "error"
+    ]
+    found += converted.of_files
+    robot = replace(
+        robot, source_numbers=(), source_data={"urdf": digest}
+    )  # its numbers are judged where it is linted
+    own = _with_base(replace(robot, ros=part.settings, processes=_own(part)))
+    if part.declared.is_alone and part.spec.ros.state_publisher == "stock":
+        own, refused = with_stock(own)
+        found += refused
+    return Foreign(own, files, tuple(found), implied)
+
+
+def _with_base(robot: Robot) -> Robot:
+    roots = robot.roots()
+    return replace(robot, base=roots[0] if len(roots) == 1 else None)
+
+
+def _expanded(
+    part: PartEntry, file: str, at: Span, packages: Packages, bolted: Mapping[str, str]
+) -> Expansion:
+    disk, spec = packages.disk, part.declared
+    if disk is None:
+        raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
+    args = {
+        name: _with_files(value, (*part.at, "args", name), part, disk)
+        for name, value in spec.args.items()
+    }
+    return disk.expand(file, packages, args, _use(part, file, packages, disk, bolted))
+
+
+def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
+    """Return a value with the absolute path of each ``${file(PATH)}``, which is relative to the robot file."""
+    at = part.source.at(path)
+
+    def absolute(call: re.Match[str]) -> str:
+        place = path_named(call[2], at)
+        if not (disk.is_file(place) or disk.is_folder(place)):
+            message, advice = (
+                f"{call[0]}: {place} does not exist",
+                "a path is relative to the file that writes it",
+            )
+            raise RejectedError([finding("TF019", message, at, help=advice)])
+        return str(FilePath(place).absolute())
+
+    return OF_FILES.sub(absolute, value) if isinstance(value, str) else value
+
+
+#: What macros call the link that they bolt themselves to, and the block with their pose in it.
+_PARENTS, _ORIGIN = ("parent_link", "parent", "parent_frame", "connected_to"), "origin"
+
+
+#: A macro's parameter as it is declared, and its default.
+_PARAMETER = re.compile(r"(\*{0,2}[A-Za-z_]\w*)(?:\s*:?=\s*('[^']*'|\S+))?")
+
+
+def _bolted(part: PartEntry, text: str) -> dict[str, str]:
+    """Return what a macro is given that takes a parent, and perhaps an origin, where ``parent`` stands at the part.
+
+    The origin is none: the part's own keys say where it is.
+    """
+    spec = part.declared
+    defaults = dict(_PARAMETER.findall(macros_in(text).get(spec.macro or "", "")))
+    wanted = [name for name in _PARENTS if name in defaults and defaults[name] != "''"]
+    if spec.parent is None or not wanted or spec.params.keys() & {*_PARENTS, _ORIGIN}:
+        return {}
+    bolted = {wanted[0]: spec.parent[0]}
+    return bolted | ({_ORIGIN: "<origin/>"} if f"*{_ORIGIN}" in defaults else {})
+
+
+def _loose(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
+    """Return what a macro made without the joint by which it hangs on its parent: the part's mount edge is that.
+
+    Raises:
+        RejectedError: if there are several such joints, or one that moves or is somewhere else.
+    """
+    parent = next(iter(bolted.values()))
+    joints = [edge for edge in robot.edges if edge.parent == parent and parent not in robot.frames]
+    if not joints:
+        return robot
+    edge = joints[0]
+    if joints[1:] or edge.kind != "static" or edge.pose != Pose():
+        what = (
+            "several joints"
+            if joints[1:]
+            else f"the joint {edge.joint_name}, which is not simply fixed there"
+        )
+        advice = (
+            "leave parent out, and give the macro its parent and pose: params:"
+            f" {{{next(iter(bolted))}: {parent}, …}}"
+        )
+        message = f"the macro {part.declared.macro} is attached to {parent} by {what}"
+        raise RejectedError(
+            [finding("TF313", message, part.source.at((*part.at, "parent")), help=advice)]
+        )
+    if part.declared.joint is None:
+        part.declared = part.declared.model_copy(
+            update={"joint": f"{part.prefix}{edge.joint_name}"}
+        )
+    return replace(robot, edges=tuple(one for one in robot.edges if one is not edge))
+
+
+def _use(
+    part: PartEntry, file: str, packages: Packages, disk: Disk, bolted: Mapping[str, str]
+) -> Use:
+    """Return how the part uses the file: as a whole, or a call of its macro."""
+    spec, at = part.declared, part.at
+    if spec.macro is None:
+        return Use(part.source.at((*at, "xacro")))
+    places = (part.source.at((*at, "include", index)) for index in range(len(spec.include)))
+    files = (
+        *(packages.path_of(one, place) for one, place in zip(spec.include, places, strict=True)),
+        file,
+    )
+    words: dict[str, str] = {name: value for name, value in bolted.items() if name != _ORIGIN}
+    blocks = [bolted[_ORIGIN]] if _ORIGIN in bolted else []
+    for name, value in spec.params.items():
+        if _is_markup(value):
+            _refuse_broken(name, value, part.source.at((*at, "params", name)))
+        block = _block(value)
+        if block is None:
+            words[name] = _word(_with_files(value, (*at, "params", name), part, disk))
+        else:
+            blocks.append(block)
+    named = {name: part.source.at_key((*at, "params", name)) for name in spec.params}
+    return Use(part.source.at((*at, "macro")), spec.macro, words, tuple(blocks), files, named)
+
+
+def _is_markup(value: Any) -> TypeGuard[str]:
+    return isinstance(value, str) and value.lstrip().startswith("<")
+
+
+def _refuse_broken(name: str, text: str, at: Span) -> None:
+    try:
+        read_block(text, at.file)
+    except RejectedError as error:
+        found = (
+            replace(one, span=at, message=f"block {name}: {one.message}") for one in error.findings
+        )
+        raise RejectedError(found) from None
+
+
+def _block(value: Any) -> str | None:
+    """Return the element that a parameter is, or None for one that is a word."""
+    if isinstance(value, Origin):
+        pose = pose_of(value)
+        xyz, rpy = (
+            " ".join(map(repr, numbers)) for numbers in (pose.xyz, rpy_from_quat(pose.quat_xyzw))
+        )
+        return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+    return value if _is_markup(value) else None
+
+
+def _word(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _own(part: PartEntry) -> tuple[Process, ...]:
+    """Return the publishers of a part that is a robot of its own."""
+    settings: RosSettings = part.settings
+    remap = topics_below(settings.namespace, part.isolate)
+    return tuple(
+        Process(
+            name,
+            name,  # type: ignore[arg-type]  # the built-in processes are called by their kinds
+            at=part.place,
+            ros_nodes=(Node(full_name(settings.namespace, f"tfcompose_{name}"), part.place),),
+            remap=remap,
+        )
+        for name in BUILT_IN
+    )

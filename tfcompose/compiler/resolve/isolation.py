@@ -1,0 +1,182 @@
+"""Robots beside each other: frame prefixes, topics below a namespace, and names that processes are given.
+
+A prefix is written in front of every frame that is not shared, as it is (robot_state_publisher's
+``frame_prefix`` does the same). Topics are isolated as Clearpath does it: /tf and /tf_static,
+which are absolute and no namespace moves, are remapped below the namespace for every process at
+once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, did_you_mean, finding
+from tfcompose.model.plan import RosSettings, known_at_launch
+from tfcompose.model.plan.codec import narrowed
+from tfcompose.spec.language.variables import CALLS
+from tfcompose.spec.load import path_named
+
+if TYPE_CHECKING:
+    from tfcompose.compiler.urdf.packages import Disk
+    from tfcompose.model.robot import Node, Process, Robot
+    from tfcompose.spec.language.robot import RobotSpec, RosSpec
+    from tfcompose.spec.load import Path, Source
+
+
+TF_TOPICS = ("/tf", "/tf_static")
+
+
+def settings_of(ros: RosSpec) -> RosSettings:
+    """Return what all processes share, with the frame prefix that follows from the isolation."""
+    namespace = ros.namespace.strip("/")
+    prefix = ros.frame_prefix
+    if not prefix and ros.isolate in {"frames", "both"} and namespace:
+        prefix = f"{namespace}/"
+    return narrowed(RosSettings, ros, namespace=namespace, frame_prefix=prefix)
+
+
+def topics_below(namespace: str, isolate: str) -> dict[str, str]:
+    """Return where the TF topics are moved: below the namespace, if they are isolated and it is one."""
+    moves = isolate in {"topics", "both"} and namespace
+    return {topic: f"/{namespace}{topic}" for topic in TF_TOPICS} if moves else {}
+
+
+def isolate(
+    robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None = None
+) -> tuple[Robot, list[Finding]]:
+    """Return the robot with its processes' topics moved, and frames and files in them named; and what is wrong."""
+    found = _wrong(robot, spec, source)
+    remap = topics_below(robot.ros.namespace, spec.ros.isolate)
+    processes = []
+    filler = _Filler(robot, source, disk)
+    for process in robot.processes:
+        moved = replace(process, remap=remap | process.remap)
+        processes.append(filler.filled(moved))
+    return replace(robot, processes=tuple(processes)), [*found, *filler.found]
+
+
+def _wrong(robot: Robot, spec: RobotSpec, source: Source) -> list[Finding]:
+    found, ros = [], spec.ros
+    has_parts = spec.parts or any(section == "parts" for section, _ in robot.broken)
+    named = robot.ros.namespace or has_parts or (ros.isolate == "frames" and ros.frame_prefix)
+    if ros.isolate != "none" and not named:
+        message = f"isolate: {ros.isolate} needs a namespace"
+        found.append(
+            finding(
+                "TF304", message, source.at(("ros", "isolate")), help="ros: {namespace: robot1}"
+            )
+        )
+    for index, frame in enumerate(ros.shared_frames):
+        if frame not in robot.frames and not robot.excuses(frame):
+            place = source.at(("ros", "shared_frames", index))
+            advice = did_you_mean(frame, robot.frames, "remove it")
+            found.append(
+                finding("TF203", f"shared_frames: unknown frame {frame}", place, help=advice)
+            )
+    return found
+
+
+@dataclass(slots=True)
+class _Filler:
+    """Fills in processes; ``found`` is what cannot be."""
+
+    robot: Robot
+    source: Source
+    disk: Disk | None
+    found: list[Finding] = field(default_factory=list)
+
+    def filled(self, process: Process) -> Process:
+        """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
+        section: Path = ("processes", process.name)
+        if self.source.has(("containers", process.name)):
+            section = ("containers", process.name)
+        elif not self.source.has(section):
+            section = ("sensors", process.name, "driver")
+        done = replace(
+            process,
+            ros_nodes=tuple(
+                replace(n, params=self._fill(n.params, (*n.path, "params")))
+                for n in process.ros_nodes
+            ),
+            argv=self._fill(process.argv, (*section, "run")),
+            remap=self._fill(process.remap, (*section, "remap")),
+            env=self._fill(process.env, (*section, "env")),
+            cwd=self._folder(process.cwd, (*section, "cwd")),
+        )
+        for node in done.ros_nodes:
+            self._check_paths(done, node)
+        return done
+
+    def _fill(self, value: Any, path: Path) -> Any:
+        if isinstance(value, str):
+            return (
+                CALLS.sub(lambda call: self._meant(call[1], call[2], path), value)
+                if "${" in value
+                else value
+            )
+        if isinstance(value, dict):
+            return {key: self._fill(item, (*path, key)) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return type(value)(
+                self._fill(item, (*path, index)) for index, item in enumerate(value)
+            )
+        return value
+
+    def _meant(self, what: str, name: str, path: Path) -> str:
+        return self._frame(name, path) if what == "frame" else self._file(name, path)
+
+    def _frame(self, frame: str, path: Path) -> str:
+        if frame not in self.robot.frames and not self.robot.excuses(frame):
+            advice = did_you_mean(frame, self.robot.frames)
+            at = self.source.at(path)
+            self.found.append(
+                finding("TF203", f"${{frame({frame})}}: unknown frame {frame}", at, help=advice)
+            )
+        return self.robot.final(frame)
+
+    def _file(self, name: str, path: Path) -> str:
+        at = self.source.at(path)
+        place = path_named(name, at)
+        if name.startswith("/"):
+            advice = (
+                "a path from this file's folder; or write the path alone, which no other"
+                " machine has"
+            )
+            self.found.append(
+                finding("TF106", f"${{file({name})}} is an absolute path", at, help=advice)
+            )
+        elif self.disk and not (self.disk.is_file(place) or self.disk.is_folder(place)):
+            message = f"${{file({name})}}: {place} does not exist"
+            self.found.append(
+                finding("TF019", message, at, help="a path is relative to the file that writes it")
+            )
+        return f"${{file:{place}}}"
+
+    def _folder(self, cwd: str | None, path: Path) -> str | None:
+        """Return the folder that a process runs in: a relative one is beside the file that names it."""
+        if cwd is None or cwd.startswith(("/", "${")):
+            return self._fill(cwd, path)  # type: ignore[no-any-return]
+        at = self.source.at(path)
+        place = path_named(cwd, at)
+        if self.disk and not self.disk.is_folder(place):
+            advice = "a path is relative to the file that writes it"
+            self.found.append(
+                finding("TF019", f"cwd: the folder {place} does not exist", at, help=advice)
+            )
+        return f"${{file:{place}}}"
+
+    def _check_paths(self, process: Process, node: Node) -> None:
+        """Find parameters with a path that only the launcher knows, where it has no way to tell the node."""
+        can = process.component or (
+            process.kind == "run" and process.package is not None and len(process.nodes) == 1
+        )
+        for key, value in node.params.items() if not can else ():
+            if known_at_launch(value):
+                message = (
+                    f"the parameter {key} of {process.name} holds a path that is known at the"
+                    " start only"
+                )
+                advice = "write it among the arguments of run"
+                place = self.source.at((*node.path, "params", key))
+                self.found.append(finding("TF816", message, place, help=advice))

@@ -1,0 +1,175 @@
+"""The middleware that the robot names: Zenoh's router among its processes, and what cannot work with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.resolve.processes import added, says_how
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.model.plan import Ready
+from tfcompose.model.plan.middleware import (
+    IMPLEMENTATIONS,
+    ROUTER,
+    ROUTER_LISTENS,
+    ROUTER_PROGRAM,
+    router_variables,
+)
+from tfcompose.model.robot import GUARD, STATIC, Process
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Robot
+    from tfcompose.spec.language.process import ProcessSpec
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Source
+
+_RMW = "RMW_IMPLEMENTATION"
+#: The router does not flush this line unless it writes to a terminal.
+_READY = Ready("log", ROUTER_LISTENS)
+#: The router's program, as a package's.
+_PROGRAM = ("rmw_zenoh_cpp", "rmw_zenohd")
+
+
+def is_own_router(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> bool:
+    """Return whether a process is the router that nobody has to declare: what stands under its name adds to it."""
+    return spec.ros.rmw == "zenoh" and name == ROUTER and not says_how(declared)
+
+
+def own_router(spec: RobotSpec, source: Source) -> list[Process]:
+    """Return the process of Zenoh's router, unless the robot has one of its own, or its middleware needs none."""
+    declared = spec.processes.get(ROUTER)
+    runs_it = any(
+        one.run and (one.run.package, one.run.executable) == _PROGRAM
+        for one in spec.processes.values()
+    )
+    if not is_own_router(ROUTER, declared, spec) or (runs_it and not declared):
+        return []
+    path = ("processes", ROUTER) if declared else ("ros", "rmw")
+    process = Process(
+        ROUTER,
+        "run",
+        at=source.at_key(path),
+        argv=(ROUTER_PROGRAM,),
+        restart="on-failure",
+        emulate_tty=True,
+    )
+    process = added(process, declared, spec)
+    return [replace(process, ready=process.ready or _READY)]
+
+
+def with_router(robot: Robot) -> Robot:
+    """Return the robot whose processes start once Zenoh's router listens; the router knows where."""
+    routers = _routers(robot)
+    if robot.ros.rmw != "zenoh" or not routers:
+        return robot
+    router, processes = routers[0], []
+    for process in robot.processes:
+        if process.name == router.name and process.kind == "run":
+            env = router_variables(robot.ros) | process.env
+            if process.ready is None:
+                process = replace(process, ready=_READY, emulate_tty=True)  # noqa: PLW2901 (as it is started)
+            processes.append(replace(process, env=env))
+        elif (
+            process.kind == "external"
+            or process.name in router.after
+            or process.name == router.name
+        ):
+            processes.append(process)
+        else:
+            processes.append(replace(process, after={router.name: "ready", **process.after}))
+    return replace(robot, processes=tuple(processes))
+
+
+def _routers(robot: Robot) -> list[Process]:
+    return [
+        one
+        for one in robot.processes
+        if one.name == ROUTER or (one.package, one.executable) == _PROGRAM
+    ]
+
+
+def wrong_middleware(robot: Robot, spec: RobotSpec, source: Source) -> Iterator[Finding]:
+    """Yield what the middleware cannot do, what names another, and computers that do not reach the router."""
+    ros = robot.ros
+    if spec.ros.router and ros.rmw != "zenoh":
+        advice = "ros: {rmw: zenoh}, or remove router"
+        yield finding(
+            "TF107", "router goes with rmw: zenoh", source.at_key(("ros", "router")), help=advice
+        )
+    if ros.rmw is None:
+        return
+    yield from _not_supported(robot, source)
+    yield from _disagreeing(robot, source)
+    if ros.rmw == "zenoh":
+        yield from _wrong_routers(robot, source)
+
+
+def _not_supported(robot: Robot, source: Source) -> Iterator[Finding]:
+    ros, at = robot.ros, source.at(("ros", "rmw"))
+    if ros.rmw == "fastdds":
+        return
+    if robot.guard.mode == "strict" and robot.guard.fence == "partition":
+        message = (
+            f"guard: {{fence: partition}} needs Fast DDS, and rmw: {ros.rmw} has no partitions"
+        )
+        place = source.at(("guard", "fence")) if source.has(("guard", "fence")) else at
+        yield finding(
+            "TF870", message, place, help="remove fence: strict fences off by remapping then"
+        )
+    if ros.rmw == "zenoh" and ros.discovery == "off":
+        message = "rmw: zenoh does not know discovery: off: whoever reaches the router is found"
+        advice = "discovery: localhost, where the router listens to its own computer alone"
+        yield finding("TF870", message, source.at(("ros", "discovery")), help=advice)
+
+
+def _disagreeing(robot: Robot, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each process that is given another middleware: it finds none of the others."""
+    wanted = IMPLEMENTATIONS[robot.ros.rmw] if robot.ros.rmw else ""
+    for process in robot.processes:
+        own = process.env.get(_RMW)
+        if own is None or own == wanted:
+            continue
+        sections = (
+            ("processes", process.name),
+            ("containers", process.name),
+            ("sensors", process.name, "driver"),
+        )
+        paths = [(*section, "env", _RMW) for section in sections]
+        place = next((source.at(path) for path in paths if source.has(path)), process.at)
+        message = f"{process.name} is given {_RMW}={own}, and the robot has rmw: {robot.ros.rmw}"
+        notes = [Note("set here", source.at(("ros", "rmw")))]
+        advice = f"remove {_RMW} from its env: {process.name} finds none of the others with it"
+        yield finding("TF871", message, place, notes=notes, help=advice)
+
+
+def _wrong_routers(robot: Robot, source: Source) -> Iterator[Finding]:
+    routers = _routers(robot)
+    for more in routers[1:]:
+        notes = [Note(f"{routers[0].name} is defined here", routers[0].at)]
+        message = f"{more.name} is a second router of Zenoh, beside {routers[0].name}"
+        yield finding(
+            "TF872", message, more.at, notes=notes, help="remove one: all processes use the same"
+        )
+    if not routers or robot.ros.router:
+        return
+    router = routers[0]
+    static = next((one.host for one in robot.processes if one.name == STATIC), None)
+    home = router.host or static
+    hosts = dict.fromkeys(
+        process.host or static
+        for process in robot.processes
+        if process.kind != "external" and process.name != GUARD
+    )
+    away = [host for host in hosts if host != home]
+    if away and router.kind != "external":
+        names = ", ".join(host or "the computer that the file does not name" for host in away)
+        declared = robot.hosts.get(home or "")
+        address = declared.ssh.rpartition("@")[2] if declared else "ADDRESS"
+        message = (
+            f"what runs on {names} does not reach {router.name}, which runs on"
+            f" {home or 'another computer'}"
+        )
+        advice = f"ros: {{router: tcp/{address}:7447}}, the address of {home or 'that computer'}"
+        yield finding("TF873", message, source.at(("ros", "rmw")), help=advice)

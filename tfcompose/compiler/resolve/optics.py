@@ -1,0 +1,109 @@
+"""What the streams of a sensor see: the preset's values, with the user's over them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, did_you_mean, finding
+from tfcompose.model.robot import Optics, OpticsSource
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable
+
+    from tfcompose.compiler.resolve.presets import Sensor
+    from tfcompose.model.robot import OpticsKind
+    from tfcompose.spec.language.optics import OpticsSpec
+    from tfcompose.spec.load import Source
+
+#: Keys of the language that ``Optics`` has under the same name; those that are left out stay as
+#: they are there.
+_KEYS = (
+    "projection", "backward", "horizontal", "vertical", "diagonal", "resolution", "near", "far", "channels",
+    "elevations", "samples", "rate", "shutter", "baseline", "active",
+)  # fmt: skip
+#: What the streams of a sensor are unless they say it.
+_KINDS: dict[str, OpticsKind] = {
+    "camera": "camera",
+    "stereo": "camera",
+    "rgbd": "camera",
+    "lidar2d": "lidar",
+    "lidar3d": "lidar",
+    "radar": "radar",
+    "ultrasonic": "ultrasonic",
+}
+#: What replaces another key of the same stream: whichever the user gives, the preset's other one
+#: says nothing then.
+_REPLACES = {"elevations": ("channels", "vertical"), "channels": ("elevations",)}
+
+
+def optics_of(
+    sensor: Sensor, frames: Collection[str], renamed: Callable[[str], str], source: Source
+) -> tuple[tuple[Optics, ...], list[Finding]]:
+    """Return what the sensor's streams see, of those whose frame is one of ``frames``, and what is wrong with it.
+
+    ``frames`` are the sensor's, its mount among them, before any renaming.
+    """
+    declared, preset = sensor.spec.optics, sensor.preset
+    made, found = [], []
+    for stream in dict.fromkeys((*preset.optics, *declared)):
+        base, own = preset.optics.get(stream), declared.get(stream)
+        at = ("sensors", sensor.name, "optics", stream)
+        pattern = (own.frame if own else None) or (base.frame if base else None)
+        if pattern is None:
+            advice = f"frame: {sensor.named(preset.mount)}; {sensor.spec.preset} has "
+            advice += f"the streams {', '.join(preset.optics)}" if preset.optics else "no streams"
+            message = f"the stream {stream} has no frame"
+            found.append(finding("TF102", message, source.at_key(at), help=advice))
+            continue
+        frame = sensor.named(pattern)
+        if own and own.frame and frame not in frames:
+            advice = did_you_mean(frame, frames, f"there is {', '.join(frames)}")
+            place = source.at((*at, "frame"))
+            found.append(
+                finding("TF203", f"{sensor.name} has no frame {frame}", place, help=advice)
+            )
+            continue
+        if frame not in frames or not (own or base is None or sensor.holds(base.when)):
+            continue
+        kind = (
+            (own.kind if own else None) or (base.kind if base else None) or _KINDS.get(preset.kind)
+        )
+        if kind is None:
+            advice = "kind: camera, lidar, radar or ultrasonic"
+            message = f"{preset.kind} sees nothing: the stream {stream} has no kind"
+            found.append(finding("TF102", message, source.at_key(at), help=advice))
+            continue
+        place = source.at_key(at) if own else source.at_key(at[:2])
+        values, sources = _merged(base, own, str(source.at_key(at)))
+        values.setdefault("active", kind != "camera")
+        made.append(Optics(stream, renamed(frame), kind, place, sources=tuple(sources), **values))
+    return tuple(made), found
+
+
+def _merged(
+    base: OpticsSpec | None, own: OpticsSpec | None, where: str
+) -> tuple[dict[str, Any], Iterable[OpticsSource]]:
+    """Return the values of the keys that anybody gives, and where they are from."""
+    values, given = _values(base), _values(own)
+    replaced = {*given, *(other for key in given for other in _REPLACES.get(key, ()))}
+    values = {key: value for key, value in values.items() if key not in replaced} | given
+    elevations = values.get("elevations")
+    if elevations:
+        values.setdefault("channels", len(elevations))
+        values.setdefault("vertical", (min(elevations), max(elevations)))
+    sources = []
+    for spec, outdated in ((base, replaced), (own, set[str]())):
+        for one in (spec.source if spec else None) or ():
+            keys = tuple(key for key in one.of if key not in outdated)
+            sources += [OpticsSource(keys, one.where, one.quality)] if keys else []
+    unsaid = tuple(
+        key
+        for key in given
+        if not any(key in one.of for one in (own.source if own else None) or ())
+    )
+    return values, [*sources, OpticsSource(unsaid, where, "robot file")] if unsaid else sources
+
+
+def _values(spec: OpticsSpec | None) -> dict[str, Any]:
+    values = {key: getattr(spec, key) for key in _KEYS} if spec else {}
+    return {key: value for key, value in values.items() if value is not None}

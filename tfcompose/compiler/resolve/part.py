@@ -1,0 +1,201 @@
+"""One part: its entry in the holder's file, and what the holder gets of it, under the names that it has there."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.resolve.renamed import Names, renamed
+from tfcompose.compiler.urdf.blocks import with_joints, within
+from tfcompose.foundation.findings import Finding, RejectedError, did_you_mean, finding
+from tfcompose.model.plan import RosSettings
+from tfcompose.model.plan.codec import narrowed
+from tfcompose.model.robot import Part
+from tfcompose.spec.language import GivenArg, as_part
+
+if TYPE_CHECKING:
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.robot import Edge, Robot
+    from tfcompose.spec.language.robot import PartSpec, RobotSpec
+    from tfcompose.spec.load import Path, Source
+
+#: What may stand in front of names so that they can be looked up.
+_PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Joined:
+    """A part as its holder sees it. ``root`` is the frame that is bolted on, None if there is no single one.
+
+    ``shared`` are those of its frames that are the holder's too.
+    """
+
+    name: str
+    declared: PartSpec
+    robot: Robot
+    root: str | None
+    shared: frozenset[str]
+
+
+@dataclass(slots=True)
+class PartEntry:
+    """One entry of ``parts`` while it is resolved."""
+
+    name: str
+    declared: PartSpec
+    spec: RobotSpec
+    source: Source
+    outer_prefix: str
+    is_broken: bool = False
+    found: list[Finding] = field(default_factory=list)
+
+    @property
+    def at(self) -> Path:
+        """Where it is written."""
+        return ("parts", self.name)
+
+    @property
+    def place(self) -> Span:
+        """The place of its name."""
+        return self.source.at_key(self.at)
+
+    @property
+    def prefix(self) -> str:
+        """What is written in front of its frames: what is said, or the namespace where frames are isolated by it."""
+        if self.declared.prefix is not None:
+            return self.declared.prefix
+        namespace = (self.declared.namespace or "").strip("/")
+        return f"{namespace}/" if namespace and self.spec.ros.isolate in {"frames", "both"} else ""
+
+    @property
+    def isolate(self) -> str:
+        """How it is isolated. Where it has no prefix, its frames are not."""
+        declared = self.spec.ros.isolate
+        return (
+            declared
+            if self.prefix
+            else {"both": "topics", "frames": "none"}.get(declared, declared)
+        )
+
+    @property
+    def settings(self) -> RosSettings:
+        """What its processes share: the holder's, below its own namespace and with its own prefix."""
+        ros = self.spec.ros
+        parts = (ros.namespace, self.declared.namespace or "")
+        namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
+        return narrowed(
+            RosSettings, ros, namespace=namespace, frame_prefix=f"{self.outer_prefix}{self.prefix}"
+        )
+
+    def given_args(self) -> dict[str, GivenArg]:
+        """Return the values that the holder gives the part's arguments."""
+        at = (*self.at, "args")
+        return {
+            name: GivenArg(value, self.source.at((*at, name)))
+            for name, value in self.declared.args.items()
+        }
+
+    def laid_over(self, inner: Source) -> Source:
+        """Return the part's source with what the holder says about all its parts laid over it."""
+        settings = {
+            "namespace": self.settings.namespace,
+            "frame_prefix": self.settings.frame_prefix,
+            "state_publisher": (
+                self.spec.ros.state_publisher if self.declared.is_alone else "tfcompose"
+            ),
+            "isolate": self.isolate,
+        }
+        source, found = as_part(
+            inner, self.source, self.at, self.spec.ros, settings, self.declared.vars
+        )
+        self.found += found
+        return source
+
+    def joined(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
+        """Return the part under the names that it has in the holder; ``implied`` are frames that only that has."""
+        if not _PREFIX.fullmatch(self.prefix):
+            at, advice = (
+                self.source.at((*self.at, "prefix")),
+                "letters, digits and _: left_, or left/",
+            )
+            raise RejectedError(
+                [finding("TF501", f"invalid prefix {self.prefix!r}", at, help=advice)]
+            )
+        shared = frozenset(robot.ros.shared_frames) & robot.frames.keys() | implied
+        if self.declared.root is not None:
+            robot = self._subtree(robot, self.declared.root)
+        names = Names(self.name, self.prefix, shared, self.declared.is_alone)
+        again = renamed(robot, names)
+        if self.declared.owner is not None:
+            at = self.source.at((*self.at, "owner"))
+            again = replace(
+                again, edges=tuple(_owned(edge, self.declared.owner, at) for edge in again.edges)
+            )
+        if self.declared.is_alone:
+            again = replace(again, parts=(Part(self.name, self.prefix, robot), *again.parts))
+        return Joined(self.name, self.declared, again, self._root(robot, names), shared)
+
+    def _subtree(self, robot: Robot, root: str) -> Robot:
+        """Return what is below ``root``."""
+        if root not in robot.frames:
+            if robot.excuses(root):
+                raise RejectedError([])
+            at, advice = self.source.at((*self.at, "root")), did_you_mean(root, robot.frames)
+            raise RejectedError(
+                [finding("TF203", f"the part {self.name} has no frame {root}", at, help=advice)]
+            )
+        return subtree(robot, root)
+
+    def _root(self, robot: Robot, names: Names) -> str | None:
+        """Return the frame that the holder bolts on; to have none, or several, is wrong only if it has to be one."""
+        roots = [name for name in robot.roots() if name not in names.shared]
+        if self.declared.parent is None or len(roots) == 1:
+            return names.frame(roots[0]) if len(roots) == 1 else None
+        if robot.broken:
+            raise RejectedError([])  # what would be the root, or would hang on it, was refused
+        held = (edge.parent for edge in robot.edges if edge.parent in names.shared)
+        listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
+        what = f"has several roots: {listed}" if roots else f"is a child of {listed} already"
+        at = self.source.at((*self.at, "parent"))
+        advice = (
+            f"choose one: root: {roots[0]}"
+            if roots
+            else "leave parent out, or take a part of it: root: FRAME"
+        )
+        raise RejectedError([finding("TF313", f"the part {self.name} {what}", at, help=advice)])
+
+
+def _owned(edge: Edge, owner: str, at: Span) -> Edge:
+    """Return the edge of another owner, who sends what is fixed on /tf_static and what moves on /tf."""
+    return replace(
+        edge, owner=owner, owner_at=at, kind="static" if edge.kind == "static" else "dynamic"
+    )
+
+
+def subtree(robot: Robot, root: str) -> Robot:
+    """Return what is below ``root``, one of the robot's frames, which becomes the base.
+
+    Hardware, raw blocks and drivers of sensors are left out with the joints, links and sensors
+    that they belong to.
+    """
+    frames = robot.below(root)
+    edges = tuple(edge for edge in robot.edges if edge.child in frames and edge.child != root)
+    sensors = tuple(sensor for sensor in robot.sensors if sensor.mount in frames)
+    joints = {edge.joint_name for edge in edges if edge.joint_name}
+    busy = {sensor.driver for sensor in sensors} | {edge.owner for edge in edges}
+    unused = {sensor.driver for sensor in robot.sensors} - busy
+    return replace(
+        robot,
+        frames={name: at for name, at in robot.frames.items() if name in frames},
+        edges=edges,
+        links={name: link for name, link in robot.links.items() if name in frames},
+        processes=tuple(process for process in robot.processes if process.name not in unused),
+        claims=tuple(
+            one for one in robot.claims if {one.parent, one.child} <= frames or one.child == root
+        ),
+        sensors=sensors,
+        base=root,
+        hardware=tuple(filter(None, (with_joints(one, joints) for one in robot.hardware))),
+        blocks=tuple(filter(None, (within(one, robot, frames, joints) for one in robot.blocks))),
+    )

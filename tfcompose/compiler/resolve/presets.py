@@ -1,0 +1,377 @@
+"""Presets: where they are, what one says with all that it extends, and what one sensor makes of it.
+
+A preset is found when it is used; folders are listed only where a name is wrong, or where all are
+asked for. Presets of nodes are a part of the program, beside its code.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import posixpath
+import re
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any, Protocol
+
+from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.spec.language import validate_node_preset, validate_preset
+from tfcompose.spec.language.overlay import extended_by, lay_over, without
+from tfcompose.spec.language.preset import PresetSpec
+from tfcompose.spec.load import load
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from tfcompose.spec.language.node_preset import NodePresetSpec
+    from tfcompose.spec.language.preset import Option, PresetFrame
+    from tfcompose.spec.language.robot import SensorSpec
+    from tfcompose.spec.load import Path, Source
+
+
+DRIVER, TFCOMPOSE = "driver", "tfcompose"
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A sensor with its preset, and its options decided. ``tf`` is who publishes the frames that a driver can."""
+
+    name: str
+    spec: SensorSpec
+    preset: PresetSpec
+    options: dict[str, Any]
+    tf: str = TFCOMPOSE
+
+    def named(self, pattern: str) -> str:
+        """Return a preset's name with the sensor's in it."""
+        return filled(pattern, self.name, self.preset.words)
+
+    def holds(self, condition: dict[str, Any]) -> bool:
+        """Return whether every option has, or holds, the value that the condition names."""
+        return holds(condition, self.options, self.tf)
+
+    def frames(self) -> dict[str, PresetFrame]:
+        """Return the frames that this sensor has, by their final names before any renaming."""
+        return {
+            self.named(name): frame
+            for name, frame in self.preset.frames.items()
+            if self.holds(frame.when)
+        }
+
+    def parent_of(self, name: str, frame: PresetFrame) -> str:
+        """Return the frame's parent before any renaming: as the user says, or where its publisher hangs it."""
+        own = self.spec.frames.get(name)
+        if own and own.parent:
+            return own.parent
+        return self.named(
+            frame.by_driver.parent if frame.by_driver and self.tf == DRIVER else frame.parent
+        )
+
+    def driven(self) -> dict[str, PresetFrame]:
+        """Return those of its frames that the driver can publish."""
+        return {name: frame for name, frame in self.frames().items() if frame.driver}
+
+
+def filled(pattern: str, name: str, words: dict[str, str]) -> str:
+    """Return the pattern with the sensor's name and the preset's words in it."""
+    for word, means in words.items():
+        pattern = pattern.replace(f"{{{word}}}", means)
+    return pattern.replace("{name}", name)
+
+
+def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
+    """Return whether every option has, or holds, the value that the condition names; ``tf`` counts as one."""
+    for option, wanted in condition.items():
+        value = tf if option == "tf" else options.get(option)
+        every = wanted if isinstance(wanted, list) else [wanted]
+        if not all(
+            one in value if isinstance(value, (list, tuple)) else one == value for one in every
+        ):
+            return False
+    return True
+
+
+def sensor_of(
+    name: str, spec: SensorSpec, library: Library, source: Source
+) -> tuple[Sensor | None, list[Finding]]:
+    """Return the sensor with its preset and options, or None and why not."""
+    at: Path = ("sensors", name)
+    span = source.at((*at, "preset"))
+    try:
+        plain = library.get(spec.preset)
+        options, found = decided(plain, spec, at, source)
+        choices = {
+            key: options[key] for key, option in plain.options.items() if option.type == "choice"
+        }
+        preset = library.get(spec.preset, choices)
+    except KeyError:
+        return None, [_no_preset(spec.preset, library, span)]
+    except RejectedError as error:
+        return None, list(error.findings)
+    hidden = library.hides(spec.preset)
+    if hidden:
+        message = (
+            f"{spec.preset} is {library.file(spec.preset)}, which takes precedence over"
+            " tfcompose's own preset"
+        )
+        notes = [Note("its own", Span(hidden))]
+        found.append(finding("TF607", message, span, notes=notes, help="give it another name"))
+    sensor = Sensor(name, spec, preset, options, DRIVER)
+    if _publisher(sensor) == TFCOMPOSE:
+        sensor = Sensor(name, spec, preset, options, TFCOMPOSE)
+    return sensor, found
+
+
+_OWN = "tfcompose help presets shows how to write one"
+
+
+def _no_preset(name: str, library: Library, span: Span) -> Finding:
+    names = library.names
+    vendor = name.partition("/")[0]
+    same = [one for one in names if one.startswith(f"{vendor}/")]
+    there = (
+        f"of {vendor} there is {', '.join(same)}"
+        if same
+        else f"tfcompose presets lists them; {_OWN}"
+    )
+    models = [one for one in names if one.rpartition("/")[2] == name.rpartition("/")[2].lower()]
+    advice = (
+        f"did you mean {' or '.join(models)}?"
+        if models and not same
+        else did_you_mean(name, same or names, there)
+    )
+    return finding("TF601", f"unknown preset {name}", span, help=advice)
+
+
+def _publisher(sensor: Sensor) -> str:
+    """Return who publishes the frames that a driver can: as said, or as the vendor's driver does by default."""
+    driver, own = sensor.preset.driver, sensor.spec.driver
+    if driver is None or (own and own.process == "none"):
+        return TFCOMPOSE
+    if not sensor.driven():
+        return TFCOMPOSE
+    return sensor.spec.tf or driver.tf
+
+
+def decided(
+    preset: PresetSpec, spec: SensorSpec, at: Path, source: Source
+) -> tuple[dict[str, Any], list[Finding]]:
+    """Return the value of each of the preset's options, and what is wrong with those that are given."""
+    options = {key: option.default for key, option in preset.options.items()}
+    found = []
+    for key, value in spec.options.items():
+        place = source.at((*at, "options", key))
+        if key not in preset.options:
+            there = (
+                f"{spec.preset} has {', '.join(preset.options)}"
+                if preset.options
+                else f"{spec.preset} has none"
+            )
+            advice = did_you_mean(key, preset.options, there)
+            found.append(
+                finding("TF603", f"{spec.preset} has no option {key}", place, help=advice)
+            )
+            continue
+        chosen = _as_text(value) if preset.options[key].type == "choice" else value
+        refusal = _refusal(preset.options[key], key, chosen, place)
+        if refusal:
+            found.append(refusal)
+        else:
+            options[key] = chosen
+    return options, found
+
+
+def _as_text(value: Any) -> Any:
+    """Return what stands for a variant's name: a number or true as it is written."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, (int, float)) else value
+
+
+def _refusal(option: Option, key: str, value: Any, place: Span) -> Finding | None:
+    if option.type == "bool" and not isinstance(value, bool):
+        return finding("TF603", f"the option {key} is {value!r}", place, help="true or false")
+    if option.type == "text" and not isinstance(value, str):
+        return finding(
+            "TF603", f"the option {key} is {value!r}, not a string", place, help="put it in quotes"
+        )
+    if option.type == "choice" and value not in option.variants:
+        advice = did_you_mean(str(value), option.variants, f"one of: {', '.join(option.variants)}")
+        return finding("TF603", f"the option {key} cannot be {value!r}", place, help=advice)
+    if option.type != "set":
+        return None
+    known = ", ".join(option.values)
+    if not isinstance(value, list):
+        return finding(
+            "TF603", f"the option {key} is not a list", place, help=f"a list of some of: {known}"
+        )
+    for item in value:
+        if item not in option.values:
+            advice = did_you_mean(str(item), option.values, f"there is {known}")
+            return finding("TF603", f"the option {key} cannot hold {item!r}", place, help=advice)
+    return None
+
+
+#: vendor/model; a model that begins with _ is there to be extended only, and nodes/ holds no
+#: sensors.
+_NAME = re.compile(r"(?!nodes/)[A-Za-z0-9][A-Za-z0-9_.-]*/_?[A-Za-z0-9][A-Za-z0-9_.-]*")
+_DEEPEST = 8
+
+
+class Storage(Protocol):
+    """The folders of presets: which files there are, and what they hold."""
+
+    def has(self, path: str) -> bool:
+        """Return whether the file is there."""
+
+    def is_folder(self, path: str) -> bool:
+        """Return whether the folder is there."""
+
+    def read(self, path: str) -> str:
+        """Return its text; raises RejectedError."""
+
+    def models(self, folder: str) -> list[str]:
+        """Return the names, vendor/model, of the presets in the folder."""
+
+    def packages(self) -> list[str]:
+        """Return the folders that installed Python packages bring; this is looked up late, as it takes long."""
+
+
+@dataclass(slots=True)
+class Library:
+    """Presets in folders; an earlier folder stands before a later one, and packages stand last."""
+
+    folders: tuple[str, ...]
+    storage: Storage
+    own: str = ""
+    _sources: dict[str, Source] = field(default_factory=dict)
+    _specs: dict[tuple[str, tuple[tuple[str, str], ...]], PresetSpec] = field(default_factory=dict)
+    _files: dict[str, str | None] = field(default_factory=dict)
+
+    def over(self, folders: Iterable[str]) -> Library:
+        """Return a library with these folders before its own."""
+        return Library((*map(posixpath.normpath, folders), *self.folders), self.storage, self.own)
+
+    @property
+    def names(self) -> list[str]:
+        """The names of all presets, in order."""
+        known = {name for folder in self._all() for name in self.storage.models(folder)}
+        return sorted(name for name in known if "/_" not in name and _NAME.fullmatch(name))
+
+    def file(self, name: str) -> str | None:
+        """Return the preset's file, or None where there is none of that name."""
+        if name not in self._files:
+            self._files[name] = self._find(name, self.folders) or self._find_late(name)
+        return self._files[name]
+
+    def hides(self, name: str) -> str | None:
+        """Return the file of tfcompose's own preset that another one of this name stands before, or None."""
+        mine = self._find(name, (self.own,)) if self.own else None
+        return mine if mine and self.file(name) != mine else None
+
+    def source(self, name: str, deep: int = 0) -> Source:
+        """Return what the preset says, laid over what it extends.
+
+        Raises:
+            KeyError: if there is none of that name.
+            RejectedError: if it, or what it extends, is no preset.
+        """
+        if name not in self._sources:
+            file = self.file(name)
+            if file is None:
+                raise KeyError(name)
+            own = load(self.storage.read(file), file)
+            self._sources[name] = self._extended(own, name, deep)
+        return self._sources[name]
+
+    def get(self, name: str, choices: Mapping[str, str] | None = None) -> PresetSpec:
+        """Return the preset; ``choices`` are the options that lay a variant over it.
+
+        Raises:
+            KeyError: if there is none of that name.
+            RejectedError: if the preset itself is wrong.
+        """
+        taken = tuple(sorted((choices or {}).items()))
+        if (name, taken) not in self._specs:
+            source = self.source(name)
+            for option, value in taken:
+                variant = source.part(("options", option, "variants", value))
+                source = lay_over(source, variant, is_overlay=False, of=PresetSpec)
+            self._specs[name, taken] = validate_preset(source)
+        return self._specs[name, taken]
+
+    def _extended(self, own: Source, name: str, deep: int) -> Source:
+        base = extended_by(own)
+        if base is None:
+            return own
+        at = own.at(("extends",))
+        if deep > _DEEPEST:
+            raise RejectedError([finding("TF606", f"{name} extends itself, by way of others", at)])
+        if base == name:  # it stands before one of the same name, and changes it
+            later = self._later(own.file)
+            below = (
+                self._extended(load(self.storage.read(later), later), name, deep + 1)
+                if later
+                else None
+            )
+        else:
+            below = self.source(base, deep + 1) if self.file(base) else None
+        if below is None:
+            raise RejectedError(
+                [finding("TF606", f"{name} extends {base}, which does not exist", at)]
+            )
+        return lay_over(without(below, "extends"), own, is_overlay=False, of=PresetSpec)
+
+    def _later(self, file: str) -> str | None:
+        """Return the file of the preset that stands behind this file's, under the same name."""
+        folder, name = _split(file)
+        behind = (*self.folders, *self.storage.packages())
+        return self._find(name, behind[behind.index(folder) + 1 :])
+
+    def _all(self) -> tuple[str, ...]:
+        return (*self.folders, *self.storage.packages())
+
+    def _find(self, name: str, folders: Iterable[str]) -> str | None:
+        paths = (
+            (posixpath.join(folder, f"{name}.yaml") for folder in folders)
+            if _NAME.fullmatch(name)
+            else ()
+        )
+        return next((path for path in paths if self.storage.has(path)), None)
+
+    def _find_late(self, name: str) -> str | None:
+        return self._find(name, self.storage.packages()) if _NAME.fullmatch(name) else None
+
+
+def _split(file: str) -> tuple[str, str]:
+    """Return the folder and the name, vendor/model, of a preset's file."""
+    rest, model = posixpath.split(file.removesuffix(".yaml"))
+    folder, vendor = posixpath.split(rest)
+    return folder, f"{vendor}/{model}"
+
+
+_NODE_PRESETS = pathlib.Path(__file__).parents[2] / "data" / "presets" / "nodes"
+
+
+@cache
+def _node_files() -> dict[str, pathlib.Path]:
+    """Return the file of each preset of a node, PACKAGE/NAME.yaml, by its name."""
+    return {file.stem: file for file in sorted(_NODE_PRESETS.glob("*/*.yaml"))}
+
+
+@cache
+def node_preset_names() -> tuple[str, ...]:
+    """Return the names of all presets of nodes, sorted."""
+    return tuple(sorted(_node_files()))
+
+
+@cache
+def node_preset(name: str) -> NodePresetSpec:
+    """Return the preset.
+
+    Raises:
+        KeyError: if there is none of that name.
+        RejectedError: if the preset itself is wrong.
+    """
+    file = _node_files()[name]
+    place = f"presets/nodes/{file.parent.name}/{file.name}"
+    return validate_node_preset(load(file.read_text("utf-8"), place))

@@ -1,0 +1,689 @@
+"""Processes: what is started, simulated or expected to run, under which names, and how it is kept alive and ended.
+
+tfcompose's own processes are here as well: ``static``, ``joints`` and ``guard``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.resolve.poses import pose_of
+from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
+from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.model.plan import Ready, Schedule, Simulation, StopRule, Sweep
+from tfcompose.model.robot import (
+    BUILT_IN,
+    GUARD,
+    JOINTS,
+    MOVING,
+    ROS2_LAUNCH,
+    SHELL,
+    STATIC,
+    Node,
+    Process,
+)
+from tfcompose.spec.language.habits import habit
+from tfcompose.spec.language.process import RUNNING, SIMULATIONS, SWEEP, keys_of
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.plan import ProcessKind, SchedulingPolicy
+    from tfcompose.model.robot import Edge, Joint, Robot
+    from tfcompose.spec.language import Validated
+    from tfcompose.spec.language.process import (
+        ContainerSpec,
+        ProcessSpec,
+        ReadySpec,
+        Run,
+        Simulate,
+        Started,
+        Way,
+    )
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Path, Source
+
+
+def user_process(
+    name: str, declared: ProcessSpec, validated: Validated
+) -> tuple[Process | None, list[Finding]]:
+    """Return the process that the user describes, or None and what is missing."""
+    spec, source = validated.spec, validated.source
+    at: Path = ("processes", name)
+    place = source.at_key(at)
+    if name in BUILT_IN:
+        return None, built_in_keys(name, declared, source)
+    namespace = namespace_of(declared, spec.ros.namespace)
+    nodes, found = nodes_of(name, declared, namespace, source)
+    if declared.external:
+        keys = how(declared, namespace, "external")
+        return replace(Process(name, "external", at=place, ros_nodes=nodes), **keys), found
+    if declared.simulate:
+        one = (Node(nodes[0].name, nodes[0].at),)
+        process, refused = _simulated(
+            Process(name, "simulate", at=place, ros_nodes=one), declared.simulate, validated
+        )
+        keys = how(declared, namespace, "simulate")
+        return process and replace(process, **keys), [*found, *refused]
+    if declared.component and declared.container:
+        process = Process(name, "component", at=place, ros_nodes=nodes)
+        return replace(process, **how(declared, namespace, "component")), found
+    if declared.run and declared.run.is_startable:
+        process = Process(name, "run", at=place, ros_nodes=nodes)
+        return (
+            replace(
+                process,
+                **how(declared, namespace),
+                **program(declared.run, shell=bool(declared.shell)),
+            ),
+            found,
+        )
+    if _is_way_refused(name, validated):
+        return None, found
+    if declared.run:
+        advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
+        at = (*at, "run")
+        return None, [
+            finding(
+                "TF102",
+                f"{name}: run needs package and executable",
+                source.at_key(at),
+                help=advice,
+            )
+        ]
+    advice = (
+        "run: {package: …, executable: …}, component: PACKAGE/CLASS, simulate: {…}, or external:"
+        " true"
+    )
+    return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
+
+
+def _simulated(
+    process: Process, simulate: Simulate, validated: Validated
+) -> tuple[Process | None, list[Finding]]:
+    at: Path = ("processes", process.name, "simulate")
+    if simulate.circle:
+        circle = simulate.circle
+        simulation = Simulation("circle", simulate.rate, radius=circle.radius, speed=circle.speed)
+    elif simulate.fixed:
+        simulation = Simulation("fixed", simulate.rate, pose=pose_of(simulate.fixed))
+    elif simulate.joints is not None:
+        simulation = Simulation("joints", simulate.rate)
+    elif any(
+        path[:3] == at and path[3:4] and path[3] in SIMULATIONS for path in validated.refused
+    ):
+        return None, []
+    else:
+        message = f"{process.name}: simulate needs circle, fixed or joints"
+        return None, [finding("TF102", message, validated.source.at_key(at))]
+    return replace(process, simulate=simulation), []
+
+
+def _is_way_refused(name: str, validated: Validated) -> bool:
+    """Return whether what says how it runs was refused, and is missing only therefore."""
+    refused = [
+        path[2:]
+        for path in validated.refused
+        if path[:2] == ("processes", name) and len(path) > 2  # noqa: PLR2004
+    ]
+    return any(
+        way in RUNNING | {"container"} or habit(str(way), {"run"})
+        for way, *rest in refused
+        if not rest or way != "run" or isinstance(rest[0], int) or rest[0] != "args"
+    )
+
+
+def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Finding]:
+    """Return a finding for each name that a sensor and a process, or two processes, share.
+
+    A sensor may have the name of the process that drives it.
+    """
+    first: dict[str, Process] = {}
+    found = []
+    for name, sensor in spec.sensors.items():
+        driven_by_it = sensor.driver is not None and sensor.driver.process == name
+        if name in spec.processes and not driven_by_it:
+            first[name] = Process(name, "external", at=source.at_key(("sensors", name)))
+    for process in processes:
+        other = first.setdefault(process.name, process)
+        if other.at != process.at:
+            notes = [Note(f"{other.name} is also defined here", other.at)]
+            advice = "rename one of them"
+            if process.name in spec.sensors:
+                advice += f", or, if it drives the sensor, driver: {process.name}"
+            message = (
+                f"the name {process.name} is used twice; sensors and processes share one name"
+                " space"
+            )
+            found.append(finding("TF502", message, process.at, notes=notes, help=advice))
+    return found
+
+
+def unknown_names(
+    processes: list[Process],
+    source: Source,
+    known: Collection[str],
+    broken: Collection[tuple[str, str]],
+) -> list[Finding]:
+    """Return a finding for each name under ``after`` that is no process, and for each end that never comes.
+
+    ``known`` are the names of all processes; an entry among the ``broken`` ones may have brought
+    another.
+    """
+    refused = {name for _, name in broken}
+    missing = tuple(name for section, name in broken if section == "parts" and name)
+    lasting = {process.name: process for process in processes if process.kind != "run"}
+    found = []
+    for process in processes:
+        section = next(
+            (one for one in ("processes", "containers") if source.has((one, process.name))),
+            "sensors",
+        )
+        inside = ("driver", "after") if section == "sensors" else ("after",)
+        for other, what in process.after.items():
+            if what == "done" and other in lasting:
+                place = source.at((section, process.name, *inside, other))
+                message = f"{process.name} waits until {other} is done, which never happens"
+                found.append(
+                    finding("TF813", message, place, help=f"after: {{{other}: ready}}, or started")
+                )
+            elif process.component and other == process.component.container:
+                continue  # it was not written here
+            elif other not in known and other not in refused and not other.startswith(missing):
+                place = source.at_key((section, process.name, *inside, other))
+                names = sorted(name for name in known if name != process.name)
+                advice = did_you_mean(other, names, f"there is {', '.join(names)}")
+                found.append(
+                    finding(
+                        "TF813",
+                        f"{process.name} waits for {other}, which is not a process",
+                        place,
+                        help=advice,
+                    )
+                )
+    return found
+
+
+def unnamed_nodes(
+    edges: tuple[Edge, ...],
+    processes: list[Process],
+    spec: RobotSpec,
+    broken: Collection[tuple[str, str]],
+) -> Iterator[Finding]:
+    """Yield a finding for each owner that is a launch file, if no node in it is named, nor refused in ``broken``."""
+    owned = {edge.owner: edge for edge in reversed(edges)}
+    for process in processes:
+        edge, declared = owned.get(process.name), spec.processes.get(process.name)
+        is_launch = process.launch is not None or process.argv[:2] == ROS2_LAUNCH
+        is_read = ("processes", process.name) not in broken
+        if (
+            edge
+            and declared
+            and is_launch
+            and is_read
+            and declared.node is None
+            and not declared.nodes
+        ):
+            message = (
+                f"{process.name} is a launch file, and the node in it that publishes {edge.name}"
+                " is not named"
+            )
+            advice = f"processes: {{{process.name}: {{node: NAME}}}}"
+            yield finding("TF332", message, edge.owner_at or edge.at, help=advice)
+
+
+_FIELDS = frozenset(one.name for one in fields(Process) if one.init)
+
+
+def how(declared: Started | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:
+    """Return the fields of a process that runs in this way, by the keys that have their names."""
+    found = {key: getattr(declared, key) for key in _FIELDS & keys_of(way)}
+    stop, ready, schedule = (found.pop(key, None) for key in ("stop", "ready", "schedule"))
+    if schedule:
+        usual: SchedulingPolicy = "fifo" if schedule.priority else "other"
+        found["schedule"] = Schedule(
+            schedule.cpus, schedule.policy or usual, schedule.priority or 0
+        )
+    if declared.namespace is not None:
+        found["namespace"] = namespace
+    if stop:
+        found["stop"] = StopRule(stop.signal, stop.timeout, stop.kill_timeout)
+    if ready:
+        found["ready"] = _ready(ready, namespace)
+    return found
+
+
+def program(run: Run, *, shell: bool) -> dict[str, Any]:
+    """Return what is started: a package's program, a launch file, or a command; a shell's command is one text."""
+    if shell and run.argv:
+        return {"argv": (*SHELL, *run.argv)}
+    return _of_ros2(run.argv) or {
+        "package": run.package,
+        "executable": run.executable,
+        "launch": run.launch,
+        "argv": run.argv or run.args,
+    }
+
+
+def _of_ros2(argv: tuple[str, ...]) -> dict[str, Any] | None:
+    """Return what a command line of ``ros2 run`` or ``ros2 launch`` starts, or None for any other.
+
+    Options of ``ros2`` itself, and a launch file that is given by its path, are left to ``ros2``.
+    """
+    match argv:
+        case ("ros2", "run", package, executable, *words) if not package.startswith("-"):
+            return {"package": package, "executable": executable, "argv": tuple(words)}
+        case ("ros2", "launch", package, file, *words) if not package.startswith("-") and all(
+            ":=" in word for word in (*words,)
+        ):
+            return (
+                {"launch": f"{package}/{file}", "argv": tuple(words)} if ":=" not in file else None
+            )
+        case _:
+            return None
+
+
+def _ready(declared: ReadySpec, namespace: str) -> Ready | None:
+    timeout_s = declared.timeout
+    if declared.topic is not None:
+        return Ready("topic", full_name(namespace, declared.topic), timeout_s=timeout_s)
+    if declared.service is not None:
+        return Ready("service", full_name(namespace, declared.service), timeout_s=timeout_s)
+    if declared.lifecycle is not None:
+        return Ready("lifecycle", declared.lifecycle, timeout_s=timeout_s)
+    if declared.log is not None:
+        return Ready("log", declared.log, timeout_s=timeout_s)
+    if declared.exit is not None:
+        return Ready("exit", number=float(declared.exit), timeout_s=timeout_s)
+    if declared.time is not None:
+        return Ready("time", number=declared.time, timeout_s=timeout_s)
+    return (
+        Ready("edges", timeout_s=timeout_s) if declared.edges else None
+    )  # what else was said was refused
+
+
+#: The parameters of ``joints``: robot_state_publisher's, where it has them, each with an example.
+_JOINTS_PARAMS: dict[str, Any] = {"publish_frequency": 30.0, "ignore_timestamp": True}
+_KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
+
+
+def built_in(spec: RobotSpec, source: Source) -> list[Process]:
+    """Return tfcompose's own processes, with what stands of them under ``processes``."""
+    own = []
+    for name in BUILT_IN:
+        declared = spec.processes.get(name)
+        at = source.at_key(("processes", name)) if declared else source.at_key(("robot",))
+        path: Path = ("processes", name)
+        params = declared.params if declared and name == JOINTS else {}
+        node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at, path, params)
+        process = Process(name, _KINDS[name], at=at, ros_nodes=(node,))
+        if declared:
+            process = replace(process, **how(declared, spec.ros.namespace, "built-in"))
+        own.append(process)
+    return own
+
+
+def says_how(declared: ProcessSpec | None) -> bool:
+    """Return whether it is said how a process runs: else what stands under its name adds to one of tfcompose's own."""
+    return declared is not None and bool(
+        declared.run or declared.external or declared.simulate or declared.component
+    )
+
+
+def added(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
+    """Return a process that tfcompose adds, with what stands under its name; it runs where ``static`` does."""
+    if declared:
+        stated = how(declared, spec.ros.namespace, "built-in")
+        process = replace(
+            process, **{key: stated[key] for key in stated if key in declared.model_fields_set}
+        )
+    static = spec.processes.get(STATIC)
+    return replace(process, host=process.host or (static.host if static else None))
+
+
+def built_in_keys(name: str, declared: ProcessSpec, source: Source) -> list[Finding]:
+    """Return findings about what stands under the name of one of tfcompose's own processes."""
+    at: Path = ("processes", name)
+    known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
+    wrong = declared.model_fields_set - known
+    advice = f"its keys can be: {', '.join(sorted(known))}"
+    if wrong & RUNNING:
+        advice = (
+            f"give what {'joints publishes from' if name == JOINTS else 'you start'} a name of its"
+            f" own; {advice}"
+        )
+    found = [
+        finding(
+            "TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice
+        )
+        for key in wrong
+    ]
+    return found + (_joints_params(declared.params, source) if name == JOINTS else [])
+
+
+def _joints_params(params: dict[str, Any], source: Source) -> list[Finding]:
+    """Return findings about the parameters of ``joints``."""
+    found = []
+    for name, value in params.items():
+        at: Path = ("processes", JOINTS, "params", name)
+        example = _JOINTS_PARAMS.get(name)
+        if example is None:
+            advice = did_you_mean(name, _JOINTS_PARAMS, f"it has {' and '.join(_JOINTS_PARAMS)}")
+            found.append(
+                finding("TF101", f"joints has no parameter {name}", source.at_key(at), help=advice)
+            )
+        elif isinstance(value, bool) != isinstance(example, bool) or not isinstance(
+            value, (bool, int, float)
+        ):
+            advice = f"for example {name}: {str(example).lower()}"
+            what = "true or false" if isinstance(example, bool) else "a number of hertz"
+            found.append(finding("TF103", f"{name} is {what}", source.at(at), help=advice))
+        elif not isinstance(value, bool) and not 0 < value < math.inf:
+            advice = "leave it out, and every joint state is published"
+            found.append(finding("TF106", f"{name} has to be above 0", source.at(at), help=advice))
+    return found
+
+
+def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
+    """Return a finding for each key of a process that does nothing there."""
+    declared: dict[Path, tuple[str, Started | None]] = {}
+    declared |= {("processes", name): (name, process) for name, process in spec.processes.items()}
+    found: list[Finding] = [*_idle_of_containers(spec, source)]
+    declared |= {
+        ("sensors", name, "driver"): (f"the driver of {name}", s.driver)
+        for name, s in spec.sensors.items()
+    }
+    for path, (name, process) in declared.items():
+        if process is not None:
+            found += _idle_rate(path, name, process, source)
+            found += _idle(path, name, process, source)
+    return found
+
+
+def _idle_of_containers(spec: RobotSpec, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each key of a container that is started elsewhere, and has no effect therefore."""
+    for name, container in spec.containers.items():
+        works = keys_of("external") | {"external"}
+        for key in container.model_fields_set - works if container.external else ():
+            message, advice = (
+                f"{name} is external, so {key} has no effect",
+                "remove it: it is for whoever starts it",
+            )
+            yield finding("TF851", message, source.at_key(("containers", name, key)), help=advice)
+
+
+def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
+    """Yield a finding about a rate: only ``joints`` has one."""
+    if process.rate is None or path == ("processes", JOINTS):
+        return
+    advice = "remove it; the rate belongs to the edge: odom: {parent: map, owner: …, rate: 10 Hz}"
+    if process.simulate:
+        advice = "write it under simulate"
+    elif path == ("processes", STATIC):
+        advice = "remove it; fixed edges are sent once"
+    message = f"{name} has no rate; only the process joints has"
+    yield finding("TF101", message, source.at_key((*path, "rate")), help=advice)
+
+
+def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each key beside external or simulate that does nothing.
+
+    Where an overlay puts that in the place of something else, the keys below it are meant for what
+    they stood beside.
+    """
+    way: Way = "external" if process.external else "simulate" if process.simulate else "run"
+    way = "component" if process.component else way
+    if (
+        way == "run"
+        or (*path, way) in source.replaced
+        or (way == "simulate" and path[0] == "sensors")
+    ):
+        return  # no driver is simulated: that is refused
+    what, whom = "simulated", "the real process"
+    if way == "external":
+        what, whom = "external", "whoever starts the process"
+    elif way == "component":
+        what, whom = "a component", f"the container {process.container}"
+    for key in (
+        process.model_fields_set - keys_of(way) - RUNNING - {"rate"}
+    ):  # which are refused elsewhere
+        message, advice = (
+            f"{name} is {what}, so {key} has no effect",
+            f"remove it: it is for {whom}",
+        )
+        yield finding("TF851", message, source.at_key((*path, key)), help=advice)
+
+
+_WORDS = {
+    "remap": "-r FROM:=TO",
+    "log_level": "--log-level LEVEL",
+    "namespace": "-r __ns:=/NAMESPACE",
+    "params": "--params-file ${params_file}",
+}
+
+
+def unreached(process: Process, source: Source) -> list[Finding]:
+    """Return findings about a parameter file without parameters, and about keys that reach no node."""
+    at: Path = ("processes", process.name)
+    names_params_file = any(
+        "${params_file}" in word for word in (*process.argv, *process.env.values())
+    )
+    if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
+        keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
+        given = [key for key in keys if getattr(process, key) and source.has((*at, key))]
+        return [_not_reached(key, process, source.at_key((*at, key))) for key in given]
+    if (
+        not names_params_file
+        or any(node.params for node in process.ros_nodes)
+        or not source.has((*at, "run"))
+    ):
+        return []
+    message = f"{process.name} is given ${{params_file}}, and has no parameters"
+    return [finding("TF816", message, source.at((*at, "run")), help="params: {…}")]
+
+
+def _not_reached(key: str, process: Process, at: Span) -> Finding:
+    """Return a warning about a key that becomes ROS arguments, which neither a shell nor ``ros2 launch`` passes on."""
+    advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
+    message = f"{key} does not reach {process.name}, which a shell reads"
+    if process.argv[:2] == ROS2_LAUNCH:
+        advice = (
+            "write run: {launch: package/file.launch.py}, or an argument that the launch file"
+            " takes"
+        )
+        message = f"{key} does not reach the nodes of {process.name}, which ros2 launch starts"
+    return finding("TF107", message, at, help=advice, severity="warning")
+
+
+#: The key among a process's parameters that names files with more of them.
+FILE_KEY = "file"
+
+
+def full_name(namespace: str, name: str) -> str:
+    """Return a node's, topic's or service's full name: below the namespace unless it begins with a slash."""
+    if name.startswith("/"):
+        return name
+    return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
+
+
+def namespace_of(declared: Started | ContainerSpec | None, namespace: str) -> str:
+    """Return the namespace of a process's nodes, without a leading slash: its own, or the robot's ``namespace``."""
+    if declared is None or declared.namespace is None:
+        return namespace
+    return full_name(namespace, declared.namespace).strip("/")
+
+
+def has_claims(spec: RobotSpec) -> bool:
+    """Return whether anything is said of what nodes publish, or a process has several nodes."""
+    return any(
+        declared.nodes or declared.publishes or (declared.node and declared.node.preset)
+        for declared in spec.processes.values()
+    )
+
+
+def names_files(params: dict[str, Any]) -> bool:
+    """Return whether parameters name files."""
+    return isinstance(params.get(FILE_KEY), (str, list))
+
+
+def _usual(declared: ProcessSpec) -> str | None:
+    """Return the name that a known node has where tfcompose cannot give it another."""
+    if (
+        declared.node is None
+        or declared.node.preset is None
+        or (declared.run and declared.run.package)
+    ):
+        return None
+    return (
+        node_preset(declared.node.preset).node
+        if declared.node.preset in node_preset_names()
+        else None
+    )
+
+
+def nodes_of(
+    name: str, declared: ProcessSpec, namespace: str, source: Source
+) -> tuple[tuple[Node, ...], list[Finding]]:
+    """Return the nodes of a process, at least one, and what is wrong with them."""
+    at: Path = ("processes", name)
+    if not declared.nodes:
+        place = source.at(("processes", name, "node")) if declared.node else source.at_key(at)
+        own_name = (declared.node.name if declared.node else None) or _usual(declared) or name
+        return (
+            Node(full_name(namespace, own_name), place, at, declared.params, declared.lifecycle),
+        ), []
+    found = []
+    for key in ("publishes",) if declared.publishes else ():
+        message = f"{name} has nodes, and {key} names none of them"
+        found.append(
+            finding(
+                "TF107", message, source.at_key((*at, key)), help="write it under one of its nodes"
+            )
+        )
+    for key in declared.params:
+        advice = (
+            f"write it under nodes: {{{next(iter(declared.nodes))}: {{params: {{{key}: …}}}}}}"
+        )
+        message = f"{name} has nodes, and the parameter {key} names none of them"
+        found.append(finding("TF107", message, source.at_key((*at, "params", key)), help=advice))
+    nodes = [
+        Node(
+            full_name(namespace, node),
+            source.at_key((*at, "nodes", node)),
+            (*at, "nodes", node),
+            own.params,
+            own.lifecycle,
+        )
+        for node, own in declared.nodes.items()
+    ]
+    return tuple(nodes), found
+
+
+#: The time of one sweep, in seconds; longer where a joint may not move that fast.
+PERIOD_S = 6.0
+
+
+def with_positions(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+    """Return the robot whose stand-ins for joint states say where every joint is that has a position of its own.
+
+    A joint that mimics another is left out: it follows, and the process computes it. Where nothing
+    is said a joint is at 0, or in the middle between its limits if 0 is not between them, as
+    joint_state_publisher has it.
+    """
+    found: list[Finding] = []
+    processes = []
+    for process in robot.processes:
+        declared = spec.processes.get(process.name)
+        wanted = declared.simulate.joints if declared and declared.simulate else None
+        simulation = process.simulate
+        if simulation and simulation.kind == "joints" and wanted is not None:
+            if isinstance(wanted, dict):
+                found += _wrong_positions(wanted, robot, process, source)
+            processes.append(replace(process, simulate=_with_joints(simulation, wanted, robot)))
+        else:
+            processes.append(process)
+    return replace(robot, processes=tuple(processes)), found
+
+
+def _with_joints(simulation: Simulation, wanted: str | dict[str, Any], robot: Robot) -> Simulation:
+    joints = {
+        edge.joint.name: edge.joint
+        for edge in robot.edges
+        if edge.joint and _has_position(edge.joint)
+    }
+    each = {name: wanted.get(name) if isinstance(wanted, dict) else wanted for name in joints}
+    positions = {
+        name: _rest(joints[name]) if what is None or isinstance(what, str) else what
+        for name, what in each.items()
+    }
+    sweeps = {name: _sweep(joints[name]) for name, what in each.items() if what == SWEEP}
+    return replace(
+        simulation,
+        joints=positions,
+        sweep={name: sweep for name, sweep in sweeps.items() if sweep},
+    )
+
+
+def _wrong_positions(
+    wanted: dict[str, Any], robot: Robot, process: Process, source: Source
+) -> Iterator[Finding]:
+    """Yield a finding for each joint that is not there, or cannot move as it should."""
+    joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
+    movable = [name for name, joint in joints.items() if _has_position(joint)]
+    for name, what in wanted.items():
+        place = source.at_key(("processes", process.name, "simulate", "joints", name))
+        joint = joints.get(name)
+        if joint and joint.mimic:
+            advice = f"give the position of {joint.mimic}"
+            yield finding(
+                "TF703",
+                f"{name} has no position of its own: it mimics {joint.mimic}",
+                place,
+                help=advice,
+            )
+        elif name not in movable:
+            if not robot.excuses(name):
+                advice = did_you_mean(
+                    name,
+                    movable,
+                    f"there is {', '.join(movable)}" if movable else "no joint moves",
+                )
+                yield finding("TF703", f"no moving joint {name}", place, help=advice)
+        elif joint and what == SWEEP and _sweep(joint) is None:
+            advice = f"give {name} a limit: {{lower, upper}}, or give a position here"
+            yield finding(
+                "TF106", f"{name} slides and has no limits to sweep between", place, help=advice
+            )
+
+
+def _has_position(joint: Joint) -> bool:
+    """Whether the joint has a single position, and one of its own."""
+    return joint.mimic is None and joint.type in MOVING
+
+
+def _rest(joint: Joint) -> float:
+    limit = joint.limit
+    if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
+        return 0.0
+    return 0.0 if limit.lower <= 0 <= limit.upper else (limit.lower + limit.upper) / 2
+
+
+def _sweep(joint: Joint) -> Sweep | None:
+    """Return the sweep between the joint's limits, no faster than it may move; None for a slide without limits.
+
+    Of two limits a missing one is 0, as URDF's readers have it.
+    """
+    limit = joint.limit
+    fastest = limit.velocity if limit and limit.velocity else math.inf
+    if joint.type == "continuous":
+        return Sweep(max(PERIOD_S, math.tau / fastest))
+    if limit is not None and (limit.lower is not None or limit.upper is not None):
+        lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    elif joint.type == "revolute":
+        lower, upper = -math.pi, math.pi
+    else:
+        return None
+    return Sweep(max(PERIOD_S, math.pi * (upper - lower) / fastest), lower, upper)

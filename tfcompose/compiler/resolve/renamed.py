@@ -1,0 +1,229 @@
+"""A robot under other names: what it is called as a part of another one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.model.plan import EdgePattern
+from tfcompose.model.robot import BUILT_IN
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.plan import GuardPolicy
+    from tfcompose.model.robot import (
+        Calibration,
+        Edge,
+        Joint,
+        Link,
+        MountedSensor,
+        Part,
+        Process,
+        Robot,
+        Shape,
+        SourceNumbers,
+        Zone,
+    )
+    from tfcompose.model.robot.hardware import Block, Hardware
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What the names of a part become in the robot that holds it.
+
+    Frames and joints get ``prefix``, frames in ``shared`` stay; processes and sensors are below
+    the part's name. A part that is ``alone`` brings its own ``static`` and ``joints``; else the
+    holder's do their work.
+    """
+
+    part: str
+    prefix: str
+    shared: frozenset[str]
+    alone: bool
+
+    def frame(self, name: str) -> str:
+        """Return the frame's name."""
+        return name if name in self.shared else f"{self.prefix}{name}"
+
+    def joint(self, name: str) -> str:
+        """Return the joint's name, if it has one."""
+        return f"{self.prefix}{name}" if name else name
+
+    def process(self, name: str) -> str:
+        """Return the name of a process, or of a sensor."""
+        return name if name in BUILT_IN and not self.alone else f"{self.part}/{name}"
+
+
+def renamed(robot: Robot, names: Names) -> Robot:
+    """Return the robot with the names that it has as a part."""
+    again = _again(robot, names) if robot.hardware else {}
+    kept = [process for process in robot.processes if process.name not in BUILT_IN or names.alone]
+    broken = {
+        (section, again)
+        for section, name in robot.broken
+        for again in _names_of(section, name, names)
+    }
+    return replace(
+        robot,
+        frames={names.frame(name): at for name, at in robot.frames.items()},
+        edges=tuple(_edge(edge, names) for edge in robot.edges),
+        links={names.frame(name): _link(link, names) for name, link in robot.links.items()},
+        processes=tuple(_process(process, names) for process in kept if process.kind != "guard"),
+        base=robot.base and names.frame(robot.base),
+        guard=_policy(robot.guard, robot, names),
+        sensors=tuple(_sensor(sensor, names) for sensor in robot.sensors),
+        claims=tuple(
+            replace(c, parent=names.frame(c.parent), child=names.frame(c.child))
+            for c in robot.claims
+        ),
+        broken=frozenset(broken),
+        parts=tuple(_part(part, names) for part in robot.parts),
+        hardware=tuple(_hardware(hardware, names, again) for hardware in robot.hardware),
+        blocks=tuple(_blocks(robot, names)),
+        zones=tuple(_zone(zone, robot, names) for zone in robot.zones),
+        source_numbers=tuple(_numbers(one, names) for one in robot.source_numbers),
+    )
+
+
+def _numbers(numbers: SourceNumbers, names: Names) -> SourceNumbers:
+    section = numbers.path[0]
+    again = names.process if section in {"sensors", "parts", "processes"} else names.frame
+    return replace(
+        numbers, in_part=names.joint(numbers.name) if section == "joints" else again(numbers.name)
+    )
+
+
+def _link(link: Link, names: Names) -> Link:
+    visuals = (
+        tuple(_shape(shape, names) for shape in link.visuals) if names.prefix else link.visuals
+    )
+    return replace(link, name=names.frame(link.name), visuals=visuals)
+
+
+def _shape(shape: Shape, names: Names) -> Shape:
+    """Return the shape with its material's name, which in URDF is one for the whole robot; colours name themselves."""
+    material = shape.material
+    if material is None or material.name.startswith("rgba"):
+        return shape
+    return replace(shape, material=replace(material, name=names.prefix + material.name))
+
+
+def _edge(edge: Edge, names: Names) -> Edge:
+    return replace(
+        edge,
+        parent=names.frame(edge.parent),
+        child=names.frame(edge.child),
+        owner=names.process(edge.owner),
+        joint=_joint(edge.joint, names) if edge.joint else None,
+        free=_joint(edge.free, names) if edge.free else None,
+        joint_name=names.joint(edge.joint_name),
+        sensor=names.process(edge.sensor) if edge.sensor else None,
+        calibration=_calibration(edge.calibration, names) if edge.calibration else None,
+        switched=tuple(map(names.frame, edge.switched)),
+    )
+
+
+def _joint(joint: Joint, names: Names) -> Joint:
+    return replace(
+        joint,
+        name=names.joint(joint.name),
+        mimic=names.joint(joint.mimic) if joint.mimic else None,
+    )
+
+
+def _hardware(hardware: Hardware, names: Names, again: dict[str, str]) -> Hardware:
+    """Return the hardware, its sensors and gpios under names that no other part has, as a raw block would have them."""
+    inside = (
+        replace(one, name=names.joint(one.name), params=_params(one.params, again))
+        for one in hardware.components
+    )
+    params = _params(hardware.params, again)
+    return replace(
+        hardware, name=names.joint(hardware.name), params=params, components=tuple(inside)
+    )
+
+
+def _params(params: dict[str, str], again: dict[str, str]) -> dict[str, str]:
+    """Return the parameters, of which one that is the name of a frame or joint, such as mimic, goes with it."""
+    return {key: again.get(value, value) for key, value in params.items()}
+
+
+def _again(robot: Robot, names: Names) -> dict[str, str]:
+    """Return what frames and joints are called now, by what they were called."""
+    again = {frame: names.frame(frame) for frame in robot.frames}
+    return again | {
+        edge.joint_name: names.joint(edge.joint_name) for edge in robot.edges if edge.joint_name
+    }
+
+
+def _blocks(robot: Robot, names: Names) -> Iterator[Block]:
+    again = {
+        name: names.joint(name) for block in robot.blocks for name in block.own_names()
+    } | _again(robot, names)
+    for block in robot.blocks:
+        yield replace(block.renamed(again), name=f"{names.part}/{block.name}")
+
+
+def _calibration(calibration: Calibration, names: Names) -> Calibration:
+    return replace(
+        calibration, parent=names.frame(calibration.parent), child=names.frame(calibration.child)
+    )
+
+
+def _process(process: Process, names: Names) -> Process:
+    simulate, component = process.simulate, process.component
+    if simulate and not (
+        names.alone or process.part
+    ):  # joint states have the names that joints have in the whole
+        joints = {names.joint(name): q for name, q in simulate.joints.items()}
+        sweep = {names.joint(name): how for name, how in simulate.sweep.items()}
+        simulate = replace(simulate, joints=joints, sweep=sweep)
+    return replace(
+        process,
+        name=names.process(process.name),
+        after={names.process(name): what for name, what in process.after.items()},
+        simulate=simulate,
+        component=component and replace(component, container=names.process(component.container)),
+        part=f"{names.part}/{process.part}".rstrip("/") if names.alone or process.part else "",
+    )
+
+
+def _part(part: Part, names: Names) -> Part:
+    return replace(part, name=f"{names.part}/{part.name}", prefix=f"{names.prefix}{part.prefix}")
+
+
+def _sensor(sensor: MountedSensor, names: Names) -> MountedSensor:
+    return replace(
+        sensor,
+        name=names.process(sensor.name),
+        mount=names.frame(sensor.mount),
+        frames=tuple(map(names.frame, sensor.frames)),
+        driver_frames=tuple(map(names.frame, sensor.driver_frames)),
+        driver=names.process(sensor.driver) if sensor.driver else "",
+        optics=tuple(replace(one, frame=names.frame(one.frame)) for one in sensor.optics),
+    )
+
+
+def _zone(zone: Zone, robot: Robot, names: Names) -> Zone:
+    sensors = {sensor.name for sensor in robot.sensors}
+    by = tuple(names.process(one) if one in sensors else one for one in zone.by)
+    return replace(zone, name=f"{names.part}/{zone.name}", frame=names.frame(zone.frame), by=by)
+
+
+def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
+    """Return the policy with its patterns renamed where they name a frame; other patterns are as they were."""
+
+    def final(pattern: str) -> str:
+        return names.frame(pattern) if pattern in robot.frames else pattern
+
+    return replace(
+        policy,
+        allow=tuple(EdgePattern(final(one.parent), final(one.child)) for one in policy.allow),
+    )
+
+
+def _names_of(section: str, name: str, names: Names) -> tuple[str, ...]:
+    """Return the names that what an entry should have brought may be looked for under."""
+    has_process = section in {"sensors", "containers", "processes"}
+    return (names.frame(name), names.process(name)) if has_process else (names.frame(name),)

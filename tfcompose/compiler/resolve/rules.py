@@ -1,0 +1,62 @@
+"""What a robot file sets about rules: the limits of codes, and the zones that sensors have to see."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.catalogue import CATALOGUE, code_of
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.units import ANGLE, LENGTH, NUMBER
+from tfcompose.model.robot import Zone
+from tfcompose.spec.language.rules import RuleSpec
+
+if TYPE_CHECKING:
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Source
+
+#: What a limit can be, by its unit in the catalogue: its dimension, what that is called, and one
+#: way to write it.
+_KINDS = {
+    "m": (LENGTH, "a length", "5 cm"),
+    "rad": (ANGLE, "an angle", "45 deg"),
+    "%": (NUMBER, "a percentage", "30 %"),
+}
+
+
+def limits_of(spec: RobotSpec, source: Source) -> tuple[dict[str, float], list[Finding]]:
+    """Return the limits that the file sets, in SI by code, and what is wrong with them."""
+    limits, found = {}, []
+    for word, setting in spec.rules.items():
+        code = code_of(word)
+        if code is None or not isinstance(setting, RuleSpec) or setting.limit is None:
+            continue
+        place = source.at(("rules", word, "limit"))
+        known = CATALOGUE[code].limit
+        if known is None:
+            others = ", ".join(one.code for one in CATALOGUE.values() if one.limit)
+            message = f"{code} {CATALOGUE[code].name} has no limit"
+            found.append(finding("TF107", message, place, help=f"these have one: {others}"))
+            continue
+        dimension, kind, sample = _KINDS[known[1]]
+        if setting.limit.dimension not in {NUMBER, dimension}:
+            message = f"the limit of {code} is {kind}"
+            found.append(finding("TF104", message, place, help=f"for example {sample}"))
+        else:
+            limits[code] = setting.limit.value
+    return limits, found
+
+
+def zones_of(spec: RobotSpec, source: Source) -> tuple[Zone, ...]:
+    """Return the zones that the file wants to be seen."""
+    return tuple(
+        Zone(
+            name,
+            source.at_key(("coverage", name)),
+            one.frame,
+            one.center,
+            one.box,
+            one.by,
+            one.least,
+        )
+        for name, one in spec.coverage.items()
+    )

@@ -1,0 +1,563 @@
+"""Sensors on their mounts: the mount edge, the frames inside, the body and the driver of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.compiler.resolve.containers import component_process
+from tfcompose.compiler.resolve.isolation import settings_of
+from tfcompose.compiler.resolve.optics import optics_of
+from tfcompose.compiler.resolve.poses import Draft, rotation_of
+from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE
+from tfcompose.compiler.resolve.processes import full_name, how, namespace_of, program
+from tfcompose.compiler.urdf.inertia import of_primitives
+from tfcompose.foundation.findings import Finding, did_you_mean, finding
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.plan import switch_text
+from tfcompose.model.robot import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
+from tfcompose.spec.language.preset import Chosen
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.compiler.resolve.edges import Drafts
+    from tfcompose.compiler.resolve.presets import Sensor
+    from tfcompose.foundation.findings import Span
+    from tfcompose.spec.language import Validated
+    from tfcompose.spec.language.preset import DriverClaim, PresetDriver, PresetFrame
+    from tfcompose.spec.language.robot import FrameOverride, RobotSpec
+    from tfcompose.spec.load import Path, Source
+
+
+def add_sensor(drafts: Drafts, sensor: Sensor) -> None:
+    """Take a sensor into the drafts of a robot."""
+    _Mounting(drafts, sensor).add()
+
+
+@dataclass(frozen=True, slots=True)
+class _Mounting:
+    """One sensor on its way into the drafts."""
+
+    drafts: Drafts
+    sensor: Sensor
+    unknown: dict[str, str] = field(default_factory=dict)
+
+    def add(self) -> None:
+        drafts, sensor = self.drafts, self.sensor
+        mount = self.renamed(sensor.named(sensor.preset.mount))
+        drafts.frames.setdefault(mount, self.place())
+        keys, at = sensor.spec, ("sensors", sensor.name)
+        drafts.add(at, keys.parent, mount, keys, joint_name=keys.joint, sensor=sensor)
+        publisher = self.publisher()
+        for name, frame in sensor.frames().items():
+            self.add_frame(name, frame, publisher)
+        self.report_unknown()
+        self.check_overrides(mount)
+        self.add_body()
+        drafts.sensors.append(self.mounted(mount))
+
+    def place(self, *keys: str) -> Span:
+        """Return the place of the sensor, or of the value of a key in it."""
+        at: Path = ("sensors", self.sensor.name, *keys)
+        return self.drafts.source.at(at) if keys else self.drafts.source.at_key(at)
+
+    def renamed(self, name: str) -> str:
+        own = self.sensor.spec.frames.get(name)
+        return own.name if own and own.name else name
+
+    def add_frame(self, name: str, frame: PresetFrame, publisher: str) -> None:
+        """Take one frame inside the sensor: the unit's own value before the preset's."""
+        own, final = self.sensor.spec.frames.get(name), self.renamed(name)
+        parent = self.sensor.parent_of(name, frame)
+        owner = publisher if frame.driver else STATIC
+        pose, missing = self.pose_of(name, frame, own)
+        if missing and owner == STATIC:
+            self.unknown[name] = f"{name}: {{{', '.join(missing)}}}"
+        kind = "dynamic" if frame.driver == "dynamic" and owner != STATIC else "static"
+        self.drafts.frames.setdefault(final, self.place())
+        nominal = frame.nominal and not (own and (own.xyz or rotation_of(own, name)))
+        joint = own.joint if own else None
+        at: Path = ("sensors", self.sensor.name, "frames", name)
+        edge = Edge(
+            parent=self.renamed(parent), child=final, kind="dynamic" if kind == "dynamic" else "static", owner=owner,
+            pose=pose, at=self.place(), given=False, sensor=self.sensor.name, nominal=nominal,
+            other_axes=frame.other_axes, pose_known=not missing, joint_name=joint or "",
+            joint_at=self.drafts.named_joint(joint, at) if joint else None,
+            entry=("sensors", self.sensor.name, "frames", name),
+        )  # fmt: skip
+        self.drafts.edges.append(Draft(edge))
+
+    def pose_of(
+        self, name: str, frame: PresetFrame, own: FrameOverride | None
+    ) -> tuple[Pose, list[str]]:
+        """Return the frame's pose in its parent, and what is missing of it: then it is the identity."""
+        at, rotation = frame.xyz, rotation_of(frame, name)
+        if frame.by_driver and self.sensor.tf == DRIVER:
+            at, rotation = (
+                frame.by_driver.xyz or at,
+                rotation_of(frame.by_driver, name) or rotation,
+            )
+        turned = rotation_of(own, name) if own else None
+        xyz = (own.xyz if own else None) or at
+        missing = ["xyz: [x, y, z]"] if xyz is None else []
+        if at is None and rotation is None and turned is None:
+            missing.append("rpy: [roll, pitch, yaw]")
+        if xyz is None or missing:
+            return Pose(), missing
+        return Pose(xyz, turned or rotation or Pose().quat_xyzw), []
+
+    def report_unknown(self) -> None:
+        """Note the frames whose poses nobody knows, with what to write."""
+        if self.unknown:
+            sensor, first = self.sensor, next(iter(self.unknown))
+            *others, last = self.unknown
+            names = f"{', '.join(others)} and {last}" if others else last
+            parent = "" if others else f" in {sensor.parent_of(first, sensor.frames()[first])}"
+            message = f"{sensor.spec.preset} has no pose of {names}{parent}"
+            frames = ", ".join(self.unknown.values())
+            advice = f"measure, and write: sensors: {{{sensor.name}: {{frames: {{{frames}}}}}}}"
+            self.drafts.found.append(finding("TF605", message, self.place("preset"), help=advice))
+
+    def publisher(self) -> str:
+        """Return who publishes the frames inside the sensor that a driver can publish; note what cannot be."""
+        sensor, declared, driver = self.sensor, self.sensor.spec, self.sensor.preset.driver
+        named = declared.driver.process if declared.driver else None
+        process, found = driver_process(sensor, self.drafts.validated)
+        self.drafts.found += found
+        if process:
+            self.drafts.drivers += [process, *further_processes(sensor, self.drafts.validated)]
+        elif found:
+            return STATIC
+        if sensor.tf == DRIVER:
+            return named or sensor.name
+        if declared.tf == DRIVER:
+            why = "driver is none" if named == "none" else f"{declared.preset} has no driver"
+            if driver and named != "none":
+                why = f"that of {declared.preset} publishes none" + (
+                    " with these options" if _has_driven_frames(sensor) else ""
+                )
+            self.refuse(
+                f"{sensor.name}: the driver cannot publish its frames: {why}", "tf: tfcompose"
+            )
+        elif (
+            declared.tf == TFCOMPOSE
+            and driver
+            and named is None
+            and driver.off is None
+            and sensor.driven()
+        ):
+            message = (
+                f"{sensor.name}: the driver of {declared.preset} has no switch for its frames"
+            )
+            self.refuse(message, "tf: driver; or driver: none, where there is no device")
+        return STATIC
+
+    def refuse(self, message: str, advice: str) -> None:
+        self.drafts.found.append(finding("TF604", message, self.place("tf"), help=advice))
+
+    def mounted(self, mount: str) -> MountedSensor:
+        """Return what the rules see of the sensor."""
+        sensor, declared, preset = self.sensor, self.sensor.spec, self.sensor.preset
+        named = declared.driver.process if declared.driver else None
+        own = (
+            sensor.name
+            if any(process.name == sensor.name for process in self.drafts.drivers)
+            else ""
+        )
+        serial = next(
+            (option for option in ("serial", "serial_number") if option in preset.options), ""
+        )
+        inside = (sensor.named(preset.mount), *sensor.frames())
+        optics, wrong = optics_of(sensor, inside, self.renamed, self.drafts.source)
+        self.drafts.found += wrong
+        return MountedSensor(
+            sensor.name,
+            declared.preset,
+            preset.kind,
+            self.place(),
+            mount,
+            tuple(self.renamed(name) for name in sensor.frames()),
+            tuple(self.renamed(name) for name in sensor.driven()),
+            "" if named == "none" else named or own,
+            preset.driver.off if preset.driver else None,
+            sensor.tf == DRIVER,
+            {
+                f"{claim.parent} → {self.renamed(sensor.named(claim.child))}": claim.off
+                for claim in claims_of(sensor)
+            },
+            preset.driver is None or preset.driver.by_default,
+            serial,
+            sensor.options.get(serial) if serial else None,
+            self.place("tf"),
+            optics,
+        )
+
+    def check_overrides(self, mount: str) -> None:
+        sensor, source = self.sensor, self.drafts.source
+        original = sensor.named(sensor.preset.mount)
+        known = [*sensor.frames(), original]
+        at: Path = ("sensors", sensor.name, "frames")
+        for name, own in sensor.spec.frames.items():
+            place = source.at_key((*at, name))
+            if name not in known:
+                advice = did_you_mean(name, known, f"there is {', '.join(known)}")
+                self.drafts.found.append(
+                    finding("TF203", f"{sensor.name} has no frame {name}", place, help=advice)
+                )
+            elif own.parent and own.parent not in known:
+                advice = did_you_mean(own.parent, known, f"there is {', '.join(known)}")
+                message = f"{sensor.name} has no frame {own.parent}"
+                self.drafts.found.append(
+                    finding("TF203", message, source.at((*at, name, "parent")), help=advice)
+                )
+        mounted = sensor.spec.frames.get(original)
+        if mounted and (mounted.xyz or mounted.parent or mounted.joint or rotation_of(mounted)):
+            advice = f"its pose and joint are those of {sensor.name}"
+            message = f"{mount} is the mount, and has no pose inside"
+            self.drafts.found.append(
+                finding("TF106", message, source.at_key((*at, original)), help=advice)
+            )
+        if mount in sensor.frames():
+            message = f"{mount} is a frame inside {sensor.name} already"
+            self.drafts.found.append(
+                finding("TF604", message, self.drafts.frames[mount], help="another name")
+            )
+
+    def add_body(self) -> None:
+        body = self.sensor.preset.body
+        if body is None:
+            return
+        frame = self.renamed(self.sensor.named(body.frame))
+        if frame in self.drafts.links:
+            return
+        shape = self.drafts.bodies.shape(body.shape, ("sensors", self.sensor.name))
+        inertial = of_primitives(body.mass, (shape,)) if body.mass and not shape.mesh else None
+        self.drafts.links[frame] = Link(frame, self.place(), (shape,), (shape,), inertial)
+
+
+def _has_driven_frames(sensor: Sensor) -> bool:
+    return any(frame.driver for frame in sensor.preset.frames.values())
+
+
+#: What a driver's further processes have in common with its first.
+_INHERITED = frozenset(
+    {
+        "env",
+        "cwd",
+        "host",
+        "log_level",
+        "restart",
+        "max_restarts",
+        "restart_delay",
+        "stop",
+        "schedule",
+    }
+)
+#: In an argument, the file that holds the parameters of a process.
+PARAMS_FILE = "${params_file}"
+
+
+def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None, list[Finding]]:
+    """Return the process of a sensor's driver, with the parameters that make it do what the spec says.
+
+    It is the preset's with the user's keys over it, the user's alone where the preset has none, or
+    None.
+    """
+    driver, declared = sensor.preset.driver, sensor.spec.driver
+    spec, source = validated.spec, validated.source
+    at: Path = ("sensors", sensor.name, "driver")
+    if declared and declared.process is not None:
+        return None, _named_driver(sensor, declared.process, validated)
+    if declared and declared.simulate:
+        advice = "driver: none, and tf: tfcompose, where there is no device"
+        return None, [
+            finding(
+                "TF604",
+                "a driver cannot be simulated",
+                source.at_key((*at, "simulate")),
+                help=advice,
+            )
+        ]
+    run, external = (declared.run, bool(declared.external)) if declared else (None, False)
+    loaded = declared if declared and declared.component and declared.container else None
+    if driver is None and declared is None:
+        return None, []
+    if not external and not loaded and not (run and run.is_startable) and (run or driver is None):
+        return None, _says_not_how(sensor.name, validated)
+    launched = driver is not None and driver.launch is not None and run is None and loaded is None
+    computed = driver_parameters(sensor, settings_of(spec.ros).frame_prefix)
+    params = (declared.params if declared else {}) | _node_parameters(
+        sensor, computed, launched=launched
+    )
+    place = source.at_key(at[:2])
+    state = driver.lifecycle if driver and run is None else None
+    node = Node(
+        driver_node(sensor, spec),
+        place,
+        at,
+        params,
+        (declared.lifecycle if declared else None) or state,
+    )
+    way: Literal["external", "component", "run"] = (
+        "external" if external else "component" if loaded else "run"
+    )
+    process = Process(sensor.name, way, at=place, ros_nodes=(node,))
+    if declared:
+        process = replace(
+            process, **how(declared, namespace_of(declared, spec.ros.namespace), way)
+        )
+    if loaded:
+        process = component_process(process, loaded, spec)
+    elif run:
+        process = replace(process, **program(run, shell=bool(declared and declared.shell)))
+    elif driver and launched:
+        args = {key: value for key, value in computed.items() if params or value != PARAMS_FILE}
+        process = replace(
+            process, launch=f"{driver.package}/{driver.launch}", argv=tuple(arguments(args))
+        )
+    elif driver:
+        process = replace(process, package=driver.package, executable=driver.executable)
+    return process, [
+        *_given_parameters(sensor, computed, source),
+        *_unreached(sensor, spec, source),
+    ]
+
+
+def _says_not_how(name: str, validated: Validated) -> list[Finding]:
+    """Return a finding about a driver that does not say how it runs, unless what says it was refused."""
+    at: Path = ("sensors", name, "driver")
+    if {(*at, "component"), (*at, "container")} & validated.refused:
+        return []
+    advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, or external: true"
+    place = validated.source.at_key((*at, "run"))
+    return [finding("TF102", f"the driver of {name} does not say how it runs", place, help=advice)]
+
+
+def further_processes(sensor: Sensor, validated: Validated) -> Iterator[Process]:
+    """Yield the further processes of a sensor's driver, where that is started as its preset says."""
+    driver, declared = sensor.preset.driver, sensor.spec.driver
+    spec, source = validated.spec, validated.source
+    if driver is None or (
+        declared and (declared.process or declared.run or declared.external or declared.simulate)
+    ):
+        return
+    at: Path = ("sensors", sensor.name)
+    above = namespace_of(declared, spec.ros.namespace)
+    inherited = (
+        {key: value for key, value in how(declared, above).items() if key in _INHERITED}
+        if declared
+        else {}
+    )
+    fill = _Filler(sensor, settings_of(spec.ros).frame_prefix)
+    for suffix, one in driver.also.items():
+        if not sensor.holds(one.when):
+            continue
+        namespace = full_name(above, sensor.named(one.namespace)).strip("/")
+        name, place = f"{sensor.name}_{suffix}", source.at_key(at)
+        full = full_name(f"/{namespace}", sensor.named(one.node))
+        node = Node(
+            full, place, (*at, "driver", "also", suffix), fill.table(one.params), one.lifecycle
+        )
+        process = Process(
+            name, "run", at=place, ros_nodes=(node,), argv=tuple(arguments(fill.table(one.args)))
+        )
+        process = replace(process, **inherited)
+        if one.launch:
+            yield replace(process, launch=f"{one.package}/{one.launch}", namespace=namespace)
+        else:
+            yield replace(process, package=one.package, executable=one.executable)
+
+
+def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
+    """Return the full name of the driver's node."""
+    driver, declared = sensor.preset.driver, sensor.spec.driver
+    own = (
+        f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/")
+        if driver
+        else sensor.name
+    )
+    namespace = namespace_of(declared, spec.ros.namespace)
+    return full_name(
+        namespace, (declared.node.name if declared and declared.node else None) or own
+    )
+
+
+def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
+    """Return the parameters, or the arguments of a launch file, that make the driver do what the spec says."""
+    driver = sensor.preset.driver
+    if driver is None:
+        return {}
+    fill = _Filler(sensor, prefix)
+    named = _frame_names(sensor, driver)
+    switch = (driver.on if sensor.tf == DRIVER else driver.off or {}) if sensor.driven() else {}
+    claims = {key: value for claim in claims_of(sensor) for key, value in claim.off.items()}
+    return (
+        fill.table(driver.args if driver.launch else driver.params)
+        | named
+        | fill.table(claims | switch)
+    )
+
+
+def claims_of(sensor: Sensor) -> tuple[DriverClaim, ...]:
+    """Return the edges outside the sensor that its driver publishes by default, unless it owns the mount's."""
+    driver, declared = sensor.preset.driver, sensor.spec
+    own = {sensor.name, declared.driver.process if declared.driver else None}
+    return () if driver is None or (declared.owner and declared.owner in own) else driver.claims
+
+
+def _node_parameters(
+    sensor: Sensor, computed: dict[str, Any], *, launched: bool
+) -> dict[str, Any]:
+    """Return the node's own parameters; a launch file takes arguments, and may pass a file of parameters on."""
+    driver = sensor.preset.driver
+    if driver is None or not driver.launch:
+        return computed
+    return _Filler(sensor, "").table(driver.params) if launched else {}
+
+
+def _frame_names(sensor: Sensor, driver: PresetDriver) -> dict[str, str]:
+    """Return the parameters that give frames their names, as ``${frame(…)}``, for the frames that the sensor has."""
+    inside = {sensor.named(sensor.preset.mount), *sensor.frames()}
+    frames = {key: sensor.named(frame) for key, frame in driver.naming.items()}
+    renamed = {name: own.name for name, own in sensor.spec.frames.items() if own.name}
+    return {
+        sensor.named(key): f"${{frame({renamed.get(frame, frame)})}}"
+        for key, frame in frames.items()
+        if frame in inside
+    }
+
+
+class _Filler:
+    """Fills a driver's parameters for one sensor; what ends up empty or undecided is left out."""
+
+    def __init__(self, sensor: Sensor, prefix: str) -> None:
+        self.sensor = sensor
+        self.prefix = prefix
+
+    def table(self, table: dict[str, Any]) -> dict[str, Any]:
+        filled = {self.sensor.named(key): self.value(value) for key, value in table.items()}
+        return {key: value for key, value in filled.items() if value is not None and value != ""}
+
+    def value(self, value: Any) -> Any:
+        if isinstance(value, Chosen):
+            if value.option:
+                return self.sensor.options.get(value.option)
+            return self.value(
+                value.value if self.sensor.holds(value.when or {}) else value.otherwise
+            )
+        if isinstance(value, str):
+            return self.sensor.named(value).replace("{prefix}", self.prefix)
+        return value
+
+
+def arguments(values: dict[str, Any]) -> list[str]:
+    """Return the values as arguments of a launch file."""
+    return [f"{key}:={_plain(value)}" for key, value in values.items()]
+
+
+def _plain(value: Any) -> str:
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
+
+
+def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]:
+    """Return findings about names that the driver makes itself, and that the spec wants otherwise."""
+    driver, declared = sensor.preset.driver, sensor.spec
+    if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
+        return []
+    settings = settings_of(spec.ros)
+    named = {sensor.named(frame) for frame in driver.naming.values()}
+    stamped = {
+        sensor.named(topic.frame)
+        for topic in sensor.preset.topics.values()
+        if sensor.holds(topic.when)
+    }
+    own = (stamped | ({*sensor.driven()} if sensor.tf == DRIVER else set())) - named
+    at: Path = ("sensors", sensor.name)
+    found = []
+    for name in sorted(own & {frame for frame, one in declared.frames.items() if one.name}):
+        wanted = declared.frames[name].name
+        message = (
+            f"the driver of {declared.preset} makes the name {name} itself, and cannot call it"
+            f" {wanted}"
+        )
+        place = source.at((*at, "frames", name, "name"))
+        found.append(
+            finding(
+                "TF604", message, place, help=f"rename the sensor {sensor.name}, or keep the name"
+            )
+        )
+    if (
+        settings.frame_prefix
+        and not driver.prefixed
+        and own & {*sensor.frames(), sensor.named(sensor.preset.mount)}
+    ):
+        message = (
+            f"the driver of {declared.preset} cannot write {settings.frame_prefix} in front of its"
+            " frames"
+        )
+        advice = "ros: {isolate: topics} keeps robots apart without a prefix"
+        found.append(finding("TF604", message, source.at_key(at), help=advice))
+    if (
+        driver.launch
+        and declared.driver
+        and declared.driver.params
+        and PARAMS_FILE not in driver.args.values()
+    ):
+        message = f"{driver.launch} of {declared.preset} takes no file of parameters"
+        place = source.at_key((*at, "driver", "params"))
+        found.append(
+            finding("TF604", message, place, help="driver: {run: {package: …, executable: …}}")
+        )
+    return found
+
+
+#: Words for no driver that YAML 1.2 reads as strings.
+OFF = frozenset({"off", "Off", "OFF", "no", "No", "NO", "null", "None", "NONE", "disabled"})
+
+
+def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Finding]:
+    """Return findings about a driver that is the name of a process: it must be one, and has its own keys."""
+    at: Path = ("sensors", sensor.name, "driver")
+    spec, source = validated.spec, validated.source
+    broken = (entry for section, entry in validated.broken if section in {"processes", "sensors"})
+    known = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
+    found = []
+    if name != "none" and name not in known:
+        declare = f"processes: {{{name}: {{external: true}}}}"
+        otherwise = (
+            f"leave driver out to start that of the preset; or {declare}"
+            if sensor.preset.driver
+            else declare
+        )
+        advice = did_you_mean(name, known, otherwise)
+        if name in OFF:
+            advice = "driver: none starts no driver"
+        found.append(
+            finding(
+                "TF813",
+                f"the driver of {sensor.name} is {name}, which is not a process",
+                source.at(at),
+                help=advice,
+            )
+        )
+    driver = sensor.spec.driver
+    for key in driver.model_fields_set - {"process"} if driver else ():
+        place = source.at_key((*at, key))
+        advice = f"write it under processes: {name}"
+        found.append(finding("TF107", f"{key} and process exclude each other", place, help=advice))
+    return found
+
+
+def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) -> list[Finding]:
+    """Return a finding for each parameter that the user gives and tfcompose computes."""
+    found = []
+    for key in sensor.spec.driver.params if sensor.spec.driver else ():
+        if key in computed:
+            message = (
+                f"tfcompose sets {switch_text({key: computed[key]})} itself, for"
+                f" {sensor.spec.preset}"
+            )
+            place = source.at_key(("sensors", sensor.name, "driver", "params", key))
+            found.append(finding("TF604", message, place, help="remove it; options and tf set it"))
+    return found

@@ -1,0 +1,83 @@
+"""A stock robot_state_publisher in the place of tfcompose's own: it publishes what its URDF holds as fixed or jointed.
+
+Facts of robot_state_publisher 3.3 (ROS 2 Jazzy): fixed joints go to /tf_static, moving ones follow
+``joint_states``, floating ones are skipped; ``frame_prefix`` is written in front of every frame;
+at most ``publish_frequency`` times a second, 20 by default, a joint state is passed on;
+``robot_description`` is published by it too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.resolve.processes import full_name
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.model.plan.stock import MOST_HZ
+from tfcompose.model.plan.stock import STATE_PUBLISHER as NAME
+from tfcompose.model.robot import JOINTS, STATIC, Node
+
+if TYPE_CHECKING:
+    from tfcompose.model.robot import Process, Robot
+
+
+def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
+    """Return the robot in which ``joints`` is a stock publisher that owns what is ours below base; and what it cannot.
+
+    Fixed edges elsewhere stay with ``static``, which then sends the description too.
+    """
+    if robot.base is None:
+        return robot, []
+    described = robot.described()
+    below = described - {robot.base}
+    found = [
+        finding(
+            "TF315",
+            f"the joint {edge.joint.name} is not below {robot.base}, and a stock {NAME} publishes"
+            " only what is",
+            edge.joint.at,
+            help="state_publisher: tfcompose, or another base",
+        )
+        for edge in robot.edges
+        if edge.joint and edge.owner == JOINTS and edge.child not in below
+    ]
+    for frame in (
+        sorted(described & set(robot.ros.shared_frames)) if robot.ros.frame_prefix else ()
+    ):
+        message = (
+            f"{frame} is shared and in the tree of {robot.base}: a stock {NAME} prefixes every"
+            " frame"
+        )
+        found.append(
+            finding("TF316", message, robot.frames.get(frame), help="state_publisher: tfcompose")
+        )
+    edges = tuple(
+        (
+            replace(edge, owner=JOINTS)
+            if edge.owner == STATIC and edge.kind == "static" and edge.child in below
+            else edge
+        )
+        for edge in robot.edges
+    )
+    has_work = any(edge.owner == JOINTS for edge in edges)
+    processes = tuple(
+        _stock(one, robot) if one.name == JOINTS and has_work else one for one in robot.processes
+    )
+    return replace(robot, edges=edges, processes=processes), found
+
+
+def _stock(joints: Process, robot: Robot) -> Process:
+    """Return the process: its description is its own, and the topic on which it would send that is moved away."""
+    params = {"publish_frequency": MOST_HZ} | joints.params
+    params["publish_frequency"] = min(float(params["publish_frequency"]), MOST_HZ)
+    prefix = {"frame_prefix": robot.ros.frame_prefix} if robot.ros.frame_prefix else {}
+    node = Node(full_name(robot.ros.namespace, NAME), joints.at, params=params | prefix)
+    return replace(
+        joints,
+        kind="run",
+        package=NAME,
+        executable=NAME,
+        ros_nodes=(node,),
+        remap={"robot_description": "~/robot_description"} | joints.remap,
+        describes=True,
+    )

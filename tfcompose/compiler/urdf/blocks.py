@@ -1,0 +1,294 @@
+"""Raw blocks: elements next to links and joints that are kept verbatim, and what of the robot they name.
+
+A block is read as the content of a ``<robot>`` that has the first line to itself: places are those
+in that document. A ``<ros2_control>`` element becomes a hardware component where that can say all
+that is in it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.urdf.read import read_xml
+from tfcompose.foundation.findings import Finding, Span, did_you_mean, finding, nearest
+from tfcompose.foundation.text import listed
+from tfcompose.model.robot.hardware import Component, Hardware, Interface
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from tfcompose.compiler.urdf.read import Element
+    from tfcompose.model.robot import Robot
+    from tfcompose.model.robot.hardware import Block
+
+
+#: Elements that name links or joints of the robot.
+REFERRING = frozenset({"gazebo", "transmission", "ros2_control"})
+#: What a block may hold, besides extensions with a prefix of their own.
+_ALLOWED = ("transmission", "gazebo", "ros2_control", "sensor", "material")
+#: What belongs into a section of the robot file, and what into another element.
+_SECTIONS = {"link": "links", "joint": "joints", "robot": "include"}
+_INNER = frozenset(
+    {"visual", "collision", "inertial", "origin", "geometry", "limit", "mimic", "axis", "plugin"}
+)
+#: At most so many joints are named where one is wrong.
+_MOST_NAMED = 8
+_SUBSTITUTION = re.compile(
+    r"\$\((?:find|find-pkg-share|arg|var|env|optenv|eval|dirname|cwd)\b[^()\n<>]*\)"
+)
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+
+
+def read_block(text: str, file: str, *, with_text: bool = False) -> Element:
+    """Return the ``<robot>`` with the elements of the block; arguments and exceptions are those of ``read_xml``."""
+    return read_xml(f"<robot>\n{text}\n</robot>", file, with_text=with_text)
+
+
+def faults_of(
+    root: Element, frames: Collection[str], joints: Collection[str]
+) -> Iterator[Finding]:
+    """Yield what is wrong with the elements of a block."""
+    if not root.children:
+        yield finding("TF719", "the block has no element", root.at, help="remove it")
+    for element in root.children:
+        if element.tag in _SECTIONS or element.tag in _INNER:
+            message = f"<{element.tag}> is not allowed in a block"
+            section = _SECTIONS.get(element.tag)
+            advice = (
+                f"write it under {section}:"
+                if section
+                else "put it into <gazebo>, a link or a joint"
+            )
+            yield finding("TF719", message, element.at, help=advice)
+        elif (
+            element.tag not in _ALLOWED
+            and ":" not in element.tag
+            and nearest(element.tag, _ALLOWED)
+        ):
+            advice = did_you_mean(element.tag, _ALLOWED)
+            yield finding("TF719", f"unknown element <{element.tag}>", element.at, help=advice)
+        yield from unknown_references(element, frames, joints)
+        yield from _undeclared_prefixes(element)
+
+
+def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
+    """Yield a finding for each prefix that no element around it declares: xacro, and other readers, stop there."""
+    waiting = [(top, frozenset({"xml", "xmlns"}))]
+    while waiting:
+        element, known = waiting.pop()
+        known |= {name[6:] for name in element.attributes if name.startswith("xmlns:")}
+        for name in (element.tag, *element.attributes):
+            prefix, colon, _ = name.partition(":")
+            if colon and prefix not in known:
+                advice = f'<{element.tag} xmlns:{prefix}="http://…">'
+                yield finding(
+                    "TF719",
+                    f"undeclared namespace prefix {prefix} in {name}",
+                    element.at,
+                    help=advice,
+                )
+        waiting += [(child, known) for child in element.children]
+
+
+def unexpanded(text: str, file: str) -> Iterator[Finding]:
+    """Yield a finding for each substitution of xacro's or a launch file's in the text of a block."""
+    for found in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
+        before = text[: found.start()]
+        line, column = before.count("\n") + 2, found.start() - before.rfind("\n")
+        message = f"{found[0]} is not expanded in a URDF"
+        advice = (
+            "write the path itself, or ${config}/x.yaml with vars: {config: /opt/…}, and --set"
+            " vars.config=… elsewhere"
+        )
+        at = Span(file, line, column, line, column + len(found[0]))
+        yield finding("TF729", message, at, help=advice, severity="warning")
+
+
+def _blank(comment: re.Match[str]) -> str:
+    return re.sub(r"[^\n]", " ", comment[0])
+
+
+def unknown_references(
+    element: Element, frames: Collection[str], joints: Collection[str]
+) -> Iterator[Finding]:
+    """Yield a finding for each link or joint that an element of a block names and the robot does not have."""
+    reference = element.attributes.get("reference")
+    if (
+        element.tag == "gazebo"
+        and reference is not None
+        and reference not in frames
+        and reference not in joints
+    ):
+        advice = did_you_mean(reference, [*frames, *joints])
+        yield finding(
+            "TF203",
+            f"unknown link or joint {reference}",
+            element.at_value("reference"),
+            help=advice,
+        )
+    if element.tag in {"transmission", "ros2_control"}:
+        for joint in element.all("joint"):
+            name = joint.attributes.get("name", "")
+            if name not in joints:
+                yield unknown_joint(name, joint.at_value("name"), joints)
+
+
+def unknown_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
+    """Return the finding that none of the ``joints``, the moving ones, has this name."""
+    there = f"the robot has {listed(joints, _MOST_NAMED)}"
+    advice = did_you_mean(name, joints, there if joints else "no joint of the robot moves")
+    return finding("TF703", f"no moving joint {name}", at, help=advice)
+
+
+def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
+    """Yield a finding for each joint of the hardware that is none of these, the robot's moving joints."""
+    for one in hardware:
+        for component in one.components:
+            if component.kind == "joint" and component.name not in joints:
+                yield unknown_joint(component.name, component.at, joints)
+
+
+def within(
+    block: Block, robot: Robot, frames: Collection[str], joints: Collection[str]
+) -> Block | None:
+    """Return the block of a robot without those of its elements that are about others than these frames and joints.
+
+    What is about neither the robot's frames nor its joints stays. None is returned where no
+    element is left.
+    """
+    elements = read_block(block.text, robot.file).children
+    all_joints = {edge.joint_name for edge in robot.edges}
+    left = [
+        element
+        for element in elements
+        if not any(unknown_references(element, frames, joints))
+        or any(unknown_references(element, robot.frames, all_joints))
+    ]
+    if len(left) == len(elements):
+        return block
+    return replace(block, text="\n".join(element.raw for element in left)) if left else None
+
+
+def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
+    """Return the hardware with these of its joints only; None where it had some, and none is left."""
+    left = tuple(one for one in hardware.components if one.kind != "joint" or one.name in joints)
+    had_joints = any(one.kind == "joint" for one in hardware.components)
+    return (
+        replace(hardware, components=left)
+        if not had_joints or any(one.kind == "joint" for one in left)
+        else None
+    )
+
+
+# ros2_control.
+
+#: What ros2_control reads as attributes of an interface, and not as parameters.
+ATTRIBUTES = ("data_type", "size")
+_TYPES = ("system", "actuator", "sensor")
+_KINDS = ("joint", "sensor", "gpio")
+_INTERFACES = ("command_interface", "state_interface")
+
+
+class _UnsupportedError(Exception):
+    """A hardware component cannot say something that is in the element."""
+
+
+def with_hardware(robot: Robot) -> Robot:
+    """Return the robot of a URDF with its ros2_control blocks as hardware, where that keeps all of them."""
+    hardware: dict[str, Hardware] = {}
+    blocks = []
+    for block in robot.blocks:
+        one = None
+        if block.text.startswith("<ros2_control"):
+            (element,) = read_block(block.text, robot.file, with_text=True).children
+            one = _hardware_of(element, block)
+        if one and one.name and one.name not in hardware:
+            hardware[one.name] = one
+        else:
+            blocks.append(block)
+    return (
+        replace(robot, hardware=tuple(hardware.values()), blocks=tuple(blocks))
+        if hardware
+        else robot
+    )
+
+
+def _hardware_of(element: Element, block: Block) -> Hardware | None:
+    """Return the hardware component that the element describes, or None where it cannot say all of it."""
+    try:
+        return _hardware(element, block)
+    except (_UnsupportedError, ValueError):
+        return None
+
+
+def _hardware(element: Element, block: Block) -> Hardware:
+    attributes = _only(element, "name", "type", "rw_rate", "is_async", tags=("hardware", *_KINDS))
+    inner = element.first("hardware")
+    if inner is None or len(element.all("hardware")) != 1 or attributes.get("type") not in _TYPES:
+        raise _UnsupportedError
+    _only(inner, tags=("plugin", "param"))
+    if len(inner.all("plugin")) != 1 or attributes.get("is_async") not in {None, "true", "false"}:
+        raise _UnsupportedError
+    plugin = inner.all("plugin")[0]
+    places = dict(zip(map(id, element.walk()), block.places, strict=True))
+    components = [
+        replace(_component(one), at=places[id(one)])
+        for one in element.children
+        if one.tag in _KINDS
+    ]
+    if len({(one.kind, one.name) for one in components}) != len(components):
+        raise _UnsupportedError
+    _only(plugin)
+    return Hardware(
+        attributes.get("name", ""),
+        plugin.text.strip(),
+        attributes["type"],
+        block.at,
+        _params(inner),
+        tuple(components),
+        int(attributes["rw_rate"]) if "rw_rate" in attributes else None,
+        attributes["is_async"] == "true" if "is_async" in attributes else None,
+    )
+
+
+def _component(element: Element) -> Component:
+    attributes = _only(element, "name", tags=("param", *_INTERFACES))
+    command, state = (tuple(_interface(one) for one in element.all(tag)) for tag in _INTERFACES)
+    for interfaces in (command, state):
+        if len({one.name for one in interfaces}) != len(interfaces):
+            raise _UnsupportedError
+    return Component(
+        element.tag, attributes.get("name", ""), element.at, command, state, _params(element)
+    )
+
+
+def _interface(element: Element) -> Interface:
+    attributes = _only(element, "name", *ATTRIBUTES, tags=("param",))
+    if "name" not in attributes:
+        raise _UnsupportedError
+    more = {key: value for key, value in attributes.items() if key != "name"}
+    params = _params(element)
+    if params.keys() & set(ATTRIBUTES):
+        raise _UnsupportedError
+    return Interface(attributes["name"], more | params)
+
+
+def _params(element: Element) -> dict[str, str]:
+    params: dict[str, str] = {}
+    for one in element.all("param"):
+        name = _only(one, "name").get("name")
+        if name is None or name in params:
+            raise _UnsupportedError
+        params[name] = one.text.strip()
+    return params
+
+
+def _only(element: Element, *attributes: str, tags: tuple[str, ...] = ()) -> dict[str, str]:
+    """Return the element's attributes, if it has no others and no other elements in it."""
+    if set(element.attributes) - set(attributes) or {
+        child.tag for child in element.children
+    } - set(tags):
+        raise _UnsupportedError
+    return element.attributes

@@ -1,0 +1,439 @@
+"""From the elements of a URDF to a robot, with the places of that file; whatever is wrong with it is a finding."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+from xml.sax.saxutils import quoteattr
+
+from tfcompose.compiler.urdf.blocks import REFERRING, unknown_references
+from tfcompose.compiler.urdf.inertia import traces
+from tfcompose.compiler.urdf.schema import (
+    HUGE,
+    JOINT_TYPES,
+    MOMENTS,
+    SIZES,
+    Values,
+    unknown_words,
+    version_of,
+)
+from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
+from tfcompose.foundation.geometry import norm
+from tfcompose.model.robot import (
+    FREE,
+    JOINTS,
+    MOVING,
+    STATIC,
+    Asset,
+    Dynamics,
+    Edge,
+    Inertial,
+    Joint,
+    Limit,
+    Link,
+    Material,
+    ReferencePositions,
+    Robot,
+    SafetyController,
+    Shape,
+    SourceNumbers,
+    colour_name,
+)
+from tfcompose.model.robot.hardware import Block
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator
+
+    from tfcompose.compiler.urdf.read import Element
+    from tfcompose.foundation.catalogue import Severity
+    from tfcompose.foundation.findings import Span
+    from tfcompose.foundation.geometry import Vector
+
+    #: Takes the address of a file, its place, and the document's file; returns the file, and what
+    #: is wrong with the address, if anything is.
+    Finder = Callable[[str, Span, str], tuple[Asset, Finding | None]]
+
+#: The elements that become links and joints; all others below <robot> are kept verbatim.
+_CONVERTED = frozenset({"link", "joint", "material"})
+
+T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)
+#: Their numbers are upper or lower bounds: an infinite one is no error, it bounds nothing.
+_BOUNDS = (Limit, SafetyController)
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """The robot that a URDF describes, right or wrong, and what was found while reading it.
+
+    ``of_elements`` is about links and joints, ``of_blocks`` about elements that are kept as they
+    are, and ``of_files`` about meshes and textures, of which those that are not here may be
+    elsewhere.
+    """
+
+    robot: Robot
+    of_elements: tuple[Finding, ...]
+    of_blocks: tuple[Finding, ...]
+    of_files: tuple[Finding, ...]
+
+    @property
+    def found(self) -> tuple[Finding, ...]:
+        """All that was found."""
+        return (*self.of_elements, *self.of_blocks, *self.of_files)
+
+
+def robot_of(root: Element, file: str, find: Finder, included: Collection[str] = ()) -> Converted:
+    """Return the robot that the URDF describes.
+
+    ``find`` looks for the files of meshes and textures. ``included`` are further files that its
+    elements come from.
+
+    Raises:
+        RejectedError: if it is no URDF.
+    """
+    if root.tag != "robot":
+        message = f"the root element is <{root.tag}>, not <robot>"
+        raise RejectedError(
+            [finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")]
+        )
+    values = Values()
+    values.has_quaternions = version_of(root, values) >= (1, 1)
+    bodies = _Bodies(values, lambda address, at: find(address, at, file), root)
+    name = values.text(root, "name", '<robot name="rover">')
+    links = _by_name(root.all("link"), values)
+    joints = root.all("joint")
+    _by_name(joints, values)
+    _by_name(
+        [one for one in root.all("material") if one.attributes.get("name")], values, "warning"
+    )
+    edges = [edge for element in joints if (edge := _edge(element, values))]
+    frames = {link: element.at_value("name") for link, element in links.items()}
+    names = {edge.joint_name: None for edge in edges}
+    referring = (element for element in root.children if element.tag in REFERRING)
+    unknown = (one for element in referring for one in unknown_references(element, frames, names))
+    robot = Robot(
+        name=name,
+        file=file,
+        frames=frames,
+        edges=tuple(edges),
+        links={link: bodies.link(link, element) for link, element in links.items()},
+        processes=(),
+        base=None,
+        blocks=tuple(_blocks(root)),
+        foreign=frozenset({file, *included}),
+        source_numbers=tuple(_source_numbers(root)),
+    )
+    of_blocks = tuple(replace(one, severity="warning") for one in unknown)
+    return Converted(robot, (*values.found, *unknown_words(root)), of_blocks, tuple(bodies.found))
+
+
+def _source_numbers(root: Element) -> Iterator[SourceNumbers]:
+    """Yield the numbers of the origins of joints and bodies, and of the limits of joints."""
+    for joint in root.all("joint"):
+        path = ("joints", joint.attributes.get("name", ""))
+        yield from _numbers_of(joint.first("origin"), path, ("xyz", "rpy"))
+        for one in _numbers_of(joint.first("limit"), path, ("lower", "upper")):
+            yield replace(one, path=(*path, "limit"))
+    for link in root.all("link"):
+        for body in link.children:
+            path = ("links", link.attributes.get("name", ""))
+            for one in _numbers_of(body.first("origin"), path, ("xyz", "rpy")):
+                yield replace(one, path=(*path, body.tag, one.key))
+
+
+def _numbers_of(
+    element: Element | None, path: tuple[str, str], names: tuple[str, ...]
+) -> Iterator[SourceNumbers]:
+    """Yield the numbers of an element's attributes; what is no number is a finding already."""
+    if element is None:
+        return
+    for name in names:
+        words = element.attributes.get(name, "").split()
+        try:
+            numbers = tuple(map(float, words))
+        except ValueError:
+            continue
+        if numbers and all(abs(number) <= HUGE for number in numbers):
+            place = partial(_value_place, element, name)
+            yield SourceNumbers((*path, name), numbers, (False,) * len(numbers), place)
+
+
+def _value_place(element: Element, name: str, _index: int) -> Span:
+    """Return the place of an attribute's value: with xacro its numbers may stand nowhere."""
+    return element.at_value(name)
+
+
+def _by_name(
+    elements: list[Element], values: Values, severity: Severity = "error"
+) -> dict[str, Element]:
+    """Return the elements by their names; a second one of a name is a finding."""
+    known: dict[str, Element] = {}
+    for element in elements:
+        name = values.text(element, "name", f'<{element.tag} name="…">')
+        if name in known:
+            note = Note("first defined here", known[name].at_value("name"))
+            message = f"duplicate {element.tag} name {name}"
+            advice = "remove it: ROS parsers reject the robot"
+            advice = "rename one of them" if severity == "error" else advice
+            at = element.at_value("name")
+            values.found.append(
+                finding("TF722", message, at, notes=[note], help=advice, severity=severity)
+            )
+        elif name:
+            known[name] = element
+    return known
+
+
+def _blocks(root: Element) -> Iterator[Block]:
+    """Yield the elements that are kept verbatim, named by tag and number."""
+    counts: dict[str, int] = {}
+    for element in root.children:
+        if element.tag not in _CONVERTED:
+            counts[element.tag] = counts.get(element.tag, 0) + 1
+            name = f"{element.tag.replace(':', '_')}_{counts[element.tag]}"
+            places = (
+                tuple(one.at for one in element.walk()) if element.tag == "ros2_control" else ()
+            )
+            yield Block(name, element.at, _with_namespaces(element, root), places)
+
+
+def _with_namespaces(element: Element, root: Element) -> str:
+    """Return the element's source text, with the namespaces that it takes from the root."""
+    raw = element.raw
+    spaces = {name: value for name, value in root.attributes.items() if name.startswith("xmlns:")}
+    used = [name for name in spaces if re.search(rf"[<\s]{re.escape(name[6:])}:", raw)]
+    more = "".join(
+        f" {name}={quoteattr(spaces[name])}" for name in used if name not in element.attributes
+    )
+    begin = 1 + len(element.tag)
+    return raw[:begin] + more + raw[begin:]
+
+
+def _edge(element: Element, values: Values) -> Edge | None:
+    """Return the edge that a joint is, or None where it has no parent or no child."""
+    name, kind = element.attributes.get("name", ""), values.text(element, "type", 'type="fixed"')
+    if kind and kind not in JOINT_TYPES:
+        advice = did_you_mean(kind, JOINT_TYPES, f"one of: {', '.join(JOINT_TYPES)}")
+        values.refuse(f"unknown joint type {kind}", element.at_value("type"), advice)
+    ends = {}
+    for tag in ("parent", "child"):
+        end = element.first(tag)
+        if end is None:
+            values.refuse(f"the joint {name} has no {tag}", element.at, f'<{tag} link="…"/>')
+        elif values.text(end, "link", f'<{tag} link="…"/>'):
+            ends[tag] = end
+    joint = _joint(name, kind, element, values) if kind in MOVING or kind in FREE else None
+    if len(ends) < 2:  # noqa: PLR2004 (parent and child)
+        return None
+    free = kind in FREE
+    return Edge(
+        parent=ends["parent"].attributes["link"],
+        child=ends["child"].attributes["link"],
+        kind="dynamic" if free else "joint" if joint else "static",
+        pose=values.pose(element),
+        owner=JOINTS if joint and not free else STATIC,
+        at=ends["parent"].at_value("link"),
+        joint=None if free else joint,
+        free=joint if free else None,
+        joint_name=name,
+        joint_at=element.at_value("name"),
+        child_at=ends["child"].at_value("link"),
+    )
+
+
+def _joint(name: str, kind: Any, element: Element, values: Values) -> Joint:
+    x, y, z = values.numbers(element.first("axis"), "xyz", (1.0, 0.0, 0.0))
+    length = norm((x, y, z))
+    if not 0 < length < math.inf:
+        at = (element.first("axis") or element).at_value("xyz")
+        values.refuse(f"the axis of {name} has no direction", at, '<axis xyz="0 0 1"/>')
+        x, y, z, length = 1.0, 0.0, 0.0, 1.0
+    axis: Vector = (x / length, y / length, z / length)
+    mimic = element.first("mimic")
+    joint = Joint(name, kind, axis, at=element.at_value("name"), axis_length=length)
+    if mimic is not None:
+        master = values.text(mimic, "joint", '<mimic joint="…"/>')
+        multiplier, offset = (
+            values.number(mimic, "multiplier", 1.0),
+            values.number(mimic, "offset", 0.0),
+        )
+        joint = replace(joint, mimic=master or None, multiplier=multiplier, offset=offset)
+    return replace(
+        joint,
+        limit=_limit(name, element.first("limit"), values),
+        dynamics=_numbers(Dynamics, element.first("dynamics"), values),
+        safety=_safety(name, element.first("safety_controller"), values),
+        reference=_numbers(ReferencePositions, element.first("calibration"), values),
+    )
+
+
+def _limit(name: str, element: Element | None, values: Values) -> Limit | None:
+    for key in ("effort", "velocity"):
+        if element is not None and key not in element.attributes:
+            values.refuse(
+                f"the limit of {name} has no {key}", element.at, f'URDF requires it: {key}="1"'
+            )
+    return _numbers(Limit, element, values)
+
+
+def _safety(name: str, element: Element | None, values: Values) -> SafetyController | None:
+    if element is not None and "k_velocity" not in element.attributes:
+        message = f"the safety_controller of {name} has no k_velocity"
+        values.refuse(message, element.at, 'URDF requires it: k_velocity="10"')
+    return _numbers(SafetyController, element, values, k_velocity=0.0)
+
+
+def _numbers(cls: type[T], element: Element | None, values: Values, **defaults: float) -> T | None:
+    """Return the object whose fields are the element's attributes; those that are missing have their defaults."""
+    if element is None:
+        return None
+    read = values.bound if cls in _BOUNDS else values.number
+    given = {name: read(element, name) for name in cls.__slots__}
+    return cls(**defaults | {name: value for name, value in given.items() if value is not None})
+
+
+@dataclass(slots=True)
+class _Bodies:
+    """Reads the links of a document; ``found`` holds what is wrong with their files."""
+
+    values: Values
+    find: Callable[[str, Span], tuple[Asset, Finding | None]]
+    root: Element
+    found: list[Finding] = field(default_factory=list)
+    _materials: dict[str, Material | None] = field(default_factory=dict)
+    _elements: dict[str, list[Element]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        visuals = [one for link in self.root.all("link") for one in link.all("visual")]
+        for around in (self.root, *visuals):
+            for material in around.all("material"):
+                self._elements.setdefault(material.attributes.get("name", ""), []).append(material)
+
+    def link(self, name: str, element: Element) -> Link:
+        """Return the body."""
+        visuals = tuple(shape for one in element.all("visual") for shape in self._shapes(one))
+        collisions = tuple(
+            shape for one in element.all("collision") for shape in self._shapes(one)
+        )
+        inertial = element.first("inertial")
+        body = (
+            self._inertial(name, inertial, visuals, collisions) if inertial is not None else None
+        )
+        return Link(name, element.at_value("name"), visuals, collisions, body)
+
+    def _shapes(self, element: Element) -> list[Shape]:
+        geometry = element.first("geometry")
+        if geometry is None or not geometry.children:
+            advice = '<geometry><box size="1 1 1"/></geometry>'
+            self.values.refuse(
+                f"the {element.tag} has no geometry", (geometry or element).at, advice
+            )
+            return []
+        shapes = []
+        for form in geometry.children:
+            if form.tag == "mesh":
+                shapes += self._mesh(element, form)
+            elif form.tag in SIZES:
+                shapes += self._primitive(element, form)
+        return shapes
+
+    def _primitive(self, element: Element, form: Element) -> list[Shape]:
+        size: list[float] = []
+        before = self.values.refused
+        for key, count in SIZES[form.tag]:
+            if key not in form.attributes:
+                self.values.refuse(f"<{form.tag}> has no {key}", form.at)
+                return []
+            size += self.values.numbers(form, key, (0.0,) * count)
+        if self.values.refused > before:
+            return []
+        if not all(0 < value < HUGE for value in size):
+            at = form.at_value(SIZES[form.tag][0][0])
+            severity: Severity = "warning" if min(size) == 0 and max(size) < HUGE else "error"
+            advice = "give it a size or remove it: some parsers ignore it, others reject the robot"
+            message = f"<{form.tag}> has the size {' '.join(f'{value:g}' for value in size)}"
+            self.values.refuse(message, at, advice, severity)
+            return []
+        if form.tag == "capsule":
+            message, advice = (
+                "parsers of ROS 2 Jazzy reject <capsule>",
+                "use a cylinder and two spheres",
+            )
+            self.values.refuse(message, form.at, advice, "warning")
+        kind: Any = form.tag
+        return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]
+
+    def _mesh(self, element: Element, form: Element) -> list[Shape]:
+        name = self.values.text(form, "filename", '<mesh filename="package://…"/>')
+        if not name:
+            return []
+        x, y, z = self.values.numbers(form, "scale", (1.0, 1.0, 1.0))
+        asset = self._asset(name, form.at_value("filename"))
+        return [
+            Shape("mesh", (x, y, z), self.values.pose(element), self._material(element), asset)
+        ]
+
+    def _asset(self, name: str, at: Span) -> Asset:
+        asset, wrong = self.find(name, at)
+        if wrong:
+            self.found.append(wrong)
+        return asset
+
+    def _material(self, element: Element) -> Material | None:
+        """Return the colour or texture of a visual; one that is only named is described elsewhere in the document."""
+        material = element.first("material")
+        if material is None:
+            return None
+        name = material.attributes.get("name", "")
+        return self._described(name, material) or (self._named(name) if name else None)
+
+    def _named(self, name: str) -> Material | None:
+        if name not in self._materials:
+            described = (self._described(name, one) for one in self._elements.get(name, ()))
+            self._materials[name] = next((one for one in described if one), None)
+        return self._materials[name]
+
+    def _described(self, name: str, material: Element) -> Material | None:
+        colour, texture = material.first("color"), material.first("texture")
+        if colour is None and texture is None:
+            return None
+        red, green, blue, opacity = self.values.numbers(colour, "rgba", (0.5, 0.5, 0.5, 1.0))
+        file = texture.attributes.get("filename") if texture is not None else None
+        image = (
+            self._asset(file, texture.at_value("filename"))
+            if texture is not None and file
+            else None
+        )
+        rgba = (red, green, blue, opacity) if colour is not None else None
+        return Material(name or colour_name(rgba or ()), rgba, image, material.at)
+
+    def _inertial(
+        self,
+        name: str,
+        element: Element,
+        visuals: tuple[Shape, ...],
+        collisions: tuple[Shape, ...],
+    ) -> Inertial | None:
+        weight, tensor = element.first("mass"), element.first("inertia")
+        if weight is None or tensor is None:
+            missing = "mass" if weight is None else "inertia"
+            self.values.refuse(
+                f"the inertial of {name} has no {missing}", element.at, f"<{missing} …/>"
+            )
+            return None
+        self.values.text(weight, "value", '<mass value="1.5"/>')
+        mass = self.values.number(weight, "value", 0.0)
+        if not 0 < mass < HUGE:
+            severity: Severity = "warning" if mass == 0 else "error"
+            advice = "give a mass in kg, greater than 0, or remove <inertial>"
+            self.values.refuse(
+                f"the mass of {name} is {mass:g} kg", weight.at_value("value"), advice, severity
+            )
+            return None
+        xx, xy, xz, yy, yz, zz = (self.values.number(tensor, key, 0.0) for key in MOMENTS)
+        of_shapes = traces(mass, visuals, collisions)
+        return Inertial(
+            mass, self.values.pose(element), (xx, xy, xz, yy, yz, zz), of_shapes, tensor.at
+        )

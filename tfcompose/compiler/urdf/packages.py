@@ -1,0 +1,219 @@
+"""Where packages and files are: by the robot's ``packages:``, then by the ament index, then around the file that asks.
+
+Nothing is opened here. What may be asked about files is handed in, so that a robot can be compiled
+from text alone.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
+
+from tfcompose.foundation.findings import Finding, RejectedError, Span, finding, nearest, slip_of
+from tfcompose.model.robot import Asset
+from tfcompose.spec.load import path_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.compiler.urdf.inertia import Moments
+    from tfcompose.compiler.urdf.xacro import Expansion, Use
+    from tfcompose.foundation.geometry import Vector
+
+_PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
+#: What others write for a file in a package: xacro and launch files, and those who forget a slash.
+_MEANT = re.compile(
+    r"(?:(?:file://)?\$\(find(?:-pkg-share)?\s+([\w.-]+)\s*\)|package:/?([\w.-]+))/+(.+)"
+)
+#: A file in a package: package://NAME/PATH, or as xacro and launch files write it.
+_IN_PACKAGE = re.compile(
+    r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)"
+)
+_NEAR = 0.8  # many packages end in _description
+FETCH = "run git lfs pull to fetch the file"
+_HIGHEST = 12  # so many folders above a file its package.xml is looked for
+
+
+def _not_expanded(file: str, *_: object) -> Expansion:
+    raise RejectedError([finding("TF001", "files cannot be read here", Span(file))])
+
+
+@dataclass(frozen=True, slots=True)
+class Disk:
+    """What a compiler may ask about files. ``prefixes`` are those of AMENT_PREFIX_PATH, in order.
+
+    ``expand`` gives what xacro makes of a file, with arguments, or of what a robot file uses of
+    it. ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with
+    the finding's parts. ``is_pointer`` tells whether a file is a pointer that Git LFS has yet to
+    replace by the file itself.
+    """
+
+    read: Callable[[str], str]
+    is_file: Callable[[str], bool]
+    is_folder: Callable[[str], bool]
+    prefixes: tuple[str, ...] = ()
+    moments: Callable[[str, Vector], Moments] | None = None
+    expand: Callable[[str, Packages, Mapping[str, Any], Use | None], Expansion] = _not_expanded
+    is_pointer: Callable[[str], bool] = lambda _: False
+
+
+@dataclass(slots=True)
+class Packages:
+    """Finds packages and addressed files. ``named`` are those that the robot names: name → folder and its place.
+
+    ``advice`` says what to do where a package is not found. ``local`` are the packages, with their
+    folders, that were found nowhere else than around the file that addresses something in them, as
+    in a source tree that is not built.
+    """
+
+    disk: Disk | None = None
+    named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
+    advice: str = "add packages: {{{name}: FOLDER}}, or source the workspace's setup file"
+    local: dict[str, str] = field(default_factory=dict)
+    _above: dict[str, tuple[str, str]] = field(default_factory=dict)
+    _missed: set[tuple[str, str]] = field(default_factory=set)
+
+    def candidates(self, name: str) -> list[str]:
+        """Return the folders that a package of that name may be in, in the order of looking."""
+        own = [path_named(*self.named[name])] if name in self.named else []
+        return own + [
+            posixpath.join(prefix, "share", name)
+            for prefix in (self.disk.prefixes if self.disk else ())
+        ]
+
+    def folder(self, name: str, file: str) -> str | None:
+        """Return the package's folder, or None where there is none; the last candidate is the package of ``file``."""
+        if self.disk is None:
+            return None
+        found = next(
+            (folder for folder in self.candidates(name) if self.disk.is_folder(folder)), None
+        )
+        around, folder = ("", "") if found is not None else self._around(posixpath.dirname(file))
+        return (folder or ".") if around == name else found
+
+    def not_found(self, name: str, at: Span | None) -> Finding:
+        """Return the finding that a package is not found, with the list of where it was looked for."""
+        folders = self.candidates(name)
+        searched = f"looked in {', '.join(folders)}" if folders else "AMENT_PREFIX_PATH is empty"
+        near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
+        way_out = f"did you mean {near}?" if near else self.advice.format(name=name)
+        advice = (
+            f"{searched};"
+            f" {'correct the folder that it is given' if name in self.named else way_out}"
+        )
+        return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
+
+    def path_of(self, named: str, at: Span) -> str:
+        """Return the path of a file that is named at a place: in a package, or relative to the file there.
+
+        Raises:
+            RejectedError: if the package is not found.
+        """
+        found = _IN_PACKAGE.fullmatch(named)
+        if found is None:
+            return path_named(named, at)
+        folder = self.folder(found[1], at.file)
+        if folder is None:
+            raise RejectedError([replace(self.not_found(found[1], at), severity="error")])
+        return posixpath.join(folder, found[2])
+
+    def asset(self, uri: str, at: Span, document: str = "") -> tuple[Asset, Finding | None]:
+        """Return the file that is addressed at a place, and what is wrong with the address, if anything is.
+
+        ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files;
+        relative ones begin in the folder of the file that names them, or of the ``document`` that
+        includes it. Other schemes (``http``, ``model``) are for others to resolve.
+        """
+        document = document or at.file
+        meant = _MEANT.fullmatch(uri)
+        if meant or not uri:
+            advice = (
+                f"package://{meant[1] or meant[2]}/{meant[3]}"
+                if meant
+                else "write package://NAME/PATH or a path"
+            )
+            return Asset(uri, at), finding(
+                "TF723", f"{uri or repr(uri)} is not a valid file address", at, help=advice
+            )
+        scheme = _SCHEME.match(uri)
+        if scheme and scheme[1] == "package":
+            return self._in_package(uri, at, document)
+        if scheme and scheme[1] != "file":
+            return Asset(uri, at), None
+        path = unquote(uri[scheme.end() :]) if scheme else uri
+        if scheme and not path.startswith("/"):
+            wrong = f"{uri} is not a valid file address"
+            return Asset(uri, at), finding(
+                "TF723", wrong, at, help="file:// with an absolute path has three slashes"
+            )
+        path = (
+            posixpath.normpath(path) if path.startswith("/") else path_named(path, Span(document))
+        )
+        package, inside = self._package_above(path)
+        return Asset(uri, at, path, package, inside), self._missing(
+            path, f"file {uri} not found", at
+        )
+
+    def _in_package(self, uri: str, at: Span, document: str) -> tuple[Asset, Finding | None]:
+        name, _, inside = unquote(uri.partition("://")[2]).partition("/")
+        if not name or not inside:
+            advice = (
+                f"one slash too many: package://{inside}"
+                if "/" in inside
+                else "package://NAME/PATH"
+            )
+            return Asset(uri, at), finding(
+                "TF723", f"{uri} is not a valid file address", at, help=advice
+            )
+        folder = self.folder(name, document)
+        if folder is None:
+            is_new = self.disk is not None and (name, document) not in self._missed
+            self._missed.add((name, document))  # a missing package is reported once for each file
+            return Asset(uri, at, "", name, inside), self.not_found(name, at) if is_new else None
+        if folder not in self.candidates(name):
+            self.local[name] = folder
+        path = posixpath.join(folder, inside)
+        return Asset(uri, at, path, name, inside), self._missing(
+            path, f"file {inside} not found in {name}", at
+        )
+
+    def _missing(self, path: str, message: str, at: Span) -> Finding | None:
+        if self.disk is None:
+            return None
+        if "\0" in path or not self.disk.is_file(path):
+            where = (
+                path if path.startswith("/") else f"{path}, from the folder where tfcompose runs"
+            )
+            return finding("TF723", message, at, help=f"looked for {where}")
+        if self.disk.is_pointer(path):
+            return finding(
+                "TF723", f"{path} is a Git LFS pointer", at, help=FETCH, severity="warning"
+            )
+        return None
+
+    def _package_above(self, path: str) -> tuple[str, str]:
+        """Return the package whose source or share folder the file is in, and its path there; empty without one."""
+        name, top = self._around(posixpath.dirname(path))
+        return (name, posixpath.relpath(path, top or ".")) if name else ("", "")
+
+    def _around(self, folder: str) -> tuple[str, str]:
+        """Return the name and folder of the package that the folder is, or is in; empty without one."""
+        if folder not in self._above:
+            self._above[folder] = self._find_above(folder)
+        return self._above[folder]
+
+    def _find_above(self, folder: str) -> tuple[str, str]:
+        for _ in range(_HIGHEST if self.disk else 0):
+            manifest = posixpath.join(folder, "package.xml")
+            if self.disk and self.disk.is_file(manifest):
+                found = _PACKAGE_NAME.search(self.disk.read(manifest))
+                return (found[1], folder) if found else ("", "")
+            above = posixpath.normpath(posixpath.join(folder, ".."))
+            if above == folder:
+                break
+            folder = above
+        return ("", "")

@@ -1,0 +1,281 @@
+"""XML text as elements that know the place of every tag and attribute, in expanded xacro too.
+
+Own code on expat, because no XML library gives the columns of attributes. Documents that declare
+entities or a document type are refused: a robot needs neither, and both can make a small file
+large or read other files.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import TYPE_CHECKING
+from xml.parsers import expat
+
+from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.spec.load import MOST_VALUES, refuse_unreadable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tfcompose.compiler.urdf.xacro import Expansion
+
+DEEPEST = 100
+
+#: Four times what a robot file may have: URDF takes about three times as many characters for the
+#: same robot.
+MOST_CHARACTERS = 16_000_000
+
+_TAG = re.compile(r"<[^\s/>]+")
+_ATTRIBUTE = re.compile(r"""\s*([^\s=/>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+_BROKEN = re.compile(r"""=\s*(?:"[^"<>]*[\t\r\n]|'[^'<>]*[\t\r\n])""")
+_BREAK = re.compile("\r\n|\r|\n")
+#: The bytes that begin no character in UTF-8.
+_INSIDE = bytes(range(0x80, 0xC0))
+_BLOCK = 4096
+
+
+class _Text:
+    """A file's text, with the places of its bytes: few are asked for, and they are computed only then."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.text, self.file = text, file
+        self.data = text.encode()
+        self.starts = [0, *(found.end() for found in _BREAK.finditer(text))]
+        self.has_broken_values = _BROKEN.search(text) is not None
+        self.before: list[
+            int
+        ] = []  # the characters before each block of bytes; none where each byte is a character
+        if len(self.data) != len(text):
+            lengths = (
+                _characters(self.data[at : at + _BLOCK]) for at in range(0, len(self.data), _BLOCK)
+            )
+            self.before = list(accumulate(lengths, initial=0))
+        self._tag: tuple[int, dict[str, tuple[int, int]], int] = (-1, {}, 0)
+
+    def position(self, byte: int) -> int:
+        """Return the character that begins at a byte."""
+        if not self.before or byte <= 0:  # -1 in an empty text
+            return max(byte, 0)
+        block = byte // _BLOCK
+        return self.before[block] + _characters(self.data[block * _BLOCK : byte])
+
+    def span(self, begin: int, length: int) -> Span:
+        """Return the place of so many characters."""
+        end = min(begin + length, len(self.text))
+        line, end_line = bisect_right(self.starts, begin), bisect_right(self.starts, end)
+        return Span(
+            self.file,
+            line,
+            begin - self.starts[line - 1] + 1,
+            end_line,
+            end - self.starts[end_line - 1] + 1,
+        )
+
+    def tag_at(self, begin: int) -> tuple[dict[str, tuple[int, int]], int]:
+        """Return where the values of a tag's attributes begin and end, and where the last one ends, quotes aside.
+
+        The tag begins at a character, where there must be one. The last tag is remembered.
+        """
+        if self._tag[0] != begin:
+            name = _TAG.match(self.text, begin)
+            position, values = name.end() if name else begin, {}
+            while attribute := _ATTRIBUTE.match(self.text, position):
+                values[attribute[1]] = attribute.span(2 if attribute[2] is not None else 3)
+                position = attribute.end()
+            self._tag = (begin, values, position)
+        return self._tag[1:]
+
+
+def _characters(data: bytes) -> int:
+    return len(data.translate(None, _INSIDE))
+
+
+@dataclass(frozen=True, slots=True)
+class _Origin:
+    """Where an element is written: the text, and the character at which its tag begins."""
+
+    source: _Text
+    begin: int
+
+
+class Element:
+    """A tag with its attributes and child elements; ``text`` is its own text, if it was asked for.
+
+    ``begin`` and ``end`` are the bytes at which its first and its last tag begin. Places are those
+    in the text, or, of an expanded document, in the file that the element comes from.
+    """
+
+    __slots__ = ("_origin", "_source", "attributes", "begin", "children", "end", "tag", "text")
+
+    def __init__(
+        self,
+        tag: str,
+        attributes: dict[str, str],
+        source: _Text,
+        begin: int,
+        origin: _Origin | None = None,
+    ) -> None:
+        self.tag, self.attributes = tag, attributes
+        self.children: list[Element] = []
+        self.text = ""
+        self.begin = self.end = begin
+        self._source, self._origin = source, origin
+
+    def _declared(self) -> _Origin:
+        return self._origin or _Origin(self._source, self._source.position(self.begin))
+
+    @property
+    def at(self) -> Span:
+        """The place of its tag."""
+        declared = self._declared()
+        return declared.source.span(declared.begin, len(self.tag) + 1)
+
+    @property
+    def raw(self) -> str:
+        """The element's source text."""
+        text = self._source.text
+        begin = self._source.position(self.begin)
+        end = text.find(">", self._source.tag_at(begin)[1])
+        if (
+            text[end - 1] != "/"
+        ):  # it has an end tag; of the others expat's versions give different places
+            end = text.find(">", self._source.position(self.end))
+        return text[begin : end + 1]
+
+    def all(self, tag: str) -> list[Element]:
+        """Return the children of a tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Element | None:
+        """Return the first child of a tag, or None."""
+        for child in self.children:
+            if child.tag == tag:
+                return child
+        return None
+
+    def walk(self) -> Iterator[Element]:
+        """Yield this element and all in it, in the order of the text."""
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += reversed(element.children)
+
+    def at_value(self, name: str) -> Span:
+        """Return the place of an attribute's value, or the element's where it is missing."""
+        declared = self._declared()
+        place = declared.source.tag_at(declared.begin)[0].get(name)
+        return declared.source.span(place[0], place[1] - place[0] or 1) if place else self.at
+
+    def raw_value(self, name: str) -> str:
+        """Return an attribute's value as in the text: XML turns tabs and line breaks in it into spaces."""
+        begin, end = self._source.tag_at(self._source.position(self.begin))[0].get(name, (0, 0))
+        return self._source.text[begin:end]
+
+    @property
+    def has_broken_values(self) -> bool:
+        """Whether in the text a value of some attribute holds a tab or a line break."""
+        return self._source.has_broken_values
+
+
+def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
+    """Return the document's root; ``with_text``, elements have their own text too.
+
+    Raises:
+        RejectedError: if the text is not XML, declares entities, or is too large or too deep.
+    """
+    refuse_unreadable(text, file, MOST_CHARACTERS)
+    reader = _Reader(text, file)
+    if with_text:
+        reader.parser.CharacterDataHandler = reader.add_text
+    return reader.read()
+
+
+def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) -> Element:
+    """Return the root of the document that xacro made of a file; elements are placed where they were written.
+
+    Raises:
+        RejectedError: as ``read_xml``.
+    """
+    refuse_unreadable(expansion.text, file, MOST_CHARACTERS)
+    reader = _Reader(expansion.text, file)
+    texts = [_Text(read(name), name) for name in expansion.files]
+    nowhere = _Origin(_Text("", file), 0)
+    reader.origins = [
+        (
+            _Origin(texts[place[0]], texts[place[0]].starts[place[1] - 1] + place[2])
+            if place
+            else nowhere
+        )
+        for place in expansion.places
+    ]
+    return reader.read()
+
+
+class _Reader:
+    def __init__(self, text: str, file: str) -> None:
+        self.source = _Text(text, file)
+        self.stack: list[Element] = []
+        self.root: Element | None = None
+        self.elements = 0
+        self.origins: list[_Origin] = []
+        self.parser = expat.ParserCreate("utf-8")
+        self.parser.StartElementHandler = self._open
+        self.parser.EndElementHandler = self._close
+        self.parser.StartDoctypeDeclHandler = self._refuse_type
+
+    def read(self) -> Element:
+        try:
+            self.parser.Parse(self.source.data, True)  # noqa: FBT003 (the last piece; it takes no keywords)
+        except expat.ExpatError as error:
+            at = self._at(self.parser.ErrorByteIndex, 1)
+            reason = expat.ErrorString(error.code) or "not XML"
+            raise RejectedError(
+                [finding("TF018", reason, at, help="fix it; other parsers stop here too")]
+            ) from None
+        if self.root is None:
+            raise RejectedError([finding("TF018", "no element", Span(self.source.file))])
+        return self.root
+
+    def add_text(self, piece: str) -> None:
+        if self.stack:
+            self.stack[-1].text += piece
+
+    def _at(self, byte: int, length: int) -> Span:
+        return self.source.span(self.source.position(byte), length)
+
+    def _refuse_type(self, *_: object) -> None:
+        at = self._at(self.parser.CurrentByteIndex, 9)
+        raise RejectedError(
+            [
+                finding(
+                    "TF018",
+                    "a document type is not allowed: it can declare entities",
+                    at,
+                    help="remove it",
+                )
+            ]
+        )
+
+    def _open(self, tag: str, attributes: dict[str, str]) -> None:
+        origin = self.origins[self.elements] if self.origins else None
+        self.elements += 1
+        element = Element(tag, attributes, self.source, self.parser.CurrentByteIndex, origin)
+        if self.elements > MOST_VALUES or len(self.stack) >= DEEPEST:
+            what = (
+                f"more than {MOST_VALUES:,} elements"
+                if self.elements > MOST_VALUES
+                else f"nested deeper than {DEEPEST} elements"
+            )
+            raise RejectedError([finding("TF008", what, element.at)])
+        if self.stack:
+            self.stack[-1].children.append(element)
+        else:
+            self.root = element
+        self.stack.append(element)
+
+    def _close(self, _: str) -> None:
+        self.stack.pop().end = self.parser.CurrentByteIndex

@@ -1,0 +1,222 @@
+"""Whether a written URDF is the robot that was meant: yourdfpy reads it, and the two are compared value by value.
+
+yourdfpy reads links and joints with what URDF says of them. It does not read other elements
+(``ros2_control``, ``gazebo``, ``transmission``), takes the first of elements that are there twice,
+and puts URDF's defaults where an element or an attribute is missing, so that none of this is
+noticed.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import fields
+from io import BytesIO
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+import yourdfpy
+
+from tfcompose.compiler.urdf.write import joint_type
+from tfcompose.foundation.geometry import Pose, angle_between, matrix_from_quat
+from tfcompose.model.robot import JOINTS, STATIC
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.files import Target
+    from tfcompose.model.robot import Edge, Inertial, Joint, Link, Material, Robot, Shape
+
+#: Poses are written to a picometre, and angles to the noise of computing them; entries of a matrix
+#: are as far off.
+FAR_M = FAR_RAD = 1e-11
+#: Moments are written with 12 digits.
+FAR_MOMENT = 1e-11
+#: Where the moments (xx, xy, xz, yy, yz, zz) stand in the tensor.
+_MOMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Iterator[str]:
+    """Yield what the text says otherwise than the robot: about links, joints, poses, masses and shapes.
+
+    ``full`` is as in ``urdf``; the text is what that, or ``emit``, returned for the same target.
+    """
+    try:
+        ET.fromstring(text)  # noqa: S314 (our own text); yourdfpy would mend what is not XML, and go on
+    except ET.ParseError as error:
+        yield f"it is not XML: {error}"
+        return
+    try:
+        there = yourdfpy.URDF.load(
+            BytesIO(text.encode()), build_scene_graph=False, load_meshes=False
+        ).robot
+    except Exception as error:  # noqa: BLE001 (whatever yourdfpy stumbles over in a text that is no URDF)
+        yield f"yourdfpy does not read it: {type(error).__name__}: {error}"
+        return
+    if there.name != robot.name:
+        yield f"its name is {there.name}, not {robot.name}"
+    base = robot.base or ""
+    frames = robot.described()
+    links = {link.name: link for link in there.links}
+    joints = {joint.child: joint for joint in there.joints}
+    edges = {
+        edge.child: edge for edge in robot.edges if edge.child in frames and edge.child != base
+    }
+    for about, found, several, meant in (
+        ("links", links.keys(), there.links, frames),
+        ("joints to these links", joints.keys(), there.joints, edges.keys()),
+    ):
+        wrong = sorted(found ^ meant)
+        if wrong or len(several) != len(meant):
+            yield f"{about} are missing, new or there twice: {', '.join(wrong)}"
+            return
+    for child, edge in edges.items():
+        mine = full or edge.owner in {STATIC, JOINTS}
+        joint = joints[child]
+        kind = joint_type(edge) if mine else "floating"
+        yield from (f"the joint {joint.name}: {one}" for one in _of_joint(joint, edge, kind))
+    for name in frames:
+        link = robot.links.get(name)
+        body = None if link is None or (name == base and not full) else link.inertial
+        yield from (f"the link {name}: {one}" for one in _of_link(links[name], link, body, target))
+
+
+def _is_moved(origin: Any, pose: Pose) -> bool:
+    """Whether yourdfpy's 4×4 matrix, None where there is no origin, is another pose."""
+    if origin is None:
+        return (
+            math.hypot(*pose.xyz) > FAR_M
+            or angle_between(pose.quat_xyzw, Pose().quat_xyzw) > FAR_RAD
+        )
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = origin.tolist()
+    meant = chain(*matrix_from_quat(pose.quat_xyzw))
+    far = (abs(one - other) for one, other in zip((a, b, c, d, e, f, g, h, i), meant, strict=True))
+    return math.dist((x, y, z), pose.xyz) > FAR_M or max(far) > FAR_RAD
+
+
+def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
+    if edge.joint_name and there.name != edge.joint_name:
+        yield f"its name is not {edge.joint_name}"
+    if there.type != kind:
+        yield f"its type is {there.type}, not {kind}"
+    if there.parent != edge.parent:
+        yield f"its parent is {there.parent}, not {edge.parent}"
+    if _is_moved(there.origin, edge.pose):
+        yield "its origin differs"
+    joint = edge.joint or edge.free
+    if joint is None or kind != joint.type or kind == "floating":
+        return
+    axis = tuple(there.axis.tolist())
+    if axis != joint.axis:
+        yield f"axis is {axis}, not {joint.axis}"
+    for tag, meant in _values(joint).items():
+        found = getattr(there, tag)
+        actual = None if found is None else _given(found)
+        if (actual is None) != (meant is None):
+            yield f"{tag} is {'missing' if actual is None else 'new'}"
+        elif actual != meant:
+            yield f"{tag} is {actual}, not {meant}"
+
+
+def _given(values: Any) -> dict[str, Any]:
+    """Return the values that a dataclass holds; yourdfpy leaves those of ``dynamics`` as text."""
+    given = ((one.name, getattr(values, one.name)) for one in fields(values))
+    return {
+        key: value if key == "joint" else float(value) for key, value in given if value is not None
+    }
+
+
+def _values(joint: Joint) -> dict[str, dict[str, Any] | None]:
+    """Return what is to stand in the joint by yourdfpy's names: values, or None where it is not to be there."""
+    limit, mimic = joint.limit, joint.mimic
+    rates = {
+        "effort": (limit and limit.effort) or 0.0,
+        "velocity": (limit and limit.velocity) or 0.0,
+    }
+    is_limited = limit is not None or joint.type in {"revolute", "prismatic"}
+    return {
+        "limit": (_given(limit) if limit else {}) | rates if is_limited else None,
+        "dynamics": _given(joint.dynamics) if joint.dynamics else None,
+        "safety_controller": _given(joint.safety) if joint.safety else None,
+        "calibration": _given(joint.reference) if joint.reference else None,
+        "mimic": (
+            {"joint": mimic, "multiplier": joint.multiplier, "offset": joint.offset}
+            if mimic
+            else None
+        ),
+    }
+
+
+def _of_link(
+    there: yourdfpy.Link, link: Link | None, body: Inertial | None, target: Target
+) -> Iterator[str]:
+    if (there.inertial is None) != (body is None):
+        yield f"its mass is {'missing' if there.inertial is None else 'new'}"
+    elif body is not None and _is_another_body(there.inertial, body):
+        yield "its mass differs"
+    visuals, collisions = (link.visuals, link.collisions) if link else ((), ())
+    for tag, found, shapes in (
+        ("visual", there.visuals, visuals),
+        ("collision", there.collisions, collisions),
+    ):
+        meant = [(shape, solid) for shape in shapes for solid in _solids(shape, target)]
+        if len(found) != len(meant):
+            yield f"it has {len(found)} {tag} elements, not {len(meant)}"
+            continue
+        for one, (shape, (kind, values, pose)) in zip(found, meant, strict=True):
+            if _form(getattr(one.geometry, kind)) != values or _is_moved(one.origin, pose):
+                yield f"a {kind} of its {tag} differs"
+            if tag == "visual" and _paint(one.material) != _meant_paint(shape.material, target):
+                yield f"the material of a {kind} differs"
+
+
+def _is_another_body(there: yourdfpy.Inertial, body: Inertial) -> bool:
+    if there.mass is None or there.inertia is None:
+        return True
+    rows = there.inertia.tolist()
+    off = max(abs(rows[i][j] - value) for (i, j), value in zip(_MOMENTS, body.tensor, strict=True))
+    is_other_tensor = off > FAR_MOMENT * max(map(abs, body.tensor))
+    return there.mass != body.mass or is_other_tensor or _is_moved(there.origin, body.pose)
+
+
+def _paint(there: yourdfpy.Material | None) -> dict[str, Any]:
+    if there is None:
+        return {}
+    colour = {} if there.color is None else {"rgba": tuple(there.color.rgba.tolist())}
+    image = {} if there.texture is None else {"texture": there.texture.filename}
+    return {"name": there.name} | colour | image
+
+
+def _meant_paint(material: Material | None, target: Target) -> dict[str, Any]:
+    if material is None:
+        return {}
+    colour = {"rgba": material.rgba} if material.rgba else {}
+    image = {"texture": target.address(material.texture)} if material.texture else {}
+    return {"name": material.name} | colour | image
+
+
+def _form(there: Any) -> dict[str, Any]:
+    """Return the values of a solid; none where there is none of the kind."""
+    values = (
+        {}
+        if there is None
+        else {key: value for key, value in vars(there).items() if value is not None}
+    )
+    return {
+        key: tuple(value.tolist()) if hasattr(value, "tolist") else value
+        for key, value in values.items()
+    }
+
+
+def _solids(shape: Shape, target: Target) -> Iterator[tuple[str, dict[str, Any], Pose]]:
+    """Yield the solids that a shape is in URDF, which has no capsule: kind, values and pose of each."""
+    size, radius = shape.size, {"radius": shape.size[0]}
+    if shape.mesh:
+        scale = {} if size == (1.0, 1.0, 1.0) else {"scale": size}
+        yield "mesh", {"filename": target.address(shape.mesh), **scale}, shape.pose
+    elif shape.kind in {"box", "sphere"}:
+        yield shape.kind, {"size": size} if shape.kind == "box" else radius, shape.pose
+    else:
+        yield "cylinder", {**radius, "length": size[1]}, shape.pose
+        for end in (size[1] / 2, -size[1] / 2) if shape.kind == "capsule" else ():
+            yield "sphere", radius, shape.pose @ Pose((0.0, 0.0, end))

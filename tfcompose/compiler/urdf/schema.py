@@ -1,0 +1,267 @@
+"""The words of URDF and what they hold: elements, attributes, shapes, types of joints, and the values of attributes.
+
+A word or a value that is none is a finding. Source: the URDF XML specification of ROS (link,
+joint, robot). What transmissions, Gazebo and ros2_control blocks hold is not checked.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, Span, finding, nearest, slip_of
+from tfcompose.foundation.geometry import Pose, normalised, quat_from_rpy, rpy_from_quat
+from tfcompose.model.robot import FREE, MOVING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.compiler.urdf.read import Element
+    from tfcompose.foundation.catalogue import Severity
+    from tfcompose.foundation.geometry import Quaternion
+
+
+JOINT_TYPES = (*MOVING, "fixed", *FREE)
+
+#: Each element with its attributes and the elements in it.
+ELEMENTS: dict[str, tuple[str, str]] = {
+    "robot": ("name version", "link joint material transmission gazebo ros2_control sensor"),
+    "link": ("name type", "inertial visual collision"),
+    "inertial": ("", "origin mass inertia"),
+    "visual": ("name", "origin geometry material"),
+    "collision": ("name", "origin geometry"),
+    "geometry": ("", "box cylinder sphere mesh capsule"),
+    "material": ("name", "color texture"),
+    "joint": (
+        "name type",
+        "origin parent child axis limit mimic dynamics calibration safety_controller",
+    ),
+    "origin": ("xyz rpy quat_xyzw", ""),
+    "mass": ("value", ""),
+    "inertia": ("ixx ixy ixz iyy iyz izz", ""),
+    "box": ("size", ""),
+    "cylinder": ("radius length", ""),
+    "capsule": ("radius length", ""),
+    "sphere": ("radius", ""),
+    "mesh": ("filename scale", ""),
+    "color": ("rgba", ""),
+    "texture": ("filename", ""),
+    "parent": ("link", ""),
+    "child": ("link", ""),
+    "axis": ("xyz", ""),
+    "limit": ("lower upper effort velocity acceleration jerk deceleration", ""),
+    "mimic": ("joint multiplier offset", ""),
+    "dynamics": ("damping friction", ""),
+    "calibration": ("rising falling reference_position", ""),
+    "safety_controller": ("soft_lower_limit soft_upper_limit k_position k_velocity", ""),
+}
+
+#: The components of a tensor, in the order in which ``Inertial`` holds them.
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+#: Of each primitive shape the attributes that give its size, each with how many numbers it has.
+SIZES: dict[str, tuple[tuple[str, int], ...]] = {
+    "box": (("size", 3),),
+    "cylinder": (("radius", 1), ("length", 1)),
+    "sphere": (("radius", 1),),
+    "capsule": (("radius", 1), ("length", 1)),
+}
+
+#: Elements next to links, joints and materials that are other programs' business.
+OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
+
+#: Elements of xacro that URDF does not have.
+_XACRO = frozenset({"insert_block", "include", "property", "if", "unless", "macro"})
+#: A word as near as this to a known one is taken for a misspelling of it.
+_MISSPELT = 0.8
+
+
+def unknown_words(root: Element) -> Iterator[Finding]:
+    """Yield a finding for each element and attribute that URDF does not have: an error where a known one is misspelt.
+
+    Others may be an extension, and are warnings; directly below <robot> they are accepted.
+    """
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        attributes, inside = (words.split() for words in ELEMENTS[element.tag])
+        for name in element.attributes:
+            if name not in attributes and ":" not in name and name != "xmlns":
+                yield _unknown(
+                    f"attribute {name} of <{element.tag}>", name, attributes, element, name
+                )
+        for child in element.children:
+            if child.tag in _XACRO or child.tag.startswith("xacro:"):
+                yield _unexpanded(child)
+            elif child.tag in inside:
+                waiting += [child] if child.tag not in OPAQUE else []
+            elif ":" not in child.tag and (element is not root or nearest(child.tag, inside)):
+                yield _unknown(
+                    f"element <{child.tag}> in <{element.tag}>", child.tag, inside, child
+                )
+
+
+def _unexpanded(element: Element) -> Finding:
+    """Return the finding about an element that xacro should have replaced: readers of URDF ignore it."""
+    if element.tag in _XACRO:
+        message = f"<{element.tag}> is a tag of xacro, not expanded without its prefix"
+        return finding("TF720", message, element.at, help=f"<xacro:{element.tag} …>")
+    advice = "in a part, use xacro: instead of urdf:"
+    return finding("TF720", f"<{element.tag}> was not expanded", element.at, help=advice)
+
+
+def _unknown(
+    what: str, word: str, known: list[str], element: Element, attribute: str = ""
+) -> Finding:
+    near = nearest(word, known)
+    advice = (
+        f"did you mean {near}?"
+        if near
+        else f"allowed here: {', '.join(known)}"
+        if known
+        else "nothing is allowed here"
+    )
+    at = element.at_value(attribute) if attribute else element.at
+    wrong = near and (slip_of(word, known) or nearest(word, known, _MISSPELT))
+    return finding(
+        "TF720", f"unknown {what}", at, help=advice, severity="error" if wrong else "warning"
+    )
+
+
+#: Products of three smaller numbers stay in the range of floats.
+HUGE = 1e30
+
+
+@dataclass(slots=True)
+class Values:
+    """Reads attributes; ``found`` is what was wrong with them, ``has_quaternions`` whether rotations may be such.
+
+    ``refused`` counts what is no value; what is a warning only leaves a value as it is.
+    """
+
+    found: list[Finding] = field(default_factory=list)
+    has_quaternions: bool = False
+    refused: int = 0
+
+    def refuse(
+        self, message: str, at: Span, advice: str = "", severity: Severity = "error"
+    ) -> None:
+        """Note that a value is wrong."""
+        self.found.append(finding("TF721", message, at, help=advice, severity=severity))
+        self.refused += severity == "error"
+
+    def text(self, element: Element, name: str, example: str) -> str:
+        """Return an attribute that must be there, or an empty text."""
+        value = element.attributes.get(name, "")
+        if not value:
+            self.refuse(f"<{element.tag}> has no {name}", element.at, f"for example {example}")
+        return value
+
+    def numbers(
+        self, element: Element | None, name: str, default: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Return an attribute's numbers, as many as ``default`` has; that is taken where there are none."""
+        if element is None or name not in element.attributes:
+            return default
+        words = element.attributes[name].split()
+        try:
+            values = tuple(map(float, words))
+        except ValueError:
+            values = ()
+        if len(values) != len(default) or not all(map(math.isfinite, values)):
+            count = "a number" if len(default) == 1 else f"{len(default)} numbers"
+            text = element.attributes[name]
+            self.refuse(
+                f"{name}={text!r} is not {count}",
+                element.at_value(name),
+                _advice(text, len(default)),
+            )
+            return default
+        if max(map(abs, values)) > HUGE:
+            self.refuse(f"{name} is too large", element.at_value(name))
+            return default
+        if element.has_broken_values and re.search(r"[\t\r\n]", element.raw_value(name).lstrip()):
+            message = f"tab or line break between the numbers of {name}"
+            self.refuse(
+                message,
+                element.at_value(name),
+                "use spaces: ROS parsers reject the robot for it",
+                "warning",
+            )
+        return values
+
+    def number(self, element: Element | None, name: str, default: Any = None) -> Any:
+        """Return an attribute's number; ``default`` is taken where there is none."""
+        if element is None or name not in element.attributes:
+            return default
+        return self.numbers(element, name, (0.0,))[0]
+
+    def bound(self, element: Element, name: str) -> float | None:
+        """Return an attribute's number that limits something; one that limits nothing is as large as numbers may be."""
+        try:
+            value = float(element.attributes.get(name, ""))
+        except ValueError:
+            value = 0.0
+        if not HUGE < abs(value) < math.inf:
+            return self.number(element, name)  # type: ignore[no-any-return]  # a number, or None
+        taken = math.copysign(HUGE, value)
+        message = f"{name} is too large: {taken:g} is used"
+        self.refuse(message, element.at_value(name), "such a limit limits nothing", "warning")
+        return taken
+
+    def pose(self, parent: Element) -> Pose:
+        """Return the pose that the element's origin gives."""
+        origin = parent.first("origin")
+        x, y, z = self.numbers(origin, "xyz", (0.0, 0.0, 0.0))
+        if origin is not None and "quat_xyzw" in origin.attributes:
+            return Pose((x, y, z), self._quaternion(origin))
+        roll, pitch, yaw = self.numbers(origin, "rpy", (0.0, 0.0, 0.0))
+        if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
+            self.refuse("rpy is out of range", origin.at_value("rpy") if origin else parent.at)
+            return Pose((x, y, z))
+        return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
+
+    def _quaternion(self, origin: Element) -> Quaternion:
+        """Return the rotation that is given as a quaternion, which URDF has from version 1.1 on."""
+        before, at = self.refused, origin.at_value("quat_xyzw")
+        x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
+        if not any((x, y, z, w)):
+            self.refuse("the quaternion has no length", at, "no rotation is 0 0 0 1")
+        if self.refused > before:
+            return (0.0, 0.0, 0.0, 1.0)
+        turned = normalised((x, y, z, w))
+        angles = " ".join(f"{angle + 0.0:.17g}" for angle in rpy_from_quat(turned))
+        if "rpy" in origin.attributes:
+            self.refuse(
+                "the origin has both rpy and quat_xyzw: parsers reject the robot",
+                at,
+                "remove one of them",
+            )
+        elif not self.has_quaternions:
+            self.refuse("parsers ignore quat_xyzw", at, f'write rpy="{angles}"')
+        return turned
+
+
+def version_of(root: Element, values: Values) -> tuple[int, ...]:
+    """Return the version of URDF that the document declares; a finding where parsers of ROS 2 Jazzy reject it."""
+    text = root.attributes.get("version", "1.0")
+    version = tuple(map(int, text.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", text) else ()
+    if version != (1, 0):
+        at = root.at_value("version")
+        if version:
+            message = f"parsers of ROS 2 Jazzy reject version {text}: they support 1.0 only"
+            values.refuse(message, at, "remove it, unless something here needs it", "warning")
+        else:
+            values.refuse(f"invalid version {text!r}", at, 'version="1.0"')
+    return version
+
+
+def _advice(text: str, count: int) -> str:
+    """Return what to write for what is not so many numbers."""
+    if "${" in text or "$(" in text:
+        return "xacro was not expanded here: use the .xacro file"
+    if "," in text:
+        return "separate numbers by spaces, not commas"
+    return f"write {count} finite numbers, separated by spaces" if count > 1 else ""

@@ -1,0 +1,47 @@
+"""Numbers, lists and durations as people read them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+#: Of a list of names so many are shown.
+LISTED = 6
+
+
+def counted(number: int, word: str) -> str:
+    """Return the number with the word, in the plural where it belongs: "1 edge", "2 edges"."""
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def with_more(first: str, more: int, word: str = "edge") -> str:
+    """Return the first name, and how many there are besides: "a and 2 more edges"."""
+    return f"{first} and {counted(more, f'more {word}')}" if more else first
+
+
+def listed(names: Iterable[object], most: int = LISTED) -> str:
+    """Return names with commas, and how many more there are than the first few: "a, b and 3 more"."""
+    some = [str(name) for name in names]
+    more = f" and {len(some) - most} more" if len(some) > most else ""
+    return ", ".join(some[:most]) + more
+
+
+def duration(seconds: float) -> str:
+    """Return how long a time is, without its sign: 120 ms, 3.2 s, 2.5 h, 12 days."""
+    size = abs(seconds)
+    if size < 1:
+        return f"{size * 1000:.0f} ms"
+    if size < 600:  # noqa: PLR2004 (ten minutes)
+        return f"{size:.3g} s"
+    return f"{size / 3600:.3g} h" if size < 48 * 3600 else f"{size / 86400:,.0f} days"
+
+
+def visible(text: str) -> str:
+    """Return the text with what cannot be seen, such as control characters, as Python's escapes."""
+    return (
+        text
+        if text.isprintable()
+        else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+    )

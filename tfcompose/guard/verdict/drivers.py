@@ -1,0 +1,252 @@
+"""Sensors' drivers against their presets: frames, poses and switches that differ from the preset.
+
+A driver sends what its device was calibrated to, which is a few millimetres from nominal; far from
+it the device is another one than the preset's. What a preset calls exact, such as the turn of an
+optical frame, no device changes.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from math import isfinite, radians
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.geometry import Offset, Pose, norm, offset_of
+from tfcompose.foundation.text import counted
+from tfcompose.guard.verdict.publishers import SAME_POSE, compared, pose_differs
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.plan import Driven, Plan, PlanEdge, PlanProcess
+    from tfcompose.tf.live.publishers import Message, Publishers
+
+    Value = bool | int | float | str
+
+#: How far a frame may be from its value: a nominal one, and one that is exact.
+NOMINAL, EXACT = Offset(0.02, radians(5.0)), Offset(0.001, radians(0.2))
+#: A quaternion's length may be so far from 1.
+UNIT_WITHIN = 0.005
+#: So many frames of publishers without a name are kept at most.
+_MOST = 1000
+
+
+def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
+    """Return the sensors that each node drives, by its full name."""
+    return {
+        node: process.drives
+        for process in plan.processes
+        for node in process.nodes
+        if process.drives
+    }
+
+
+# Poses.
+
+
+def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
+    """Return whether the plan says where a fixed frame is that this process owns, and no preset does.
+
+    Another owner's pose is the identity where the robot says none.
+    """
+    if edge.kind != "static" or any(driven.publishes for driven in owner.drives):
+        return False
+    return owner.kind == "static" or edge.pose != Pose()
+
+
+def fixed_of(plan: Plan) -> dict[str, PlanEdge]:
+    """Return the fixed edges with a pose that others than tfcompose's own publisher own, by their child."""
+    known, owners = expected_of(plan), {process.name: process for process in plan.processes}
+    return {
+        edge.child: edge
+        for edge in plan.edges
+        if edge.child not in known
+        and edge.owner in owners
+        and owners[edge.owner].kind != "static"
+        and is_fixed(edge, owners[edge.owner])
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """A frame that a driver publishes, and whether its pose is nominal only."""
+
+    edge: PlanEdge
+    driven: Driven
+    nominal: bool
+
+
+def expected_of(plan: Plan) -> dict[str, Expected]:
+    """Return the frames inside sensors that their drivers publish, by the frame's name."""
+    edges = {edge.child: edge for edge in plan.edges}
+    return {
+        child: Expected(edges[child], driven, kind == "nominal")
+        for process in plan.processes
+        for driven in process.drives
+        for child, kind in driven.frames.items()
+        if child in edges and kind != "unknown"
+    }
+
+
+def is_pose(sent: Pose) -> bool:
+    """Return whether tf2 takes the pose."""
+    return (
+        all(map(isfinite, (*sent.xyz, *sent.quat_xyzw)))
+        and abs(norm(sent.quat_xyzw) - 1) < UNIT_WITHIN
+    )
+
+
+def is_off(expected: Expected, sent: Pose) -> bool:
+    """Return whether a pose is farther from the preset's than a calibration explains; False for what tf2 drops."""
+    return is_pose(sent) and offset_of(expected.edge.pose, sent).beyond(
+        NOMINAL if expected.nominal else EXACT
+    )
+
+
+def driver_pose_differs(
+    node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None
+) -> Finding:
+    """Return the finding for frames of one sensor that its driver ``node``, empty if not known, sends elsewhere."""
+    (expected, sent), *others = off
+    driven, edge = expected.driven, expected.edge
+    more = f", and {counted(len(others), 'more frame')} elsewhere" if others else ""
+    sender = f"the driver {node}" if node else f"the driver of {driven.sensor}"
+    message = (
+        f"the pose of {edge.child} in {edge.parent} from {sender} is"
+        f" {offset_of(edge.pose, sent).text} off preset {driven.preset}{more}:"
+        f" {compared(edge.pose, sent)}"
+    )
+    notes = [
+        Note(f"{one.edge.child} in {one.edge.parent}: {compared(one.edge.pose, pose)}")
+        for one, pose in others
+    ]
+    own = f"{{{edge.child}: {{xyz: [{_row(sent.xyz)}], quat_xyzw: [{_row(sent.quat_xyzw)}]}}}}"
+    values = f"sensors: {{{driven.sensor}: {{frames: {own}}}}}"
+    advice = (
+        f"is {driven.sensor} another model? If these are this unit's values, write them: {values}"
+    )
+    return finding("TF828", message, place, help=advice, notes=notes, severity="warning")
+
+
+def _row(values: tuple[float, ...]) -> str:
+    return ", ".join(f"{round(value, 6) + 0.0:g}" for value in values)
+
+
+@dataclass(frozen=True, slots=True)
+class SentPose:
+    """What a publisher sent of a frame that a driver is expected to send, or another owner, as the plan says."""
+
+    expected: Expected | PlanEdge
+    pose: Pose
+    gid: bytes
+    static: bool
+
+    @property
+    def edge(self) -> PlanEdge:
+        """The planned edge."""
+        return _edge_of(self.expected)
+
+
+def _edge_of(expected: Expected | PlanEdge) -> PlanEdge:
+    return expected.edge if isinstance(expected, Expected) else expected
+
+
+class SentPoses:
+    """The poses of frames that drivers and other owners publish, message by message.
+
+    A publisher is compared once for each frame, where the rmw says who sent a message.
+    """
+
+    def __init__(self, plan: Plan, publishers: Publishers) -> None:
+        self._publishers = publishers
+        self._expected: dict[str, Expected | PlanEdge] = {**fixed_of(plan), **expected_of(plan)}
+        self._received: set[tuple[bytes, str]] = set()
+        self._waiting: list[SentPose] = []
+
+    def take(self, message: Message) -> None:
+        """Note the poses that a message brings along."""
+        if message.gid is None or not self._expected:
+            return
+        for (parent, child), pose in zip(message.edges, message.poses, strict=False):
+            expected, key = self._expected.get(child), (message.gid, child)
+            if (
+                expected is None
+                or key in self._received
+                or parent != _edge_of(expected).parent
+                or len(self._received) >= _MOST
+            ):
+                continue
+            self._received.add(key)
+            self._waiting.append(SentPose(expected, pose, message.gid, message.static))
+
+    @property
+    def frames(self) -> frozenset[str]:
+        """The frames whose poses are compared."""
+        return frozenset(self._expected)
+
+    def judge(self) -> Iterator[Finding]:
+        """Yield what was sent otherwise than presets or the plan say, once for each publisher and sensor."""
+        wrong: dict[tuple[str, str], list[tuple[Expected, Pose]]] = {}
+        elsewhere: dict[str, list[tuple[PlanEdge, str, Pose]]] = {}
+        waiting = []
+        for sent in self._waiting:
+            nodes = self._publishers.nodes(sent.gid, static=sent.static)
+            if not nodes:
+                waiting.append(sent)
+            elif nodes != (sent.edge.node,):
+                continue
+            elif isinstance(sent.expected, Expected):
+                if is_off(sent.expected, sent.pose):
+                    wrong.setdefault((nodes[0], sent.expected.driven.sensor), []).append(
+                        (sent.expected, sent.pose)
+                    )
+            elif is_pose(sent.pose) and offset_of(sent.edge.pose, sent.pose).beyond(SAME_POSE):
+                elsewhere.setdefault(nodes[0], []).append((sent.edge, sent.edge.parent, sent.pose))
+        self._waiting = waiting
+        for node, poses in elsewhere.items():
+            yield pose_differs(poses, node)
+        for (node, _), off in wrong.items():
+            yield driver_pose_differs(node, off)
+
+
+# Switches.
+
+
+def not_taken(
+    node: str,
+    wanted: dict[str, Value],
+    found: dict[str, Value | None],
+    drives: tuple[Driven, ...] = (),
+) -> list[Finding]:
+    """Return a finding for each parameter of the node that is not what the plan wrote; None: it has no such one."""
+    return [
+        _not_taken(node, name, value, found[name], drives)
+        for name, value in wanted.items()
+        if found[name] is None
+        or found[name] != value
+        or isinstance(found[name], bool) != isinstance(value, bool)
+    ]
+
+
+def _not_taken(
+    node: str, name: str, wanted: Value, found: Value | None, drives: tuple[Driven, ...]
+) -> Finding:
+    plan = f"the plan wrote {name}: {json.dumps(wanted)}"
+    of = "".join(f" for {one.sensor} ({one.preset})" for one in drives[:1])
+    if found is None:
+        advice = (
+            "is it a version of the node that has another switch, or another node of that name?"
+        )
+        return finding(
+            "TF829", f"{node} has no parameter {name}, and {plan}{of}", None, help=advice
+        )
+    advice = (
+        f"start it with {name}: {json.dumps(wanted)}; otherwise it publishes what the plan does"
+        " not expect"
+    )
+    return finding(
+        "TF829", f"{node} has {name}: {json.dumps(found)}, and {plan}{of}", None, help=advice
+    )

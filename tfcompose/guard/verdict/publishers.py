@@ -1,0 +1,407 @@
+"""Publishers: settings that no listener accepts, the wrong topic or type, two of one edge, and poses that are off."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.geometry import Offset, Pose, normalised, offset_of
+from tfcompose.foundation.text import counted, listed, with_more
+from tfcompose.model.plan.topics import GLOBAL
+from tfcompose.tf.live.state import NAMELESS, who
+from tfcompose.tf.ros.environment import PROFILE_VARIABLES
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.plan import PlanEdge
+    from tfcompose.tf.live.edges import EdgeState
+    from tfcompose.tf.live.state import TreeState
+
+#: A listener keeps the last 100 messages on /tf_static, one of each publisher.
+MOST_STATIC = 100
+LISTED_AT_MOST = 12
+#: What two poses may be apart and count as the same.
+SAME_POSE = Offset(1e-3, math.radians(0.1))
+#: A micrometre, a millidegree.
+_SAME = Offset(1e-6, 2e-5)
+#: One that sends so long after the other began has not only replaced it.
+TOGETHER_S = 0.3
+
+
+# What there is to say.
+
+
+def two_publishers_message(edges: str, publishers: Sequence[str], *, several: bool) -> str:
+    """Return the message for edges that have two publishers; one name alone is there twice."""
+    names = list(dict.fromkeys(publishers))
+    by = f"twice by {names[0]}" if len(names) == 1 else f"by {' and by '.join(names)}"
+    return f"{edges} {'are' if several else 'is'} published {by}"
+
+
+def topics_message(
+    edges: str, topics: Sequence[tuple[str, str]], declared: str = "", *, several: bool = False
+) -> str:
+    """Return the message for edges that come on the wrong topic, or on two: the topics, each with who publishes there.
+
+    ``declared`` is the topic that the plan says, empty where none does.
+    """
+    on = " and ".join(f"on {topic}{' by ' if by else ''}{by}" for topic, by in topics)
+    return (
+        f"{edges} {'are' if several else 'is'} published"
+        f" {on}{', declared for ' if declared else ''}{declared}"
+    )
+
+
+def flood(node: str, where: str, transforms: int, hertz: float | None) -> Finding:
+    """Return the finding for a publisher of more undeclared edges than the guard judges.
+
+    Its messages have up to so many transforms and come so often; ``hertz`` is None where that is
+    not known.
+    """
+    rate = f" at {hertz:.3g} Hz" if hertz else ""
+    message = (
+        f"{node} sends {transforms:,} frames{rate}, more than are judged: only its declared"
+        " edges are"
+    )
+    notes = [Note(f"{node} runs {where}")] if where else []
+    return finding(
+        "TF853",
+        message,
+        None,
+        notes=notes,
+        help=f"end {node}, or let it use the same frames again",
+    )
+
+
+def flooded(state: TreeState) -> Iterator[Finding]:
+    """A node publishes more edges than are kept."""
+    named = {one.gid: one for one in state.publishers}
+    for gid, number in state.beyond.items():
+        one = named.get(gid) if gid is not None else None
+        node = one.node if one and one.node else NAMELESS
+        message = (
+            f"{node} publishes more edges than are kept: {counted(number, 'transform')} of further"
+            " ones came"
+        )
+        notes = [Note(f"{node} runs {one.where}")] if one and one.where else []
+        yield finding(
+            "TF853",
+            message,
+            None,
+            notes=notes,
+            help=f"end {node}, or let it use the same frames again",
+        )
+
+
+def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: bool) -> Finding:
+    """Return the finding for a process of a strict plan that is not behind the fence, which may be of remappings.
+
+    ``profile`` is the profile file that it was started with instead of the fence's; empty: none.
+    """
+    message = (
+        f"{node} of {process} publishes {topic} past the fence of guard: strict: every listener"
+        " receives it"
+    )
+    if remapped:
+        advice = (
+            "let it take ROS arguments: start it as {package, executable}, or add --ros-args to"
+            " its words; "
+        )
+        advice += 'a script passes them on with "$@"'
+        return finding("TF852", message, None, help=advice)
+    variable = PROFILE_VARIABLES[0]
+    given = f"with {variable}={profile}, which" if profile else f"without {variable}, which"
+    notes = [
+        Note(
+            f"it runs {given} a script or program that starts it {'sets' if profile else 'unsets'}"
+        )
+    ]
+    if profile:
+        advice = (
+            f"take {variable} out of the script, and name the file in the robot's file, where the"
+            " fence is added "
+        )
+        advice += f"to it: processes: {{{process}: {{env: {{{variable}: {profile}}}}}}}"
+    else:
+        advice = f"let the script keep {variable}, which names the fence"
+    advice += '; or, with a script that passes "$@" on, guard: {fence: remap}'
+    return finding("TF852", message, None, notes=notes, help=advice)
+
+
+def best_effort_publisher(node: str, topic: str) -> Finding:
+    """Return the finding for a publisher that sends best effort, which no TF listener accepts."""
+    message = (
+        f"{node} publishes {topic} best effort, so no listener receives it: all ask for reliable"
+    )
+    return finding("TF826", message, None, help="publish it reliable")
+
+
+def leak(node: str, topic: str, own: str) -> Finding:
+    """Return the finding for a node of an isolated robot that publishes a global TF topic."""
+    message = f"{node} publishes the global {topic}, but its robot's TF is on {own}"
+    advice = (
+        f"start it with the remapping {topic}:={own}, as tfcompose does with the processes that it"
+        " starts"
+    )
+    return finding("TF827", message, None, help=advice)
+
+
+def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Finding:
+    """Return the finding for a publisher whose last latched message, which the guard heard, lacks these edges."""
+    lost, named = counted(sent_before, "message"), listed(missing, LISTED_AT_MOST)
+    message = (
+        f"{node} sent {lost} on /tf_static before the guard received it, and none since contains"
+        f" {named}"
+    )
+    advice = "send all fixed edges in each message: a latched topic keeps the last one only"
+    return finding("TF850", message, None, severity="warning", help=advice)
+
+
+def volatile_publisher(node: str, topic: str, owned: Sequence[str]) -> Finding:
+    """Return the finding for a publisher of fixed edges that no TF listener accepts; ``owned`` are its edges."""
+    notes = [Note(f"it owns {listed(owned, LISTED_AT_MOST)}")] if owned else []
+    message = f"{node} publishes {topic} with durability volatile, so no listener receives it"
+    return finding(
+        "TF806",
+        message,
+        None,
+        notes=notes,
+        help="publish it with durability transient_local, reliable",
+    )
+
+
+# At the end.
+
+
+def two_publishers(state: TreeState) -> Iterator[Finding]:
+    """Two publishers send the same edge."""
+    same: dict[tuple[str, str], list[EdgeState]] = {}
+    for edge in state.taken:
+        same.setdefault((edge.parent, edge.child), []).append(edge)
+    groups: dict[tuple[bytes | None, ...], list[list[EdgeState]]] = {}
+    planned = state.planned
+    for (_, child), edges in same.items():
+        rivals = [
+            edge for edge in edges if edge.stream.gid is not None and edge.present is not False
+        ]
+        distinct = {edge.stream.gid for edge in rivals}
+        if len({edge.stream.static for edge in rivals}) > 1:
+            continue  # it comes on both topics, which is a finding of its own
+        if len(distinct) > 1 and child not in planned and _together(rivals):
+            groups.setdefault(tuple(sorted(distinct, key=str)), []).append(rivals)
+    for found in groups.values():
+        rivals = sorted(found[0], key=who)
+        names = list(dict.fromkeys(who(edge) for edge in rivals))
+        named = with_more(rivals[0].name, len(found) - 1)
+        message = (
+            two_publishers_message(named, names, several=len(found) > 1)
+            + f"; {_difference(rivals)}"
+        )
+        notes = [Note(_where(state, edge)) for edge in rivals]
+        notes += [Note(others[0].name) for others in found[1:8]]
+        advice = (
+            "end one of them, or switch its TF off"
+            if len(names) > 1
+            else f"{names[0]} runs twice: end one"
+        )
+        yield finding("TF822", message, None, severity="warning", notes=notes, help=advice)
+
+
+def both_topics(state: TreeState) -> Iterator[Finding]:
+    """A frame comes on /tf and on /tf_static."""
+    kinds: dict[str, dict[bool, EdgeState]] = {}
+    for edge in state.taken:
+        kinds.setdefault(edge.child, {})[edge.stream.static] = edge
+    planned = state.planned
+    for child, found in kinds.items():
+        if len(found) == 1 or child in planned:
+            continue
+        moving, fixed = found[False], found[True]
+        message = topics_message(
+            child, [(state.topics[0], who(moving)), (state.topics[1], who(fixed))]
+        )
+        advice = "send it on one of them: tf2 discards the frame's history whenever it changes"
+        yield finding("TF809", message, None, help=advice)
+
+
+def volatile_static(state: TreeState) -> Iterator[Finding]:
+    """Fixed frames are sent so that no listener can receive them."""
+    for one in state.publishers:
+        if one.static and not one.latched and one.node and one.type in {"", TF_MESSAGE}:
+            owned = (
+                [edge.name for edge in state.plan.edges if edge.node == one.node]
+                if state.plan
+                else []
+            )
+            yield volatile_publisher(one.node, one.topic or state.topics[1], owned)
+
+
+def volatile_reader(state: TreeState) -> Iterator[Finding]:
+    """A node listens to fixed frames so that it misses those that were sent before it came."""
+    if state.volatile_readers and any(one.static for one in state.publishers):
+        listen = "listens" if len(state.volatile_readers) == 1 else "listen"
+        message = (
+            f"{listed(state.volatile_readers)} {listen} to {state.topics[1]} with durability"
+            " volatile: "
+        )
+        message += "what was sent before is missed"
+        advice = (
+            "subscribe with durability transient_local, reliable, depth 100, as tf2_ros's"
+            " TransformListener does"
+        )
+        yield finding("TF849", message, None, severity="warning", help=advice)
+
+
+def best_effort(state: TreeState) -> Iterator[Finding]:
+    """Frames are sent best effort, and listeners ask for reliable."""
+    for one in state.publishers:
+        if not one.reliable and one.node and one.type in {"", TF_MESSAGE}:
+            yield best_effort_publisher(one.node, one.topic or state.topics[one.static])
+
+
+def other_type(state: TreeState) -> Iterator[Finding]:
+    """Something else than transforms is published on a topic of TF."""
+    for topic in state.graph:
+        if topic.name in state.topics and topic.type != TF_MESSAGE and topic.publishers:
+            message = (
+                f"{listed(topic.publishers)} publishes {topic.type} on {topic.name}, and listeners"
+                " ask for "
+            )
+            message += TF_MESSAGE
+            yield finding(
+                "TF832",
+                message,
+                None,
+                help=f"publish {TF_MESSAGE}, or give the topic another name",
+            )
+
+
+def unreadable(state: TreeState) -> Iterator[Finding]:
+    """Bytes come that are no TFMessage."""
+    named = {one.gid: one for one in state.publishers}
+    for gid, number in state.malformed.items():
+        one = named.get(gid) if gid is not None else None
+        node, topic = (
+            (one.node or NAMELESS, one.topic) if one else (NAMELESS, listed(state.topics))
+        )
+        message = (
+            f"{counted(number, 'message')} on {topic} from {node} cannot be read as {TF_MESSAGE}"
+        )
+        yield finding(
+            "TF832",
+            message,
+            None,
+            help="does it send bytes of its own making, or with another definition?",
+        )
+
+
+def many_static(state: TreeState) -> Iterator[Finding]:
+    """So many nodes publish fixed frames that listeners lose some."""
+    fixed = [one for one in state.publishers if one.static]
+    if len(fixed) >= MOST_STATIC:
+        nodes = sorted({one.node for one in fixed if one.node})
+        message = (
+            f"{len(fixed)} publishers on {state.topics[1]}, and a listener keeps the last"
+            f" {MOST_STATIC} messages"
+        )
+        advice = "let one node publish them: tfcompose sends all fixed edges in one message"
+        yield finding(
+            "TF309", message, None, severity="error", notes=[Note(listed(nodes))], help=advice
+        )
+
+
+def isolation_leak(state: TreeState) -> Iterator[Finding]:
+    """A node of a robot with TF topics of its own writes the global ones."""
+    topics = {topic.name: topic for topic in state.typed(TF_MESSAGE)}
+    own = (
+        {node for process in state.plan.processes for node in process.nodes}
+        if state.plan
+        else set()
+    )
+    for name in [name for name in topics if name not in GLOBAL and name.endswith(GLOBAL)]:
+        word = "/tf_static" if name.endswith("/tf_static") else "/tf"
+        inside = name.removesuffix(word)
+        if not topics[name].publishers or (
+            state.topics not in {GLOBAL, (f"{inside}/tf", f"{inside}/tf_static")}
+        ):
+            continue
+        for node in topics[word].publishers if word in topics else ():
+            if node.startswith(f"{inside}/") or (node in own and state.topics != GLOBAL):
+                yield leak(node, word, name)
+
+
+def _together(edges: Sequence[EdgeState]) -> bool:
+    """Whether two of them sent in the same stretch of time; what is fixed is sent once and holds on."""
+    spans = sorted(
+        (e.stream.first_ns, float("inf") if e.stream.static else e.stream.arrivals.last_ns)
+        for e in edges
+    )
+    return any(end - begun > TOGETHER_S * 1e9 for (_, end), (begun, _) in pairwise(spans))
+
+
+def _difference(edges: Sequence[EdgeState]) -> str:
+    """Return how far apart the newest poses are."""
+    off = offset_of(edges[0].stream.pose, edges[1].stream.pose)
+    return (
+        f"their newest values are {off.text} apart"
+        if off.beyond(_SAME)
+        else "both with the same value"
+    )
+
+
+def _where(state: TreeState, edge: EdgeState) -> str:
+    where, rate = state.where(edge), edge.timing.rate
+    how = "once" if edge.stream.static or rate is None else f"at {rate:.3g} Hz"
+    return f"{who(edge)} sends it {how}{', and runs ' if where else ''}{where}"
+
+
+def shown(pose: Pose) -> str:
+    """Return the pose in one line: metres, and fixed-axis angles in degrees."""
+    xyz = " ".join(f"{round(value, 5) + 0.0:g}" for value in pose.xyz)
+    angles = Pose(pose.xyz, normalised(pose.quat_xyzw)).rpy
+    rpy = " ".join(f"{round(math.degrees(angle), 3) + 0.0:g}" for angle in angles)
+    return f"xyz {xyz} m, rpy {rpy} deg"
+
+
+def compared(expected: Pose, observed: Pose) -> str:
+    """Return both poses as people read them."""
+    return f"seen {shown(observed)}; expected {shown(expected)}"
+
+
+def pose_differs(
+    off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None
+) -> Finding:
+    """Return the finding for edges that come with another pose than the plan's: each with its parent, as it was sent.
+
+    ``publisher`` is empty where it is not known; ``place`` is where the first edge is in the
+    robot's file.
+    """
+    (edge, parent, pose), *others = off
+    by = f" from {publisher}" if publisher else ""
+    more = f", and of {counted(len(others), 'more frame')} too" if others else ""
+    message = (
+        f"the pose of {edge.child} in {parent}{by} is off by"
+        f" {offset_of(edge.pose, pose).text}{more}"
+    )
+    notes = [
+        Note(
+            f"{one.child} in {above} by {offset_of(one.pose, sent).text}:"
+            f" {compared(one.pose, sent)}"
+        )
+        for one, above, sent in others[:LISTED_AT_MOST]
+    ]
+    notes += (
+        [] if place else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
+    )
+    advice = (
+        "was it changed after the start? tfcompose up restarts what differs; else correct the one"
+        " that is wrong"
+    )
+    return finding(
+        "TF846", f"{message}: {compared(edge.pose, pose)}", place, notes=notes, help=advice
+    )

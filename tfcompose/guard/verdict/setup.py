@@ -1,0 +1,169 @@
+"""The ROS setup: whether there is anything to listen to, and whether this process can hear it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.text import counted, listed
+from tfcompose.model.plan.topics import namespace_options
+from tfcompose.tf.ros.environment import DOMAIN, RANGE, RMW
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from tfcompose.tf.live.state import RosProcess, TreeState
+
+LOCALHOST_ONLY, SERVER = "ROS_LOCALHOST_ONLY", "ROS_DISCOVERY_SERVER"
+#: The variables that decide who hears whom.
+VARIABLES = (DOMAIN, RANGE, LOCALHOST_ONLY, RMW, "ROS_STATIC_PEERS", SERVER)
+#: What decides who hears whom, with what holds where it is not set.
+DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: "", SERVER: ""}
+#: Of processes with other settings, those of so many settings are named, so many of each.
+MOST_SETTINGS = MOST_PROCESSES = 3
+
+
+def settings_text(settings: Mapping[str, str]) -> str:
+    """Return the settings as people read them."""
+    words = [f"{name}={settings[name]}" for name in VARIABLES if settings.get(name)]
+    if not settings.get(DOMAIN):
+        words.insert(0, f"{DOMAIN} unset (0)")
+    return ", ".join(words)
+
+
+def elsewhere_help(elsewhere: Sequence[str]) -> str:
+    """Return what to do where no TF came and there is some on other topics, or none."""
+    if elsewhere:
+        return f"there is TF on {listed(elsewhere)}: {namespace_options(elsewhere)}"
+    return "is the robot running, and with these settings? tfcompose doctor looks for the reason"
+
+
+def no_tf(state: TreeState) -> Iterator[Finding]:
+    """Nobody publishes TF here."""
+    if state.publishers or state.edges or state.malformed:
+        return
+    moving, fixed = state.topics
+    others = counted(len(state.nodes), "other node") if state.nodes else "no other node"
+    message = f"nobody publishes {moving} or {fixed}; in {state.seconds:.1f} s {others} "
+    message += "was seen" if len(state.nodes) < 2 else "were seen"  # noqa: PLR2004 (one, or none)
+    notes = [Note(f"seen: {listed(state.nodes)}")] if state.nodes else []
+    notes.append(Note(f"looked with {settings_text(state.settings)}"))
+    if state.plan:
+        notes.append(
+            Note(f"{counted(len(state.plan.edges), 'edge')} of {state.plan.robot} should be there")
+        )
+    elsewhere = _elsewhere(state)
+    if elsewhere:
+        notes.append(Note(f"there is TF on {listed(elsewhere)}"))
+        advice = f"look there: tfcompose doctor {namespace_options(elsewhere)}"
+    elif state.plan and not state.nodes:
+        advice = (
+            f"is {state.plan.robot} running, and with these settings? tfcompose ps lists the"
+            " running robots"
+        )
+    elif state.nodes:
+        advice = (
+            "start robot_state_publisher, or tfcompose up; tfcompose doctor --for 20 looks longer"
+        )
+    else:
+        advice = (
+            "is the robot running, and with these settings? On another machine: are both in one"
+            " network with multicast?"
+        )
+    yield finding("TF845", message, None, notes=notes, help=advice)
+
+
+def other_settings(state: TreeState) -> Iterator[Finding]:
+    """Where frames are missing: processes of this machine that cannot be heard, because ROS is set up otherwise."""
+    complete = not state.planned - {edge.child for edge in state.edges}
+    if (state.edges and complete) or (not state.edges and _elsewhere(state)):
+        return
+    found: dict[tuple[tuple[str, str], ...], list[RosProcess]] = {}
+    for process in state.processes:
+        apart = settings_apart(process.settings, state.settings)
+        if apart:
+            found.setdefault(tuple(apart.items()), []).append(process)
+    # Those of this domain first: they are of this robot. Else who was started last, as robots are
+    # that one looks for.
+    order = sorted(
+        found.items(), key=lambda item: (DOMAIN in dict(item[0]), -max(one.pid for one in item[1]))
+    )
+    for apart_items, processes in order[:MOST_SETTINGS]:
+        number = "a ROS process" if len(processes) == 1 else f"{len(processes)} ROS processes"
+        settings = [f"{name}={value}" for name, value in apart_items]
+        here = [
+            f"{name} is {state.settings.get(name) or DEFAULTS[name] or 'unset'}"
+            for name, _ in apart_items
+        ]
+        message = (
+            f"{number} on this machine cannot be reached from here: started with"
+            f" {', '.join(settings)}, "
+        )
+        message += f"and here {' and '.join(here)}"
+        notes = [Note(f"pid {one.pid}: {one.command}") for one in processes[:MOST_PROCESSES]]
+        more = len(processes) - len(notes)
+        notes += [Note(f"and {more} more")] if more else []
+        advice = (
+            f"to look there: {' '.join(settings)} tfcompose doctor; processes that communicate"
+            " need the same settings"
+        )
+        yield finding("TF908", message, None, severity="warning", notes=notes, help=advice)
+
+
+def _elsewhere(state: TreeState) -> list[str]:
+    """Return the topics with TF that are not observed."""
+    return [
+        topic.name
+        for topic in state.typed(TF_MESSAGE)
+        if topic.publishers and topic.name not in state.topics
+    ]
+
+
+def settings_contradict(state: TreeState) -> Iterator[Finding]:
+    """Variables that set up ROS say what cannot be, or contradict each other."""
+    settings = state.settings
+    value = settings.get(RANGE, "")
+    if settings.get(LOCALHOST_ONLY) == "1":
+        if value not in {"", "LOCALHOST"}:
+            message = (
+                f"{LOCALHOST_ONLY}=1 is set, so {RANGE}={value} has no effect: other machines are"
+                " not reached"
+            )
+            yield finding(
+                "TF909",
+                message,
+                None,
+                severity="warning",
+                help=f"unset {LOCALHOST_ONLY}; it is deprecated",
+            )
+    elif value not in {"", "SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"}:
+        message = f"{RANGE}={value} is not one of SUBNET, LOCALHOST, OFF, SYSTEM_DEFAULT"
+        yield finding(
+            "TF909",
+            message,
+            None,
+            severity="warning",
+            help="ROS takes SUBNET instead, with a warning",
+        )
+    elif value == "OFF":
+        message = f"{RANGE}=OFF: nodes discover nobody, not even on this machine"
+        yield finding(
+            "TF909",
+            message,
+            None,
+            help=f"export {RANGE}=LOCALHOST, or SUBNET for several machines",
+        )
+
+
+def settings_apart(theirs: Mapping[str, str], ours: Mapping[str, str]) -> dict[str, str]:
+    """Return the settings in which processes on one machine differ so that they do not discover each other."""
+    apart = {}
+    for name, default in DEFAULTS.items():
+        their, our = theirs.get(name) or default, ours.get(name) or default
+        if their == our or name == LOCALHOST_ONLY or (name == RANGE and "OFF" not in {their, our}):
+            continue
+        if name == RMW and not (their and our):
+            continue  # the installation's default, which may be the same
+        apart[name] = their
+    return apart

@@ -1,0 +1,425 @@
+"""Stamps and clocks: the wrong clock, the same stamp again, back in time, too old and too new.
+
+The guard judges stamps message by message, with ``StampHistory`` and ``Clocks``; the doctor judges
+at the end what an observer has counted. A stamp is compared with the system's time, or with
+simulated time as it comes on /clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.text import counted, duration, listed, with_more
+from tfcompose.tf.live.arrivals import KEPT_NS
+from tfcompose.tf.live.state import who
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from tfcompose.tf.live.edges import EdgeState
+    from tfcompose.tf.live.state import TreeState
+
+REPEATED, BACK, WRONG_CLOCK = "TF823", "TF824", "TF825"
+
+_SECOND_NS = 1_000_000_000
+#: Before 2001: no time of day.
+_NO_DATE_NS = 10**9 * _SECOND_NS
+KEPT_S = KEPT_NS / _SECOND_NS
+#: A single step back by so much is enough.
+LARGE_STEP_S = 1.0
+#: Stamps that are ahead by more make lookups of "now" give a pose of before; nodes that predict do
+#: so by less.
+AHEAD_S = 0.15
+#: AMCL and others date what these frames hold forward by up to a second, so that lookups of "now"
+#: do not fail.
+LOCALISED_IN, FORWARD_S = ("map", "earth", "world"), 1.1
+#: A simulated clock takes smaller steps.
+CLOCK_STEP_S = 0.5
+#: A message that seems to arrive so long before it was sent comes from a clock that is ahead.
+SKEW_S = 0.02
+#: A network is not that slow; a clock may be that late.
+SLOW_S = 0.25
+#: At the end: so many stamps, and this part of all, are no accident.
+FEWEST, PART = 5, 0.3
+#: Message by message: so many wrong ones in a row are no accident; so many that are right end it.
+WRONG_IN_A_ROW = 3
+#: Each fault counts up by so many, each right message down by one; at so many the fault is
+#: reported.
+REPEAT_COUNTS, REPEATS = 2, 10
+STEP_COUNTS, BACK_STEPS = 4, 12
+#: How fast simulated time goes by is measured over so long.
+SPEED_OVER_S = 2.0
+#: Simulated time that has not moved for so long stands: the simulator is paused. Less than an edge
+#: may be quiet.
+STANDS_S = 0.3
+
+
+# What there is to say.
+
+
+def other_clock(stamp_ns: int, received_ns: int, sim_ns: int | None, *, simulated: bool) -> str:
+    """Return how a stamp is of another clock than it should be, empty where it is of the right one.
+
+    ``received_ns`` is the system's time when it came, 0 where that is not known; ``sim_ns`` the
+    newest time on /clock, None where there is none. ``simulated`` says which of the two it should
+    be.
+    """
+    if stamp_ns == 0:
+        return "without a stamp"
+    near_sim = sim_ns is not None and abs(stamp_ns - sim_ns) <= KEPT_NS
+    near_system = bool(received_ns) and abs(stamp_ns - received_ns) <= KEPT_NS
+    if simulated and sim_ns is not None:
+        if near_sim:
+            return ""
+        if near_system:
+            return f"stamped with the system's time, while /clock says {sim_ns / 1e9:.1f} s"
+        return f"stamped {stamp_ns / 1e9:.1f} s, {_off(stamp_ns, sim_ns)} /clock"
+    if simulated or near_system or not received_ns:
+        return ""
+    if near_sim:
+        return f"stamped with simulated time ({stamp_ns / 1e9:.1f} s), unlike others"
+    if stamp_ns < _NO_DATE_NS:
+        return f"stamped {stamp_ns / 1e9:.1f} s, which is simulated time, or time since a start"
+    return f"stamped {_off(stamp_ns, received_ns)} the system's time"
+
+
+def _off(stamp_ns: int, reference_ns: int) -> str:
+    return (
+        f"{duration((reference_ns - stamp_ns) / 1e9)}"
+        f" {'behind' if stamp_ns < reference_ns else 'ahead of'}"
+    )
+
+
+def message(code: str, publisher: str, edges: str, detail: str) -> str:
+    """Return the message for stamps that repeat, go back, or are of another clock."""
+    if code == REPEATED:
+        return f"{publisher} sends {edges} with the same stamp again and again: {detail}"
+    if code == BACK:
+        return f"{publisher} stamps {edges} back in time, {detail}"
+    return f"{publisher} sends {edges} {detail}"
+
+
+def advice(code: str, detail: str) -> str:
+    """Return what to do about it."""
+    if code == REPEATED:
+        return (
+            "tf2 drops all but the first; stamp with the time of the measurement, or send when"
+            " there is a new one"
+        )
+    if code == BACK:
+        return (
+            "tf2 sorts it in behind newer ones, or drops it; was a bag or a simulation started"
+            " again, or a clock set?"
+        )
+    if detail == "without a stamp":
+        simulated = "a node with use_sim_time stamps 0 while nothing publishes /clock"
+        return f"{simulated}; otherwise set header.stamp from the node's clock"
+    apart = "no lookup can combine it with the rest"
+    if "simulated" in detail or "/clock" in detail:
+        return f"{apart}: use_sim_time must be the same for all nodes, and agree with ros.clock"
+    return f"{apart}: is a bag played without --clock, or a machine's clock not in sync?"
+
+
+# Message by message.
+
+
+@dataclass(slots=True)
+class Clocks:
+    """What time it is: the system's time when a message came, and the newest on /clock (None: nothing came yet).
+
+    ``sent`` says whether anybody is there who could send it.
+    """
+
+    simulated: bool
+    sim_ns: int | None = None
+    sent: bool = True
+    _moved: float = 0.0
+    _since: tuple[float, int] | None = None
+    _speed: float = 1.0
+
+    def take(self, sim_ns: int | None, now: float) -> None:
+        """Take the newest time on /clock, and when that was."""
+        self._moved = self._moved if sim_ns == self.sim_ns else now
+        self.sim_ns = sim_ns
+        if sim_ns is None:
+            return
+        if self._since is None or sim_ns < self._since[1]:
+            self._since = (now, sim_ns)
+        elif now - self._since[0] >= SPEED_OVER_S:
+            self._speed = self._passed(now)
+            self._since = (now, sim_ns)
+
+    def stands(self, now: float) -> bool:
+        """Return whether time came and has stopped: no node sends anything then, and none counts as silent."""
+        return (
+            self.simulated
+            and self.sent
+            and self.sim_ns is not None
+            and now - self._moved > STANDS_S
+        )
+
+    def speed(self, now: float) -> float:
+        """Return how many seconds go by on /clock in a second, 1 at most: the least of what is, and was a while ago."""
+        enough = self._since is not None and now - self._since[0] >= SPEED_OVER_S / 4
+        return min(self._speed, self._passed(now)) if enough else self._speed
+
+    def _passed(self, now: float) -> float:
+        """Return the speed since the last time that it was measured."""
+        begun, begun_ns = self._since or (now, 0)
+        return min(1.0, ((self.sim_ns or 0) - begun_ns) / _SECOND_NS / max(now - begun, 1e-9))
+
+    def reference_ns(self, received_ns: int) -> int | None:
+        """Return the time that stamps should have, or None if that is not known."""
+        return self.sim_ns if self.simulated else received_ns or None
+
+
+@dataclass(slots=True)
+class StampHistory:
+    """The stamps of one publisher's messages with the same edges."""
+
+    last: Sequence[int] = ()
+    repeats: int = 0
+    back: int = 0
+    wrong: int = 0
+
+    def judge(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> tuple[str, str]:
+        """Take a message's stamps and return the fault's code and what was observed; empty where all is well."""
+        last, self.last = self.last, stamps_ns
+        off = self._clock(stamps_ns, received_ns, clocks)
+        step = self._step(stamps_ns, last) if last else ("", "")
+        # Who repeats a stamp for long is off at last, and that follows from it; who has none is
+        # said to have none.
+        if off and (step[0] != REPEATED or not stamps_ns[0]):
+            return WRONG_CLOCK, off
+        return step
+
+    def _step(self, stamps_ns: Sequence[int], last: Sequence[int]) -> tuple[str, str]:
+        steps = [new - old for new, old in zip(stamps_ns, last, strict=False)]
+        least = min(steps)
+        if least > 0:
+            self.repeats, self.back = max(0, self.repeats - 1), max(0, self.back - 1)
+        elif least == 0:
+            self.repeats = min(self.repeats + REPEAT_COUNTS, 2 * REPEATS)
+            if self.repeats >= REPEATS:
+                return REPEATED, f"{stamps_ns[steps.index(0)] / 1e9:.3f} s"
+        else:
+            large = -least >= LARGE_STEP_S * _SECOND_NS
+            self.back = min(self.back + (BACK_STEPS if large else STEP_COUNTS), 2 * BACK_STEPS)
+            if self.back >= BACK_STEPS:
+                return BACK, f"by {duration(least / 1e9)}"
+        return "", ""
+
+    def _clock(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> str:
+        reference = clocks.reference_ns(received_ns)
+        if reference is None:
+            return ""
+        oldest, newest = min(stamps_ns), max(stamps_ns)
+        worst = newest if newest - reference > reference - oldest else oldest
+        if abs(worst - reference) <= KEPT_NS:
+            self.wrong = 0
+            return ""
+        self.wrong = min(self.wrong + 1, WRONG_IN_A_ROW)
+        if self.wrong < WRONG_IN_A_ROW:
+            return ""
+        return other_clock(worst, received_ns, clocks.sim_ns, simulated=clocks.simulated)
+
+
+# At the end.
+
+
+def stamp_repeated(state: TreeState) -> Iterator[Finding]:
+    """A publisher sends an edge with the same stamp again and again."""
+
+    def repeats(edge: EdgeState) -> bool:
+        return (
+            _repeats(edge) and edge.stream.stamp_ns > 0 and not _stands_with_the_clock(state, edge)
+        )
+
+    for edges in by_publisher(state, repeats):
+        stream = edges[0].stream
+        detail = f"{stream.stamp_ns / 1e9:.3f} s"
+        notes = [Note(f"{stream.stamps_repeated} of {stream.arrivals.count} messages")]
+        yield _stamp_finding(REPEATED, edges, detail, notes)
+
+
+def stamp_went_back(state: TreeState) -> Iterator[Finding]:
+    """A publisher's stamps go back in time."""
+    for edges in by_publisher(state, _went_back):
+        stream = edges[0].stream
+        now_s = _behind_newest_s(edges[0])
+        by = f", the newest is {duration(now_s)} before an earlier one" if now_s > 0 else ""
+        detail = f"{counted(stream.stamps_back, 'time')} in {stream.arrivals.count}{by}"
+        yield _stamp_finding(BACK, edges, detail)
+
+
+def wrong_clock(state: TreeState) -> Iterator[Finding]:
+    """Stamps are of another clock than the others': simulated and system time mixed, or no stamp at all."""
+    simulated = state.simulated
+    for edges in by_publisher(
+        state, lambda edge: bool(_off_clock(state, edge, simulated=simulated))
+    ):
+        where = state.where(edges[0])
+        notes = [Note(f"it runs {where}")] if where else []
+        yield _stamp_finding(
+            WRONG_CLOCK, edges, _off_clock(state, edges[0], simulated=simulated), notes
+        )
+
+
+def _stamp_finding(
+    code: str, edges: Sequence[EdgeState], detail: str, notes: Sequence[Note] = ()
+) -> Finding:
+    sentence = message(code, who(edges[0]), names_of(edges), detail)
+    severity = "error" if code == WRONG_CLOCK else "warning"
+    return finding(code, sentence, None, severity=severity, notes=notes, help=advice(code, detail))  # type: ignore[arg-type]
+
+
+def host_clock_off(state: TreeState) -> Iterator[Finding]:
+    """The clock of another machine is not this one's."""
+    machines: dict[tuple[bool, str], tuple[float, list[str]]] = {}
+    for one in state.publishers:
+        skew = state.skews_s.get(one.gid)
+        if skew is None or -SLOW_S < skew < SKEW_S or not one.node:
+            continue
+        known = machines.setdefault((skew > 0, one.where), (skew, []))[1]
+        if one.node not in known:
+            known.append(one.node)
+    for (ahead, where), (skew, nodes) in machines.items():
+        there = f" {where}" if where else ""
+        if ahead:
+            message = (
+                f"the clock of {listed(nodes)}{there} is {duration(skew)} ahead of this machine's"
+            )
+        else:
+            message = (
+                f"what {listed(nodes)}{there} sends arrives {duration(skew)} after it was sent"
+            )
+        advice = (
+            "bring the machines' clocks together (chrony, or timedatectl set-ntp true); stamps"
+            " differ by as much"
+        )
+        advice += "" if ahead else ", or the network is that slow"
+        yield finding("TF834", message, None, help=advice)
+
+
+def stamps_ahead(state: TreeState) -> Iterator[Finding]:
+    """An edge's stamps are ahead of time."""
+
+    def ahead(edge: EdgeState) -> bool:
+        most = edge.timing.most_delay_s
+        skewed = state.skews_s.get(edge.stream.gid or b"", 0.0) >= SKEW_S
+        localised = edge.parent.rpartition("/")[2] in LOCALISED_IN
+        least = FORWARD_S if localised else AHEAD_S
+        return most is not None and -KEPT_S <= most <= -least and not skewed
+
+    for edges in by_publisher(state, ahead):
+        ahead_s = -(edges[0].timing.delay_s or 0.0)
+        message = f"{who(edges[0])} stamps {names_of(edges)} {duration(ahead_s)} ahead of time"
+        advice = (
+            "lookups at the current time get an older pose; is its clock ahead, or its time offset"
+            " too large?"
+        )
+        yield finding("TF835", message, None, severity="warning", help=advice)
+
+
+def clock_missing(state: TreeState) -> Iterator[Finding]:
+    """Nodes wait for simulated time, and it does not come."""
+    for topic in state.graph:
+        if topic.name != "/clock" or not (
+            topic.readers or (state.plan and state.plan.ros.clock == "sim")
+        ):
+            continue
+        users = (
+            f"{listed(topic.readers)} {'use' if len(topic.readers) > 1 else 'uses'} simulated time"
+        )
+        users = users if topic.readers else "the plan's clock is sim"
+        if not topic.publishers:
+            message = f"{users}, and nobody publishes /clock"
+            advice = "start the simulator, play the bag with --clock, or set use_sim_time: false"
+            yield finding("TF836", message, None, help=advice)
+        elif not state.clock_moves:
+            stuck = (
+                "has sent nothing"
+                if state.clock_ns is None
+                else f"is stuck at {state.clock_ns / 1e9:.3f} s"
+            )
+            message = f"{users}, and /clock from {listed(topic.publishers)} {stuck}"
+            yield finding(
+                "TF836", message, None, help="is the simulator paused, or the bag at its end?"
+            )
+
+
+def two_clocks(state: TreeState) -> Iterator[Finding]:
+    """Two nodes publish the time."""
+    for topic in state.graph:
+        if topic.name == "/clock" and len(topic.publishers) > 1:
+            message = (
+                f"/clock is published by {' and by '.join(sorted(topic.publishers))}: time jumps"
+                " back and forth"
+            )
+            yield finding(
+                "TF837",
+                message,
+                None,
+                help="end one: a second simulator, or a bag that is played with --clock",
+            )
+
+
+def by_publisher(
+    state: TreeState, is_so: Callable[[EdgeState], bool]
+) -> Iterator[list[EdgeState]]:
+    """Give the moving edges of which something is so, those of one publisher together."""
+    found: dict[object, list[EdgeState]] = {}
+    for edge in state.moving:
+        if is_so(edge):
+            found.setdefault(edge.stream.gid or edge.nodes, []).append(edge)
+    yield from found.values()
+
+
+def names_of(edges: Sequence[EdgeState]) -> str:
+    """Return the first edge by name, and how many more there are."""
+    return with_more(edges[0].name, len(edges) - 1)
+
+
+def _many(edge: EdgeState, number: int) -> bool:
+    return number >= FEWEST and number >= PART * edge.stream.arrivals.count
+
+
+def _repeats(edge: EdgeState) -> bool:
+    return _many(edge, edge.stream.stamps_repeated)
+
+
+def _stands_with_the_clock(state: TreeState, edge: EdgeState) -> bool:
+    """Whether its stamps are those of a /clock that stands, which is a finding of its own."""
+    return (
+        state.clock_ns is not None
+        and not state.clock_moves
+        and abs(edge.stream.stamp_ns - state.clock_ns) <= CLOCK_STEP_S * _SECOND_NS
+    )
+
+
+def _went_back(edge: EdgeState) -> bool:
+    return _many(edge, edge.stream.stamps_back) or (
+        edge.stream.stamps_back > 0 and _behind_newest_s(edge) >= LARGE_STEP_S
+    )
+
+
+def _behind_newest_s(edge: EdgeState) -> float:
+    return (edge.stream.newest_ns - edge.stream.stamp_ns) / 1e9
+
+
+def least_delay_s(edge: EdgeState) -> float:
+    """Return the least age of a stamp when it came; a repeated stamp only grows old."""
+    least = edge.timing.least_delay_s
+    return 0.0 if least is None or _repeats(edge) else least
+
+
+def _off_clock(state: TreeState, edge: EdgeState, *, simulated: bool) -> str:
+    """Return how the stamps are not of the clock that the others have, or nothing."""
+    stream = edge.stream
+    if stream.stamp_ns and _many(edge, stream.stamps_repeated):
+        return ""  # it is off at last, which follows
+    return other_clock(
+        stream.stamp_ns, stream.arrivals.last_ns, state.clock_ns, simulated=simulated
+    )

@@ -1,0 +1,474 @@
+"""Compares a plan with what was observed, a running tree or a recording, edge by edge.
+
+What is fixed is compared by value: what tfcompose publishes itself, what another owner sends on
+/tf_static with a pose that the robot says, and of a joint what its motion leaves as it is. Frames
+inside a sensor that its driver publishes may be calibrated: they are compared as far as the preset
+says how well it knows them.
+
+``verify`` has a verdict for each edge; the doctor reports differences of one kind and one
+publisher together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, Note, did_you_mean
+from tfcompose.foundation.geometry import Offset, Pose, offset_of
+from tfcompose.foundation.text import listed
+from tfcompose.guard.verdict.drivers import (
+    Expected,
+    driver_pose_differs,
+    drives_of,
+    expected_of,
+    is_fixed,
+    is_off,
+)
+from tfcompose.guard.verdict.ownership import (
+    SELF,
+    Violation,
+    code_of,
+    may_be_owners,
+    relays_of,
+    sensor_of,
+    violation_finding,
+)
+from tfcompose.guard.verdict.publishers import SAME_POSE, flooded, pose_differs
+from tfcompose.guard.verdict.rates import left, never_received, silent, slow
+from tfcompose.guard.verdict.tree import rejected_transforms
+from tfcompose.model.plan import SLOW_BELOW
+from tfcompose.model.plan.stock import stand_ins
+from tfcompose.model.plan.topics import parts_of
+from tfcompose.tf.live.state import TreeState
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from tfcompose.foundation.catalogue import Severity
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.plan import Plan, PlanEdge
+    from tfcompose.tf.live.edges import EdgeState, TreeObserver
+
+    Topics = tuple[str, str]
+    Group = Sequence["Difference"]
+
+#: A rate is judged from so many messages on.
+FEWEST = 4
+#: How long a publisher may stay without a name before it is judged all the same.
+NAMELESS_S = 0.7
+#: Of poses that are off so many are listed.
+MOST_POSES = 6
+_TURNING = frozenset({"revolute", "continuous"})
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One thing that is wrong with one edge.
+
+    ``edge`` is the planned one, None where nobody declared it, ``live`` what came, None where
+    nothing did. What else there is depends on the code: an ``violation``; a ``driver``'s frame
+    that is elsewhere; how far a pose is ``off``, whoever sent it; the ``silence_s`` in which
+    nothing came, which are ``over`` or not.
+    """
+
+    code: str
+    edge: PlanEdge | None
+    live: EdgeState | None = None
+    violation: Violation | None = None
+    driver: Expected | None = None
+    off: Offset | None = None
+    silence_s: float = 0.0
+    over: bool = False
+
+
+def differences(state: TreeState, plan: Plan, tolerance: Offset = SAME_POSE) -> list[Difference]:
+    """Return what differs from the plan: edge by edge in its order, then what is not in it."""
+    comparison = _Comparison(state, plan, tolerance)
+    planned = [one for edge in plan.edges for one in comparison.of_planned(edge)]
+    return [*planned, *comparison.undeclared()]
+
+
+@dataclass
+class _Comparison:
+    state: TreeState
+    plan: Plan
+    tolerance: Offset
+    _relays: frozenset[str] = field(init=False)
+    _stand_ins: dict[str, frozenset[str]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._relays = relays_of(self.plan)
+        present = {
+            node for one in self.state.edges if one.present is not False for node in one.nodes
+        }
+        others = stand_ins(self.plan)
+        # The stock nodes that may send an edge in its owner's place, where that is not there; by
+        # the edge's child.
+        self._stand_ins = {
+            edge.child: others[edge.child]
+            for edge in self.plan.edges
+            if edge.child in others and edge.node not in present
+        }
+
+    @cached_property
+    def by_child(self) -> dict[str, list[EdgeState]]:
+        found: dict[str, list[EdgeState]] = {}
+        for one in self.state.edges:
+            found.setdefault(one.child, []).append(one)
+        return found
+
+    @cached_property
+    def drivers(self) -> dict[str, Expected]:
+        return expected_of(self.plan)
+
+    def of_planned(self, edge: PlanEdge) -> Iterator[Difference]:
+        some = self.by_child.get(edge.child, [])
+        for one in some:
+            yield from self._violation(edge, one)
+            yield from self._value(edge, one)
+        yield from self._twice(edge, some)
+        hanging = [one for one in some if one.parent != edge.child]
+        if not hanging:
+            yield Difference("TF811", edge)
+        owners = [
+            one
+            for one in hanging
+            if edge.may_hang_on(one.parent) and (not one.nodes or self._may_own(edge, one))
+        ]
+        if owners:  # one that was started again is judged by what came last
+            newest = max(
+                owners, key=lambda one: (one.present is not False, one.stream.arrivals.last_ns)
+            )
+            yield from _times(edge, newest, simulated=self.plan.ros.clock == "sim")
+
+    def undeclared(self) -> Iterator[Difference]:
+        planned = {edge.child for edge in self.plan.edges}
+        for one in self.state.edges:
+            stream = one.stream
+            if stream.child in planned or self.plan.may_be_undeclared(stream.parent, stream.child):
+                continue
+            yield self._violated("TF803", None, one)
+
+    def _violation(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
+        stream = one.stream
+        if stream.parent == stream.child:
+            yield self._violated(SELF, edge, one)
+            return
+        unknown = not one.nodes and (self.state.recorded or one.known_s < NAMELESS_S)
+        owner, sure = unknown or self._may_own(edge, one), unknown or len(one.nodes) == 1
+        code = code_of(edge, stream.parent, static=stream.static, owner=owner, sure=sure)
+        if code:
+            off = (
+                self._off(edge, stream.pose)
+                if code == "TF801" and stream.rejected_row is not stream.row
+                else None
+            )
+            found = self._violated(code, edge, one)
+            yield (
+                replace(found, off=off)
+                if off is not None and off.beyond(self.tolerance)
+                else found
+            )
+
+    def _violated(
+        self, code: str, edge: PlanEdge | None, one: EdgeState, *, namesake: bool = False
+    ) -> Difference:
+        stream = one.stream
+        violation = Violation(
+            code, stream.parent, stream.child, one.nodes, stream.static, edge,
+            namesake=namesake, recorded=self.state.recorded,
+        )  # fmt: skip
+        return Difference(code, edge, one, violation)
+
+    def _twice(self, edge: PlanEdge, some: Sequence[EdgeState]) -> Iterator[Difference]:
+        """Judge publishers that all have the owner's name: there is one too many."""
+        namesakes: dict[bytes | None, EdgeState] = {}
+        for one in sorted(some, key=lambda one: one.stream.first_ns):
+            if one.nodes == (edge.node,) and one.present and edge.may_hang_on(one.parent):
+                namesakes.setdefault(one.stream.gid, one)
+        of_kind = [
+            one
+            for one in namesakes.values()
+            if one.stream.static == next(iter(namesakes.values())).stream.static
+        ]
+        for other in of_kind[1:]:
+            yield self._violated("TF801", edge, other, namesake=True)
+
+    def _may_own(self, edge: PlanEdge, one: EdgeState) -> bool:
+        return may_be_owners(
+            edge, one.nodes, self._relays | self._stand_ins.get(edge.child, frozenset())
+        )
+
+    def _value(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
+        stream = one.stream
+        if stream.rejected_row is stream.row or not edge.may_hang_on(stream.parent):
+            return
+        if one.nodes and not self._may_own(edge, one):
+            return  # somebody else's value is reported with who it is
+        driver = self.drivers.get(edge.child)
+        if driver is not None:
+            if is_off(driver, stream.pose):
+                yield Difference("TF828", edge, one, driver=driver)
+            return
+        off = self._off(edge, stream.pose)
+        if off is not None and off.beyond(self.tolerance):
+            yield Difference("TF846", edge, one, off=off)
+
+    def _off(self, edge: PlanEdge, pose: Pose) -> Offset | None:
+        """Return how far the pose is from what is fixed of it, None where nothing is."""
+        off = offset_of(edge.pose, pose)
+        if edge.joint is not None:
+            if edge.joint.type in _TURNING:
+                return Offset(off.xyz_m, 0.0)
+            return Offset(0.0, off.rot_rad) if edge.joint.type == "prismatic" else None
+        owner = self.plan.process(edge.owner)
+        return off if is_fixed(edge, owner) else None
+
+
+def _times(edge: PlanEdge, one: EdgeState, *, simulated: bool) -> Iterator[Difference]:
+    """Judge whether it comes, and often enough; a simulation may go slower than the time of day."""
+    rate, limit_s = edge.rate, edge.silent_after_s
+    if one.present is False:
+        yield Difference("TF804", edge, one, silence_s=one.age_s)
+        return
+    if one.stream.static or rate is None or limit_s is None:
+        return
+    speed = min(1.0, one.stream.speed) if simulated else 1.0
+    limit_s /= speed
+    gap_s, observed_rate = one.timing.longest_gap_s, one.timing.rate
+    if one.age_s > limit_s:
+        yield Difference("TF804", edge, one, silence_s=one.age_s)
+    elif gap_s is not None and gap_s > limit_s:
+        yield Difference("TF804", edge, one, silence_s=gap_s, over=True)
+    elif (
+        observed_rate is not None
+        and one.stream.arrivals.count >= FEWEST
+        and observed_rate < SLOW_BELOW * rate * speed
+    ):
+        yield Difference("TF805", edge, one)
+
+
+def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
+    """Return what to do about an edge that never came."""
+    planned = {one.child for one in plan.edges}
+    strangers = [one.child for one in state.edges if one.child not in planned]
+    meant = did_you_mean(edge.child, strangers)
+    if meant or state.recorded:
+        return meant
+    if edge.node in state.nodes:
+        return (
+            f"{edge.node} is running and sends nothing: what does it wait for, and is its TF"
+            " switched on?"
+        )
+    kind = next((process.kind for process in plan.processes if process.name == edge.owner), "")
+    if kind == "external":
+        return (
+            f"no node {edge.node} was found: start it, or correct node: of the process"
+            f" {edge.owner}"
+        )
+    return f"no node {edge.node} was found: is the robot running? tfcompose ps"
+
+
+# Differences as findings.
+
+
+def grouped(found: Iterable[Difference]) -> list[list[Difference]]:
+    """Return those that are reported together, in the order in which the first of each came."""
+    groups: dict[tuple[object, ...], list[Difference]] = {}
+    for one in found:
+        groups.setdefault(_key(one), []).append(one)
+    return list(groups.values())
+
+
+def group_finding(
+    group: Group,
+    state: TreeState,
+    plan: Plan,
+    place: Span | None = None,
+    slow_is: Severity = "warning",
+) -> Finding:
+    """Return the finding for differences of one group; ``place`` is where the first edge is in the robot's file."""
+    first = group[0]
+    found = (
+        _violation_finding(group, state, plan, place)
+        if first.violation
+        else _difference_finding(group, state, plan, place, slow_is)
+    )
+    # Of a recording nobody can mend what its nodes did.
+    return (
+        replace(found, help="")
+        if state.recorded and first.code in {"TF804", "TF805", "TF846"}
+        else found
+    )
+
+
+def _difference_finding(
+    group: Group, state: TreeState, plan: Plan, place: Span | None, slow_is: Severity
+) -> Finding:
+    first = group[0]
+    edges = [one.edge for one in group if one.edge is not None]
+    if first.live is None:
+        return never_received(edges, missing_help(state, plan, edges[0]), place)
+    stream = first.live.stream
+    if first.driver is not None:
+        off = [
+            (one.driver, one.live.stream.pose)
+            for one in group
+            if one.driver is not None and one.live is not None
+        ]
+        return driver_pose_differs(first.live.publisher, off, place)
+    if first.off is not None:
+        return _poses(group, place)
+    if first.code == "TF805":
+        return slow(
+            edges, min(one.live.timing.rate or 0.0 for one in group if one.live), place, slow_is
+        )
+    if stream.static:
+        return left(edges, place)
+    gone = first.live.present is False
+    return silent(edges, max(one.silence_s for one in group), place, over=first.over, gone=gone)
+
+
+def _key(one: Difference) -> tuple[object, ...]:
+    if one.violation is not None:
+        owner = one.edge.owner if one.edge else None
+        return (
+            one.code,
+            one.violation.who,
+            owner,
+            one.violation.static if one.code == "TF809" else None,
+        )
+    if one.edge is None:
+        return (one.code,)
+    edge = one.edge
+    sensor = one.driver.driven.sensor if one.driver else None
+    rate = edge.rate if one.code in {"TF804", "TF805"} else None
+    return (
+        one.code,
+        edge.owner,
+        rate,
+        one.over,
+        sensor,
+        one.live.publisher if one.off and one.live else None,
+    )
+
+
+def _violation_finding(group: Group, state: TreeState, plan: Plan, place: Span | None) -> Finding:
+    violations = [one.violation for one in group if one.violation is not None]
+    first = group[0]
+    where = state.where(first.live) if first.live else ""
+    found = violation_finding(
+        violations, plan, where, sensor_of(violations[0], drives_of(plan)), place
+    )
+    found = replace(found, notes=(*found.notes, *_elsewhere(group)))
+    if not violations[0].namesake:
+        return found
+    gid = first.live.stream.gid if first.live else None
+    others = [
+        one
+        for one in state.publishers
+        if one.node in violations[0].nodes and one.gid != gid and one.where
+    ]
+    notes = [Note(f"{one.node} runs {one.where}") for one in others]
+    return replace(found, notes=(*found.notes, *dict.fromkeys(notes)))
+
+
+def _elsewhere(group: Group) -> list[Note]:
+    """Return how far the poses are off that came from a node other than the owner."""
+    off = [(one.violation, one.off) for one in group if one.violation and one.off]
+    notes = [
+        Note(f"its pose of {what.child} in {what.parent} is off by {far.text}")
+        for what, far in off[:MOST_POSES]
+    ]
+    return (
+        [*notes, Note(f"and {len(off) - len(notes)} more are off")]
+        if len(off) > len(notes)
+        else notes
+    )
+
+
+def _poses(group: Group, place: Span | None) -> Finding:
+    off = [
+        (one.edge, one.live.parent, one.live.stream.pose) for one in group if one.edge and one.live
+    ]
+    publisher = group[0].live.publisher if group[0].live else ""
+    return pose_differs(off, publisher, place)
+
+
+# Of a whole plan.
+
+
+def differs_from_plan(state: TreeState) -> Iterator[Finding]:
+    """What is published differs from the plan."""
+    if state.plan is None or not (state.edges or state.publishers):
+        return  # nobody publishes at all, which is another finding
+    found = [
+        one for one in differences(state, state.plan) if one.code != SELF
+    ]  # found for every edge, planned or not
+    for group in grouped(found):
+        yield group_finding(group, state, state.plan)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What is wrong with an edge, nothing if all is as expected; ``owner`` is None where nobody declared it."""
+
+    edge: str
+    owner: str | None
+    found: tuple[Finding, ...]
+
+
+def verify(
+    plan: Plan,
+    observers: Mapping[Topics, TreeObserver],
+    tolerance: Offset,
+    places: Mapping[str, Span] | None = None,
+) -> list[Verdict]:
+    """Return a verdict for each planned edge, in the plan's order, then one for each edge that is not in the plan.
+
+    ``places`` is where the edges stand in the robot's file, by child.
+    """
+    found: dict[str, list[Finding]] = {edge.child: [] for edge in plan.edges}
+    extra = []
+    for topics, part in parts_of(plan).items():
+        state = state_of(observers[topics], topics)
+        for edge in state.edges:
+            if edge.stream.rejected is not None and edge.child in found:
+                found[edge.child] += rejected_transforms(edge)
+        for one in differences(state, part, tolerance):
+            # The parts of a plan differ in their edges only; a process is looked up in the whole.
+            place = (places or {}).get(one.edge.child) if one.edge else None
+            reported = group_finding([one], state, plan, place, slow_is="error")
+            if one.edge is None and one.live is not None:
+                extra.append(Verdict(one.live.name, None, (reported,)))
+            elif one.edge is not None:
+                found[one.edge.child].append(reported)
+        extra += [Verdict(listed(state.topics), None, (one,)) for one in flooded(state)]
+    return [
+        *(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges),
+        *extra,
+    ]
+
+
+def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
+    """Return what an observer has received on the topics (moving, fixed)."""
+    return TreeState(
+        max(0, observer.until_ns - observer.begun_ns) / 1e9,
+        topics,
+        tuple(observer.edges(observer.until_ns)),
+        tuple(observer.publishers.known.values()),
+        observer.nodes,
+        beyond=dict(observer.beyond),
+        recorded=observer.recorded,
+    )
+
+
+def summary(verdicts: Sequence[Verdict]) -> str:
+    """Return one line: how many edges are as expected, and how many are not declared."""
+    planned = [one for one in verdicts if one.owner is not None]
+    right = sum(not one.found for one in planned)
+    extra = len(verdicts) - len(planned)
+    more = f", {extra} that nobody declared" if extra else ""
+    return f"{right} of {len(planned)} edges as expected{more}"

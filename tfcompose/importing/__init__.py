@@ -1,8 +1,0 @@
-"""Turns what robots are described and started by into the text of a robot file, for ``tfcompose import``.
-
-Of a URDF, ``sensors`` recognises presets, ``omitted`` lists what a robot file cannot hold, and ``robot_file`` writes
-the text. Readers of what starts processes (``shell``, ``launch``) fill a ``draft``, in which ``programs`` have their
-entries. Launch files are read in a process of its own (``launch_process``): by ROS's launch where it is installed, with
-``launch_recorder``, and elsewhere by a stand-in of its API. Both give the same records.
-Must not import ``cli``, ``emit``, ``plan``.
-"""

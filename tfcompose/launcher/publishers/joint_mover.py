@@ -1,0 +1,249 @@
+"""From joint states to TF messages, bytes to bytes; unusable joint states are reported and left out.
+
+The pose of a joint's edge is its pose at 0 followed by the motion (URDF). For a turn about the
+unit axis a that is p₀, q₀·(a sin q/2, cos q/2) = cos q/2 · q₀ + sin q/2 · q₀·(a, 0); for a slide
+p₀ + q · R₀a, q₀. Both are linear in what the position gives, so that no joint is computed by
+itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tfcompose.foundation.geometry import multiply, rotate
+from tfcompose.launcher.publishers.mimics import SLIDING, TURNING, Joints
+from tfcompose.tf.ros.joint_codec import read_names
+from tfcompose.tf.ros.tf_codec import ArrayTemplate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from tfcompose.launcher.publishers.mimics import Followed
+    from tfcompose.model.plan import Joint, PlanEdge
+    from tfcompose.tf.ros.joint_codec import Names
+
+_SECOND_NS = 1_000_000_000
+# Joint states come with one list of names from each driver; one that never repeats itself must not
+# fill the memory.
+_MOST_SOURCES = 64
+# Faults are reported once by their sentence, which may hold a name; at most so many.
+_MOST_LINES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class PublishOptions:
+    """How joint states are published; the words are robot_state_publisher's.
+
+    ``publish_frequency`` in Hz is the most of those with the same names, or 0 for all.
+    ``ignore_timestamp`` says that they are published whatever their time is: also when it is the
+    last one's, or their frequency too high.
+    """
+
+    publish_frequency: float = 0.0
+    ignore_timestamp: bool = False
+
+
+@dataclass(slots=True)
+class _Source:
+    """Joint states with the same names, and when the last of them was published, in nanoseconds of their own time."""
+
+    names: Names
+    moving: Moving | None
+    last_ns: int | None = None
+    due_ns: int = 0
+
+
+class JointMover:
+    """The moving edges of a plan.
+
+    ``say`` is given lines for people. ``now_ns`` gives the time for a message without a stamp,
+    from its arrival in nanoseconds, or None as long as there is none: messages that are sent by
+    hand often have no stamp.
+    """
+
+    def __init__(
+        self,
+        edges: Sequence[PlanEdge],
+        say: Callable[[str], None],
+        now_ns: Callable[[int], int | None],
+        options: PublishOptions | None = None,
+    ) -> None:
+        pairs = [(edge, edge.joint) for edge in edges if edge.joint]
+        movable = [(edge, joint) for edge, joint in pairs if joint.type in TURNING + SLIDING]
+        self._edges = [edge for edge, _ in movable]
+        self._all_joints = [joint for _, joint in movable]
+        self._joints = Joints(self._all_joints)
+        self._say = say
+        self._now_ns = now_ns
+        options = options or PublishOptions()
+        self._ignores_time = options.ignore_timestamp
+        self._period_ns = (
+            round(_SECOND_NS / options.publish_frequency) if options.publish_frequency else 0
+        )
+        self._sources: list[_Source] = []
+        self._reported: set[str] = set()
+        self._moved: set[int] = set()
+        for edge, joint in pairs:
+            if joint.type not in TURNING + SLIDING:
+                say(
+                    f"{edge.name} is not published: a {joint.type} joint has no single position in"
+                    " joint states"
+                )
+
+    def __len__(self) -> int:
+        return len(self._edges)
+
+    @property
+    def missing(self) -> list[str]:
+        """The joints that no joint state has moved yet; not those that follow one of them."""
+        names = {
+            joint.name for index, joint in enumerate(self._all_joints) if index not in self._moved
+        }
+        return [
+            joint.name
+            for joint in self._all_joints
+            if joint.name in names and joint.mimic not in names
+        ]
+
+    def tf_message(self, data: bytes, received_ns: int) -> bytes | None:
+        """Return what a joint state says as a TFMessage, or None where it says nothing or is left out."""
+        try:
+            source = self._source(data)
+            if source.moving is None:
+                return None
+            positions = source.names.positions(data)
+            stamp_ns = source.names.stamp_ns(data) or self._now_ns(received_ns)
+            if stamp_ns is None or not self._is_due(source, stamp_ns):
+                return None
+            return source.moving.message(positions, stamp_ns)
+        except ValueError as error:
+            self._once(f"dropped a joint state: {error} (reported once)")
+            return None
+
+    def _source(self, data: bytes) -> _Source:
+        for source in self._sources:
+            if source.names.fit(data):
+                return source
+        names = read_names(data)
+        names.positions(data)
+        for source in self._sources:
+            if (
+                source.names.names == names.names
+            ):  # with another frame, or other bytes between the names
+                source.names = names
+                return source
+        if len(self._sources) >= _MOST_SOURCES:
+            self._sources.clear()
+        followed = self._joints.followed(names.names)
+        moving = Moving(self._edges, self._all_joints, followed, names.names) if followed else None
+        self._moved |= {one.joint for one in followed}
+        self._sources.append(_Source(names, moving))
+        return self._sources[-1]
+
+    def _is_due(self, source: _Source, stamp_ns: int) -> bool:
+        """Whether a joint state of this time is published, and note that it is.
+
+        tf2 takes the first transform of one time only, and every listener warns of the others. A
+        time before the last one is a recording that starts anew, or a second source, and is
+        published: tf2 sorts.
+        """
+        if self._ignores_time:
+            return True
+        if stamp_ns == source.last_ns:
+            self._once(
+                "left out a joint state with the same time as the one before (reported once)"
+            )
+            return False
+        # Half a period early is in time: the next one is due a period after this one was, so that
+        # a source's jitter leaves nothing out and the mean stays.
+        early_ns = source.due_ns - self._period_ns // 2
+        if self._period_ns and source.last_ns is not None and source.last_ns < stamp_ns < early_ns:
+            hertz = _SECOND_NS / self._period_ns
+            self._once(
+                f"joint states come with more than {hertz:g} Hz: some are left out, as"
+                " publish_frequency says"
+            )
+            return False
+        behind = (
+            source.last_ns is None
+            or stamp_ns < source.last_ns
+            or stamp_ns - source.due_ns > self._period_ns
+        )
+        source.due_ns = (stamp_ns if behind else source.due_ns) + self._period_ns
+        source.last_ns = stamp_ns
+        return True
+
+    def _once(self, line: str) -> None:
+        if line not in self._reported and len(self._reported) < _MOST_LINES:
+            self._reported.add(line)
+            self._say(line)
+
+
+class Moving:
+    """The edges that joint states with one list of names move, as one message.
+
+    ``edges`` and ``joints`` are in the order of the indices in ``followed``; positions are in rad,
+    or m for a prismatic joint.
+    """
+
+    def __init__(
+        self,
+        edges: Sequence[PlanEdge],
+        joints: Sequence[Joint],
+        followed: Sequence[Followed],
+        names: Sequence[str],
+    ) -> None:
+        ordered = sorted(followed, key=lambda one: joints[one.joint].type in SLIDING)
+        self._names = [names[one.column] for one in ordered]
+        self._columns = np.array([one.column for one in ordered], np.intp)
+        self._multiplier = np.array([one.multiplier for one in ordered])
+        self._offset = np.array([one.offset for one in ordered])
+        self._follows = any((one.multiplier, one.offset) != (1.0, 0.0) for one in ordered)
+        moved = [(edges[one.joint], joints[one.joint]) for one in ordered]
+        self._turning = turning = sum(joint.type not in SLIDING for _, joint in moved)
+        self._message = ArrayTemplate(
+            [(e.parent, e.child) for e, _ in moved], [e.pose for e, _ in moved]
+        )
+        # One row a component and one column a joint: numpy is fast along long rows.
+        self._quat_at = self._message.quat_at[:turning].T.copy()
+        self._xyz_at = self._message.xyz_at[turning:].T.copy()
+        poses = [(edge.pose, joint.axis) for edge, joint in moved]
+        rotating, sliding = poses[:turning], poses[turning:]
+        self._at_0 = _columns([pose.quat_xyzw for pose, _ in rotating], 4)
+        self._turned = _columns(
+            [multiply(pose.quat_xyzw, (*axis, 0.0)) for pose, axis in rotating], 4
+        )
+        self._start = _columns([pose.xyz for pose, _ in sliding], 3)
+        self._along = _columns([rotate(pose.quat_xyzw, axis) for pose, axis in sliding], 3)
+
+    def message(self, positions: NDArray[np.float64], stamp_ns: int) -> bytes:
+        """Return the TFMessage for these positions, in the order of the names, at this time in nanoseconds.
+
+        Raises:
+            ValueError: with a sentence that is the same for the same fault, if a position is not
+            finite or a message
+                cannot hold the time.
+        """
+        q = positions[self._columns].astype(np.float64, copy=False)
+        if not np.isfinite(q).all():
+            name = self._names[int(np.argmin(np.isfinite(q)))]
+            raise ValueError(f"the position of {name} is not finite")
+        if self._follows:
+            q = q * self._multiplier + self._offset
+        doubles, turning = self._message.doubles, self._turning
+        if turning:
+            half = 0.5 * q[:turning]
+            doubles[self._quat_at] = np.cos(half) * self._at_0 + np.sin(half) * self._turned
+        if turning < len(q):
+            doubles[self._xyz_at] = self._start + q[turning:] * self._along
+        return self._message.data(stamp_ns)
+
+
+def _columns(columns: Sequence[tuple[float, ...]], height: int) -> NDArray[np.float64]:
+    made: NDArray[np.float64] = np.array(columns, np.float64).reshape(-1, height).T.copy()
+    return made

@@ -1,0 +1,105 @@
+"""The process that turns joint states into edges on /tf, and names the joints that none speaks of.
+
+``python -m tfcompose.launcher.publishers.joints PLAN_FILE PROCESS_NAME``
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.text import counted, listed
+from tfcompose.tf.process import ready, say, start, wait_for_go
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.launcher.publishers.joint_mover import JointMover
+    from tfcompose.tf.process import Own
+
+MISSING_AFTER_S = 5.0
+_NAMED_AT_MOST = 8
+
+
+def joints(own: Own, stop: Stop) -> None:
+    """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
+    # ROS, once signals are handled.
+    from tfcompose.launcher.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415
+
+    # ROS, once signals are handled.
+    from tfcompose.launcher.publishers.joint_mover import JointMover, PublishOptions  # noqa: PLC0415
+    from tfcompose.tf.ros.clock import StampClock  # noqa: PLC0415 (ROS, once signals are handled)
+
+    # ROS, once signals are handled.
+    from tfcompose.tf.ros.graph import publishing_nodes  # noqa: PLC0415
+
+    # ROS, once signals are handled.
+    from tfcompose.tf.ros.node import TFPublisher, WaitSet, open_node, parameter  # noqa: PLC0415
+
+    # ROS, once signals are handled.
+    from tfcompose.tf.ros.sensor_data import JointStateSubscription  # noqa: PLC0415
+
+    if not wait_for_go(stop):
+        return
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
+        options = PublishOptions(
+            parameter(node, "publish_frequency", 0.0),
+            parameter(node, "ignore_timestamp", default=False),
+        )
+        clock = StampClock(node, say, sim=own.plan.ros.clock == "sim")
+        mover = JointMover(own.edges, say, clock.now_ns, options)
+        publisher = TFPublisher(node, static=False)
+        description = Description(own, node)
+        states = JointStateSubscription(node)
+        at_most = (
+            f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""
+        )
+        say(f"{counted(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
+        ready()
+        missing = _Missing(mover, states.topic, lambda: publishing_nodes(node, states.topic))
+        wait_set = WaitSet(node, [states, description.subscription], stop)
+        while not stop.requested:
+            is_waiting = missing.is_waiting or clock.is_waiting or description.is_waiting
+            with_something = wait_set.wait(CHECK_EVERY_S if is_waiting else None)
+            for received in states.take() if states in with_something else ():
+                message = mover.tf_message(received.data, received.received_ns)
+                if message is not None:
+                    publisher.publish(message)
+            if description.is_waiting or description.subscription in with_something:
+                description.check()
+            missing.check()
+            clock.check()
+
+
+class _Missing:
+    """Names once, after some seconds, the joints that no joint state speaks of."""
+
+    def __init__(self, mover: JointMover, topic: str, publishers: Callable[[], list[str]]) -> None:
+        self._mover, self._topic, self._publishers = mover, topic, publishers
+        self._due = time.monotonic() + MISSING_AFTER_S
+        self.is_waiting = len(mover) > 0
+
+    def check(self) -> None:
+        if not self.is_waiting or time.monotonic() < self._due:
+            return
+        self.is_waiting = False
+        names = self._mover.missing
+        if names:
+            say(
+                f"no joint state after {MISSING_AFTER_S:g} s for {listed(names, _NAMED_AT_MOST)}:"
+                f" {self._senders()}"
+            )
+
+    def _senders(self) -> str:
+        names = self._publishers()
+        return (
+            f"{self._topic} comes from {', '.join(names)}"
+            if names
+            else f"nobody publishes {self._topic}"
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(start(sys.argv[1:], "joints", joints))

@@ -1,0 +1,71 @@
+"""The process that latches the fixed edges on /tf_static, and the description where nobody else sends it.
+
+``python -m tfcompose.launcher.publishers.static PLAN_FILE PROCESS_NAME``
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.text import counted
+from tfcompose.tf.process import ready, say, start, wait_for_go
+from tfcompose.tf.ros.tf_codec import Transform, encode
+
+if TYPE_CHECKING:
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.tf.process import Own
+
+
+def static(own: Own, stop: Stop) -> None:
+    """Latch all fixed edges in one message on /tf_static, and the description where no joints process does."""
+    # ROS, once signals are handled.
+    from tfcompose.launcher.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415
+
+    # ROS, once signals are handled.
+    from tfcompose.tf.ros.node import TFPublisher, open_node, wait  # noqa: PLC0415
+
+    if not wait_for_go(stop):
+        return
+    # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may not
+    # have begun.
+    stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
+    edges = [
+        Transform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges
+    ]
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
+        publisher = TFPublisher(node, static=True)
+        if edges:
+            publisher.publish(encode(edges))
+        say(
+            f"{counted(len(edges), 'edge')} on /tf_static"
+            if edges
+            else "the description; no edge is fixed"
+        )
+        ready()
+        if _joints_of(own) in {
+            process.name
+            for process in own.plan.processes
+            if process.kind in ("joints", "external")
+        }:
+            stop.wait(None)
+            return
+        description = Description(own, node)
+        while not stop.requested:
+            wait(
+                node,
+                [description.subscription],
+                CHECK_EVERY_S if description.is_waiting else None,
+                stop,
+            )
+            description.check()
+
+
+def _joints_of(own: Own) -> str:
+    """Return the name of the process that sends the description in this one's place, where there is one."""
+    return f"{own.process.name.removesuffix('static')}joints"
+
+
+if __name__ == "__main__":
+    sys.exit(start(sys.argv[1:], "static", static))

@@ -1,0 +1,114 @@
+"""Files that tfcompose writes: their text, and how they address meshes and textures."""
+
+from __future__ import annotations
+
+import html
+import posixpath
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+from urllib.parse import quote
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.robot import Asset, Robot
+
+Form = Literal["as-written", "package", "file", "relative"]
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A file to be written: its path below the output folder, and its text."""
+
+    path: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where the files are written, relative to where the robot's paths begin, and how they address others.
+
+    ``as-written`` keeps addresses; a relative path becomes relative to ``folder``, so that readers
+    of the written URDF find the file. ``package`` writes ``package://``, ``file`` absolute
+    ``file://`` (``top`` is the absolute folder that relative paths begin in), ``relative`` paths
+    from ``folder``.
+    """
+
+    form: Form = "as-written"
+    folder: str = "."
+    top: str = "/"
+
+    def address(self, asset: Asset) -> str:
+        """Return the address; one that cannot be had in this form is kept (``unaddressed`` names those)."""
+        if self.form == "package" and asset.package:
+            return f"package://{asset.package}/{_quoted(asset.inside)}"
+        if self.form == "file" and asset.path:
+            return "file://" + _quoted(posixpath.normpath(posixpath.join(self.top, asset.path)))
+        plain = "://" not in asset.uri and not asset.uri.startswith("/")
+        if asset.path and (self.form == "relative" or plain):
+            return self.from_folder(asset.path)
+        return asset.uri
+
+    def from_folder(self, path: str) -> str:
+        """Return the path seen from the folder of the written files."""
+        begin = posixpath.join(self.top, self.folder)
+        return posixpath.relpath(posixpath.join(self.top, path), begin)
+
+
+AS_IN_SOURCE = Target()
+_NOT_IN_ADDRESSES = re.compile(r"[\x00-\x20\x7f#%?]")
+
+
+def _quoted(path: str) -> str:
+    """Return the path as an address has it: a space is %20.
+
+    ROS reads addresses with libcurl, which refuses spaces and takes ``#``, ``?`` and ``%`` for
+    something else. What it takes as it is stays so, since other readers decode nothing.
+    """
+    return _NOT_IN_ADDRESSES.sub(lambda found: f"%{ord(found[0]):02X}", path)
+
+
+def assets(robot: Robot) -> Iterator[Asset]:
+    """Yield the files that the robot's bodies name."""
+    for link in robot.links.values():
+        for shape in (*link.visuals, *link.collisions):
+            if shape.mesh:
+                yield shape.mesh
+            if shape.material and shape.material.texture:
+                yield shape.material.texture
+
+
+def unaddressed(robot: Robot, form: Form) -> list[Asset]:
+    """Return the files that have no address of this form: in no package, or of unknown place; each once."""
+    if form == "as-written":
+        return []
+    without = [
+        one for one in assets(robot) if not (one.package if form == "package" else one.path)
+    ]
+    return list(dict.fromkeys(one for one in without if not _elsewhere(one)))
+
+
+def _elsewhere(asset: Asset) -> bool:
+    """Whether the address is for others to resolve: http, model."""
+    return "://" in asset.uri and not asset.uri.startswith(("package://", "file://"))
+
+
+_RELATIVE = re.compile(
+    r"""(<(?:mesh|texture)\s[^<>]*?\bfilename\s*=\s*)(["'])(?!/|[A-Za-z][A-Za-z0-9+.-]*://)([^<>]+?)\2"""
+)
+
+
+def with_absolute_addresses(urdf: str, folder: Path) -> str:
+    """Return the URDF in which paths that begin in ``folder``, where it was built, are absolute ``file://`` addresses.
+
+    Who reads the description from a topic does not know that folder. Only the machine that runs
+    the plan does, so that what is built stays the same everywhere.
+    """
+
+    def absolute(found: re.Match[str]) -> str:
+        path = Path(folder, html.unescape(found[3])).resolve()
+        return f"{found[1]}{found[2]}file://{quote(str(path))}{found[2]}"
+
+    return _RELATIVE.sub(absolute, urdf)

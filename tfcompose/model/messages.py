@@ -1,0 +1,519 @@
+"""Messages between the processes of a run, as lines of JSON.
+
+The guard sends events to the launcher on a pipe, and takes orders on another; its log is for
+people. Other commands send requests to the launcher's control socket and get answers, or the
+notices that a person at ``up`` reads too.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from tfcompose.foundation.findings import Finding  # noqa: TC001 (messages are read by these types)
+from tfcompose.model.plan import LifecycleState, ProcessKind  # noqa: TC001
+from tfcompose.model.plan.codec import OMITTED, TaggedUnion, decode
+
+# Events: from the guard to the launcher.
+
+
+@dataclass(frozen=True, slots=True)
+class Clear:
+    """The look before the start is over and no planned edge was published by anybody."""
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A planned edge was published before the start: the plan must not start, or must end."""
+
+    found: Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """Edges, named by their children, were received from their owner for the first time."""
+
+    owner: str
+    children: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Silent:
+    """Edges, named by their children, that were live come no more; or, if that is ``over``, come again."""
+
+    children: tuple[str, ...]
+    over: bool
+
+
+@dataclass(frozen=True, slots=True)
+class OwnerReady:
+    """All edges of a process are live."""
+
+    process: str
+
+
+@dataclass(frozen=True, slots=True)
+class Complete:
+    """Every edge of the plan is live."""
+
+    edges: int
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A violation, once per case; ``process`` is the plan's process that did it, where it can be stopped for it."""
+
+    found: Finding
+    process: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Unfenced:
+    """A process of a strict plan sends past the fence: it must be stopped, whatever else is only reported."""
+
+    found: Finding
+    process: str
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """A case that was reported is over; the sentence says which."""
+
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class GateOpen:
+    """What a process's gate waits for is there; ``seen`` says what."""
+
+    process: str
+    seen: str
+
+
+@dataclass(frozen=True, slots=True)
+class GateShut:
+    """What a process's gate waits for is not there yet; ``seen`` says what is there instead."""
+
+    process: str
+    seen: str
+
+
+@dataclass(frozen=True, slots=True)
+class Remember:
+    """What the next guard must know, should this one die: the launcher keeps it by key and does not look into it."""
+
+    changed: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A container has loaded a component; ``number`` is that of the order."""
+
+    process: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class NotLoaded:
+    """A container has not loaded a component, for this reason; ``number`` is that of the order."""
+
+    process: str
+    number: int
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unloaded:
+    """A component is not in its container any more, or the container does not answer: then ``why`` says so."""
+
+    process: str
+    number: int
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Alive:
+    """The guard looks; it says so once a second."""
+
+
+GuardEvent = (
+    Alive
+    | Clear
+    | Taken
+    | Live
+    | Silent
+    | OwnerReady
+    | Complete
+    | Found
+    | Unfenced
+    | Recovered
+    | GateOpen
+    | GateShut
+    | Remember
+    | Loaded
+    | NotLoaded
+    | Unloaded
+)
+
+GUARD_EVENTS = TaggedUnion[GuardEvent]("event", get_args(GuardEvent))
+
+
+# Orders: from the launcher to the guard.
+
+
+@dataclass(frozen=True, slots=True)
+class Absent:
+    """A process of the plan was stopped on purpose, or ended: its silence is nobody's fault."""
+
+    process: str
+
+
+@dataclass(frozen=True, slots=True)
+class Present:
+    """A process of the plan is started, again: its edges are to be seen anew."""
+
+    process: str
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """Say when this is there: a topic with a publisher, a service, or nodes in lifecycle states.
+
+    ``topic`` and ``service`` are full names, or empty. ``nodes`` holds the lifecycle states that
+    are waited for; ``drive`` says that the guard brings them there. ``writers`` are topics whose
+    publishers are named while others look at what comes there. A gate at which nothing is to be
+    seen replaces the process's, and is not looked at.
+    """
+
+    process: str
+    topic: str = ""
+    service: str = ""
+    nodes: dict[str, LifecycleState] = field(default_factory=dict)
+    drive: bool = False
+    writers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Have a container load a component, as the file says; it is answered by ``Loaded`` or ``NotLoaded``.
+
+    The answer has the order's ``number``. ``again`` says that a guard before this one may have had
+    it loaded.
+    """
+
+    process: str
+    number: int
+    file: str
+    again: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Unload:
+    """Have a container unload a component, as the file says; it is answered by ``Unloaded``, with ``number``."""
+
+    process: str
+    number: int
+    file: str
+
+
+GuardOrder = Absent | Present | Gate | Load | Unload
+
+GUARD_ORDERS = TaggedUnion[GuardOrder]("order", get_args(GuardOrder))
+
+
+# Notices: from the launcher to a person, and to clients of its control socket.
+
+#: supervisord's states, and that of an external process; people and programs read these words.
+StateName = Literal[
+    "stopped", "starting", "running", "backoff", "stopping", "exited", "fatal", "expected"
+]
+Stream = Literal["stdout", "stderr"]
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """A line that a process wrote, without its end. A line longer than 64 KiB comes in pieces."""
+
+    process: str
+    stream: Stream
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessState:
+    """A process went into this state. ``detail`` says why, where there is more to say: "exit code 3; again in 2 s"."""
+
+    process: str
+    state: StateName
+    pid: int | None = None
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OwnerLive:
+    """All edges of an owner were received from it, ``seconds`` after the start; ``edges`` are their names."""
+
+    owner: str
+    node: str
+    edges: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessReady:
+    """A process that waited for something of its own is ready, ``seconds`` after the start; ``seen`` says by what."""
+
+    process: str
+    seen: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class AllStarted:
+    """Whatever can be started was; ``waiting`` are processes that wait for others to be ready, or done."""
+
+    started: int
+    waiting: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class StartRow:
+    """When a process was started and ready, in seconds after the start; None: it is external."""
+
+    process: str
+    started: float | None
+    ready: float
+
+
+@dataclass(frozen=True, slots=True)
+class AllReady:
+    """Every process is ready and every edge live, ``seconds`` after the start; but for those that were given up."""
+
+    rows: tuple[StartRow, ...]
+    seconds: float
+    without: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Replanned:
+    """A changed plan is followed from now on: the names of processes, and the frames that listeners will still hold."""
+
+    changed: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TreeComplete:
+    """Every edge of the plan is live, ``seconds`` after the start."""
+
+    edges: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """The edges of one owner that nobody has published yet, in the plan's order, of ``owned`` ones."""
+
+    owner: str
+    node: str
+    edges: tuple[str, ...]
+    owned: int
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Edges that nobody has published yet, by owner."""
+
+    missing: tuple[Missing, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FindingShown:
+    """Something is wrong."""
+
+    found: Finding
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveredShown:
+    """A case that was shown is over, ``seconds`` after the start."""
+
+    text: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stopping:
+    """Everything is being stopped, for this reason."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """Nothing runs any more: the last notice. ``because`` is the failure that came first, and what was said last."""
+
+    exit_code: int
+    because: tuple[str, ...] = ()
+
+
+Notice = (
+    LogLine
+    | ProcessState
+    | OwnerLive
+    | ProcessReady
+    | AllStarted
+    | AllReady
+    | Replanned
+    | TreeComplete
+    | Waiting
+    | FindingShown
+    | RecoveredShown
+    | Stopping
+    | Ended
+)
+
+NOTICES = TaggedUnion[Notice]("event", get_args(Notice))
+
+
+def notice_line(notice: Notice, at: float) -> str:
+    """Return the notice as one line of JSON, without its end; ``at`` is when, in seconds since 1970."""
+    return json.dumps(
+        {"event": "", "at": round(at, 3)} | NOTICES.encode(notice), ensure_ascii=False
+    )
+
+
+def read_notice(line: bytes) -> tuple[Notice, float]:
+    """Return the notice that ``notice_line`` wrote, and when.
+
+    Raises:
+        ValueError: if the line is none.
+    """
+    data = json.loads(line)
+    notice = NOTICES.decode(data)
+    return notice, decode(float, data.get("at"))
+
+
+# Requests: what other commands ask of the launcher, and its answers.
+
+Verb = Literal["stop", "start", "restart"]
+
+
+@dataclass(frozen=True, slots=True)
+class StatusRequest:
+    """What is known of the run? Answered by a ``RobotStatus``."""
+
+    do: Literal["ps"] = "ps"
+
+
+@dataclass(frozen=True, slots=True)
+class EventsRequest:
+    """From now on, the notices: first those that were sent already. Answered by these alone."""
+
+    do: Literal["events"] = "events"
+
+
+@dataclass(frozen=True, slots=True)
+class DownRequest:
+    """Stop everything. Answered by ``Done``."""
+
+    do: Literal["down"] = "down"
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessRequest:
+    """Stop, start or restart one process. Answered by ``Done``."""
+
+    do: Verb
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class UpdateRequest:
+    """Follow another plan: its file, and the folder that it was built in. Answered by a ``PlanChange``."""
+
+    plan: str
+    base: str
+    do: Literal["update"] = "update"
+
+
+Request = StatusRequest | EventsRequest | DownRequest | ProcessRequest | UpdateRequest
+
+REQUESTS = TaggedUnion[Request]("do", get_args(Request))
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Nothing was done, for this reason."""
+
+    error: str
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """It is being done; ``waits`` says what a process that is started waits for first."""
+
+    ok: Literal[True] = True
+    waits: str = field(default="", metadata=OMITTED)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanChange:
+    """What another plan changes: the processes that are different, new, and no more, and the fixed edges that vanish.
+
+    tf2 never forgets a fixed edge, so listeners hold those that vanish until they start anew.
+    """
+
+    changed: tuple[str, ...]
+    added: tuple[str, ...]
+    removed: tuple[str, ...]
+    held: tuple[str, ...]
+    ok: Literal[True] = True
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessStatus:
+    """One process.
+
+    ``detail`` says why it is in its state, ``waits`` what it is without, ``seen`` what is there
+    instead. ``uptime`` is in seconds; ``edges`` counts those that it owns, ``live`` those of them
+    that are received.
+    """
+
+    name: str
+    kind: ProcessKind
+    host: str | None
+    state: StateName
+    detail: str
+    required: bool | None
+    failed: bool
+    ready: bool
+    waits: str
+    seen: str
+    pid: int | None
+    uptime: float | None
+    restarts: int
+    edges: int
+    live: int
+    nodes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotStatus:
+    """All that is known of a run; ``plan`` is the digest of what it was made from, ``uptime`` is in seconds."""
+
+    robot: str
+    host: str | None
+    launcher: int
+    plan: str
+    uptime: float
+    complete: bool
+    ready: bool
+    stopping: bool
+    missing: tuple[str, ...]
+    silent: tuple[str, ...]
+    processes: tuple[ProcessStatus, ...]

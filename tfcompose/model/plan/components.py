@@ -1,0 +1,85 @@
+"""What a container is asked to load, as the launcher and the guard know it.
+
+Names are those of rclcpp_components (ROS 2 Jazzy): a container offers ``~/_container/load_node``
+and others beside it. A component takes nothing from the container's command line, so that its
+remappings and parameters go with the request.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.model.plan.topics import GLOBAL, private_topics
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from tfcompose.model.plan import Plan, PlanProcess
+
+#: The services, below the container's node.
+LOAD, UNLOAD, LIST = "_container/load_node", "_container/unload_node", "_container/list_nodes"
+
+
+@dataclass(frozen=True, slots=True)
+class LoadRequest:
+    """A component to load. ``container`` and ``node`` are full names of nodes; values of parameters are those of ROS.
+
+    A list has values of one kind; a list of whole and other numbers counts as one of others.
+    """
+
+    container: str
+    node: str
+    package: str
+    plugin: str
+    remap: dict[str, str] = field(default_factory=dict)
+    params: dict[str, Any] = field(default_factory=dict)
+    extra_arguments: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def what(self) -> str:
+        """The component as people write it."""
+        return f"{self.package}/{self.plugin}"
+
+
+def load_file(folder: Path, process: str) -> Path:
+    """Return the file, in the folder of a run's plan, that holds a component's request."""
+    return folder / "load" / f"{process.replace('/', '.')}.json"
+
+
+def load_request(
+    plan: Plan, process: PlanProcess, fill: Callable[[str], str], *, private: bool
+) -> LoadRequest:
+    """Return the request for a component of the plan; ``fill`` replaces what only the starting machine knows.
+
+    With ``private`` the processes of a strict plan are remapped to TF topics of their own.
+
+    Raises:
+        ValueError: if the process is no component, or its container has no node.
+    """
+    component = process.component
+    container = next(
+        (one for one in plan.processes if component and one.name == component.container), None
+    )
+    if component is None or container is None or not container.nodes or not process.nodes:
+        raise ValueError(f"the plan does not say which container loads {process.name}")
+    remap = process.remap
+    if private and (own := private_topics(plan).get(process.name)):
+        remap = dict([*zip(GLOBAL, own, strict=True), *zip(process.topics, own, strict=True)])
+        remap |= {old: new for old, new in process.remap.items() if old not in remap}
+    return LoadRequest(
+        container.nodes[0],
+        process.nodes[0],
+        component.package,
+        component.plugin,
+        remap,
+        {name: _filled(value, fill) for name, value in component.params.items()},
+        component.extra_arguments,
+    )
+
+
+def _filled(value: Any, fill: Callable[[str], str]) -> Any:
+    if isinstance(value, list):
+        return [_filled(one, fill) for one in value]
+    return fill(value) if isinstance(value, str) else value

@@ -1,0 +1,185 @@
+"""The plan as a file: JSON, written and read with the standard library alone."""
+
+from __future__ import annotations
+
+import graphlib
+import json
+import re
+from collections import Counter
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
+from tfcompose.model.plan import VERSION, Plan
+from tfcompose.model.plan.codec import DecodeError, decode, encode, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: A robot's name, which becomes part of topics, units and programs; and a process's, in a part
+#: with the part's name.
+_ROBOT = re.compile(r"[a-z][a-z0-9_]*")
+_PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
+#: A host's, which becomes part of folders, units and nodes.
+_HOST = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+#: Control characters, and halves of characters.
+_CONTROL = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
+#: Keys below which text may hold lines and tabs: what programs are given.
+_FOR_PROGRAMS = frozenset({"argv", "env", "switches", "component"})
+
+
+def write_plan(plan: Plan) -> str:
+    """Return the plan as JSON text: one line an edge and a process, the same bytes for the same plan."""
+    lines = (
+        f"  {_json(key)}: {_rows(value) if isinstance(value, list) else _json(value)}"
+        for key, value in encode(plan).items()
+    )
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def read_plan(text: str, file: str) -> Plan:
+    """Return the plan that ``write_plan`` wrote.
+
+    Raises:
+        RejectedError: with a TF902 finding, if the text is no plan of this version.
+    """
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        line, column = getattr(error, "lineno", 1), getattr(error, "colno", 1)
+        raise RejectedError(
+            [_bad(f"not a plan: {error}", Span(file, line, column, line, column + 1))]
+        ) from None
+    if not isinstance(data, dict) or "edges" not in data or "processes" not in data:
+        raise RejectedError([_bad("not a plan: it has no edges or processes", Span(file))])
+    if data.get("version") != VERSION or data["version"] is True:
+        message = (
+            f"the plan has version {shown(data.get('version'))}; this tfcompose reads version"
+            f" {VERSION}"
+        )
+        raise RejectedError([_bad(message, Span(file))])
+    try:
+        plan = decode(Plan, data)
+    except DecodeError as error:
+        raise RejectedError([_bad(f"not a valid plan: {error}", Span(file))]) from None
+    wrong = [*_wrong_text(data), *_wrong_names(plan)]
+    if wrong:
+        raise RejectedError([_bad(f"not a valid plan: {one}", Span(file)) for one in wrong])
+    return plan
+
+
+def _wrong_text(data: Any) -> Iterator[str]:
+    """Yield what is wrong with each text: control characters would move a terminal's cursor, or begin a new line."""
+    waiting: list[tuple[Any, tuple[str, ...]]] = [
+        (data, ())
+    ]  # what no field takes may be nested deeper than calls may
+    while waiting:
+        value, path = waiting.pop()
+        if isinstance(value, str):
+            found = _CONTROL.findall(value)
+            if found and not (_FOR_PROGRAMS & set(path) and {"\n", "\t"}.issuperset(found)):
+                yield f"{'.'.join(path)} holds a control character: {json.dumps(value)[:60]}"
+        elif isinstance(value, dict):
+            for key, one in reversed(value.items()):
+                waiting += [(one, (*path, key)), (key, (*path, "a key"))]
+        elif isinstance(value, list):
+            waiting += reversed([(one, (*path, str(number))) for number, one in enumerate(value)])
+
+
+def _wrong_names(plan: Plan) -> Iterator[str]:
+    """Yield what is wrong with names: those that no robot file can give, of nothing, and of files elsewhere."""
+    if not _ROBOT.fullmatch(plan.robot):
+        yield f"robot is {shown(plan.robot)}, not a name of lower case letters, digits and _"
+    known = Counter(process.name for process in plan.processes)
+    for name, times in known.items():
+        if not _PROCESS.fullmatch(name):
+            yield f"a process is named {shown(name)}, not with letters, digits, _, - and ."
+        if times > 1:
+            yield f"{times} processes are named {name}"
+    yield from (
+        f"the owner of {edge.name} is {shown(edge.owner)}, which is not a process"
+        for edge in plan.edges
+        if edge.owner not in known
+    )
+    yield from (
+        f"{process.name} waits for {shown(other)}, which is not a process"
+        for process in plan.processes
+        for other in process.after
+        if other not in known
+    )
+    if all(other in known for process in plan.processes for other in process.after):
+        yield from _wrong_order(plan)
+    for ready, name in ((process.ready, process.name) for process in plan.processes):
+        if ready and ready.kind == "log" and (error := _regex_error(ready.text)):
+            yield f"{name} is ready at {shown(ready.text)}, not a regular expression: {error}"
+    yield from _wrong_components(plan)
+    yield from _wrong_files(plan)
+    yield from (
+        f"a host is named {shown(name)}, not with letters, digits, _, - and ."
+        for name in _wrong_hosts(plan)
+    )
+
+
+def _wrong_components(plan: Plan) -> Iterator[str]:
+    """Yield what is wrong with components: their containers must be processes with a node."""
+    containers = {
+        process.name for process in plan.processes if process.nodes and not process.component
+    }
+    for process in plan.processes:
+        component = process.component
+        if (process.kind == "component") != (component is not None):
+            yield (
+                f"{process.name} is of kind {process.kind}, and {'a' if component else 'no'}"
+                " component"
+            )
+        elif component and component.container not in containers:
+            yield (
+                f"the container of {process.name} is {shown(component.container)}, which is no"
+                " process with a node"
+            )
+        elif component and not process.nodes:
+            yield f"{process.name} is a component without a node"
+
+
+def _wrong_order(plan: Plan) -> Iterator[str]:
+    try:
+        graphlib.TopologicalSorter(
+            {process.name: process.after for process in plan.processes}
+        ).prepare()
+    except graphlib.CycleError as error:
+        yield f"processes wait for each other: {', '.join(map(shown, error.args[1]))}"
+
+
+def _wrong_files(plan: Plan) -> Iterator[str]:
+    files = (
+        plan.description,
+        *(file for one in plan.processes for file in (one.params_file, one.description)),
+    )
+    for file in dict.fromkeys(filter(None, files)):
+        path = PurePosixPath(file)
+        if path.is_absolute() or ".." in path.parts:
+            yield f"the file {shown(file)} is not in the plan's folder"
+
+
+def _wrong_hosts(plan: Plan) -> Iterator[str]:
+    """Yield the hosts whose names cannot be part of folders and units."""
+    return (name for name in plan.hosts if not _HOST.fullmatch(name))
+
+
+def _regex_error(pattern: str) -> str:
+    try:
+        re.compile(pattern)
+    except (re.error, RecursionError, OverflowError) as error:
+        return str(error)
+    return ""
+
+
+def _bad(message: str, span: Span) -> Finding:
+    return finding("TF902", message, span, help="build it again: tfcompose build robot.yaml")
+
+
+_json = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
+
+
+def _rows(rows: list[Any]) -> str:
+    return "[\n" + ",\n".join(f"    {_json(row)}" for row in rows) + "\n  ]" if rows else "[]"

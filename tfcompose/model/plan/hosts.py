@@ -1,0 +1,145 @@
+"""A plan over several machines: which of them this one is, and what it starts.
+
+A process runs on the host that it names. What names none runs on the machine that the plan does
+not name; where ``static`` names a host, the compiler has written that host to all of them. The
+guard runs on every machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, did_you_mean, finding
+from tfcompose.model.plan import PlanProcess, Ready
+
+if TYPE_CHECKING:
+    from tfcompose.model.plan import Plan, PlanEdge
+
+#: What a launcher cannot see of a process on another machine: its output and its end.
+_UNSEEN = ("log", "exit")
+
+
+def hosts_of(plan: Plan) -> tuple[str, ...]:
+    """Return the machines that the plan names, in its order."""
+    named = (process.host for process in plan.managed)
+    return tuple(dict.fromkeys(host for host in named if host is not None))
+
+
+def without_host(plan: Plan) -> tuple[str, ...]:
+    """Return what the machine starts that the plan does not name."""
+    own = (one for one in plan.processes if one.kind not in ("external", "guard"))
+    return tuple(process.name for process in own if process.host is None)
+
+
+def share_of(plan: Plan, host: str | None, machine: str) -> Plan | Finding:
+    """Return the plan as one machine starts it: what others start is expected there, not started.
+
+    ``host`` is the one that the user says this is; without it, it is the one with this
+    ``machine``'s name, whole or up to the first dot, or else the one that the plan does not name.
+    A plan without hosts stays as it is.
+    """
+    hosts = hosts_of(plan)
+    if host is not None and host not in hosts:
+        known = (
+            f"the plan names {', '.join(hosts)}"
+            if hosts
+            else "the plan names no host: leave out --host"
+        )
+        message = f"no process of {plan.robot} runs on a host {host}"
+        return finding("TF819", message, None, help=f"{did_you_mean(host, hosts, known)}")
+    if not hosts:
+        return plan
+    watched = next((one.host for one in plan.processes if one.kind == "guard"), None)
+    if plan.guard.mode == "strict" and watched is not None:
+        message = (
+            f"guard: strict passes on by each machine's guard, and that of {plan.robot} is on"
+            f" {watched} only"
+        )
+        return finding(
+            "TF819", message, None, help="remove the guard's host, or watch: guard: {mode: watch}"
+        )
+    host = host or next(
+        (name for name in (machine, machine.partition(".")[0]) if name in hosts), None
+    )
+    if host is None and not without_host(plan):
+        message = (
+            f"this machine is {machine}, and every process of {plan.robot} runs on another:"
+            f" {', '.join(hosts)}"
+        )
+        return finding(
+            "TF819", message, None, help=f"say which one it is: --host {' or --host '.join(hosts)}"
+        )
+    return _share(plan, host)
+
+
+def describe_share(plan: Plan) -> tuple[str, ...]:
+    """Return what is printed of a share: what this machine starts, and what others do; nothing of a whole plan."""
+    if plan.host is None:
+        return ()
+    others: dict[str, list[str]] = {}
+    for process in plan.processes:
+        if process.kind == "external":
+            others.setdefault(
+                f"of {process.host}" if process.host else "from elsewhere", []
+            ).append(process.name)
+    own = ", ".join(process.name for process in plan.managed)
+    here = f"host {plan.host}" if plan.host else "this machine, which the plan does not name,"
+    return (
+        f"{here} starts {own}",
+        *(f"expected {where}: {', '.join(names)}" for where, names in others.items()),
+    )
+
+
+def _share(plan: Plan, host: str | None) -> Plan:
+    processes = tuple(_here(plan, process, host) for process in plan.processes)
+    watched = next((one.host for one in plan.processes if one.kind == "guard"), None)
+    guard = replace(plan.guard, mode="off") if watched not in (None, host) else plan.guard
+    edges = (
+        tuple(_edge_on_host(plan, edge, host) for edge in plan.edges)
+        if guard.mode == "strict"
+        else plan.edges
+    )
+    return replace(plan, edges=edges, processes=processes, guard=guard, host=host or "")
+
+
+def _edge_on_host(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:
+    """Return the edge as it is seen on a host: what another machine's process sends, its strict guard passes on."""
+    owner = plan.process(edge.owner)
+    if owner.kind == "external" or owner.host == host:
+        return edge
+    return replace(edge, node=next(iter(plan.guards_of(owner.host)), edge.node))
+
+
+def _here(plan: Plan, process: PlanProcess, host: str | None) -> PlanProcess:
+    if process.kind == "guard":
+        return replace(process, nodes=plan.guards_of(host))
+    return process if process.kind == "external" or process.host == host else _elsewhere(process)
+
+
+def _elsewhere(process: PlanProcess) -> PlanProcess:
+    """Return the process as one that is expected: how it is run is its own machine's business."""
+    ready, states = process.ready, set(process.lifecycle.values())
+    if ready and ready.kind in _UNSEEN:
+        ready = None
+    elif ready is None and len(states) == 1 and set(process.nodes) == set(process.lifecycle):
+        ready = Ready("lifecycle", states.pop())
+    return PlanProcess(
+        process.name,
+        "external",
+        remap=process.remap,
+        nodes=process.nodes,
+        required=process.required,
+        ready=ready,
+        host=process.host,
+        owns=process.owns,
+        drives=process.drives,
+        switches=process.switches,
+        namespace=process.namespace,
+    )
+
+
+def without_computer(plan: Plan) -> tuple[str, ...]:
+    """Return the processes that would run on no computer under ``hosts``, where the plan is deployed to these."""
+    own = (one for one in plan.managed if one.kind != "guard")
+    return tuple(process.name for process in own if process.host not in plan.hosts)

@@ -1,0 +1,557 @@
+"""What a plan holds: its enumerations, edges, processes, what all of them share, and the guard's policy.
+
+Each enumeration of the plan and of the language is a Literal here; ``get_args`` gives its words.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+from tfcompose.foundation.geometry import Pose, norm
+from tfcompose.model.plan.codec import FLAT, OMITTED, Rule, documented
+
+#: Who moves an edge: nobody, joint states, or its owner.
+EdgeKind = Literal["static", "joint", "dynamic"]
+#: How a joint moves; of planar and floating ones joint states say nothing.
+JointType = Literal["revolute", "continuous", "prismatic", "planar", "floating"]
+
+#: What a process is: one of tfcompose's own, one that is started elsewhere, a program, or a node
+#: in a container.
+ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run", "component"]
+#: After which ends a process is started again.
+RestartPolicy = Literal["no", "on-failure", "always"]
+#: The first signal that ends a process.
+StopSignal = Literal["SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", "SIGUSR2"]
+#: What makes a process ready.
+ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "time"]
+#: What must have happened to another process before one is started.
+StartCondition = Literal["started", "ready", "done"]
+#: The states of a lifecycle node that it can be brought into, or be waited for in.
+LifecycleState = Literal["inactive", "active"]
+#: How much a node's loggers write.
+LogLevel = Literal["debug", "info", "warn", "error", "fatal"]
+#: What a stand-in does.
+SimulationKind = Literal["circle", "fixed", "joints"]
+#: Where a process's output goes: to the terminal of up and into its log, or to one of them.
+OutputPlace = Literal["both", "log", "screen"]
+#: How the kernel schedules a process (sched(7)); fifo and rr are real-time policies.
+SchedulingPolicy = Literal["other", "batch", "idle", "fifo", "rr"]
+#: How well the pose of a frame is known that a driver publishes.
+PoseKnowledge = Literal["exact", "nominal", "unknown"]
+
+#: Whose time the whole plan runs by.
+Clock = Literal["wall", "sim"]
+#: How far ROS looks for other nodes; None in a plan: as far as the environment says.
+Discovery = Literal["localhost", "subnet", "off"]
+#: The middleware that all processes use.
+Rmw = Literal["fastdds", "cyclonedds", "zenoh"]
+#: The release of ROS that all processes are from.
+Distro = Literal["jazzy", "kilted"]
+#: What keeps several robots in one domain apart: topics below their namespaces, or frames with a
+#: prefix.
+Isolation = Literal["none", "topics", "frames", "both"]
+#: Who publishes what is ours below the base.
+StatePublisher = Literal["tfcompose", "stock"]
+#: Who publishes the frames inside a sensor.
+SensorPublisher = Literal["driver", "tfcompose"]
+
+#: What the guard does with what a process sends and does not own: nothing, report it, or hold it
+#: back.
+GuardMode = Literal["off", "watch", "strict"]
+#: What an edge is that nobody declared.
+UnknownEdges = Literal["ignore", "warn", "error"]
+#: What follows a violation: words, the end of the process that surely did it, or the end of
+#: everything.
+OnViolation = Literal["report", "stop-offender", "stop"]
+#: How a strict guard fences processes off; auto: by partition where their rmw is Fast DDS, else by
+#: remapping.
+FenceWay = Literal["auto", "partition", "remap"]
+
+
+#: An edge is silent after four periods, and never before this: what a loaded machine can delay.
+SILENT_AT_LEAST_S = 0.6
+SILENT_PERIODS = 4.0
+#: It is too slow below this part of the rate that is declared.
+SLOW_BELOW = 0.8
+#: How often a process is started again in a row, unless it says so itself.
+MAX_RESTARTS = 5
+
+
+def _unit_quaternion(pose: Pose) -> None:
+    if abs(norm(pose.quat_xyzw) - 1) > 1e-6:  # noqa: PLR2004 (what was written is normalised to the last bit)
+        raise ValueError("has a quat_xyzw that is not a unit quaternion")
+
+
+def _above_0(value: float) -> None:
+    if value <= 0:
+        raise ValueError(f"is {value:g}, not above 0")
+
+
+#: A pose as it is read from a plan.
+UnitPose = Annotated[Pose, Rule(_unit_quaternion)]
+#: A time or rate.
+AboveZero = Annotated[float, Rule(_above_0, {"exclusiveMinimum": 0})]
+
+
+class SourceLine(NamedTuple):
+    """A line of a robot file; the file is relative to the robot's."""
+
+    file: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class EdgePattern:
+    """Edges by the names of their frames, in which ``*`` and ``?`` are wildcards."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    parent: str = documented("*", "the parent frame", "camera_color_optical_frame")
+    child: str = documented("*", "the child frame", "tag36h11:*")
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A moving joint: its edge's pose at position q is the edge's ``pose`` followed by the motion along ``axis``.
+
+    ``axis`` is a unit vector in the child's frame at q = 0. With ``mimic`` the position is
+    ``multiplier`` · q(mimic) + ``offset``. Positions are radians, or metres for a prismatic joint.
+    """
+
+    name: str
+    type: JointType
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    mimic: str | None = None
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlanEdge:
+    """One TF edge and the process that publishes it. ``node`` is the publishing node's full name.
+
+    ``switched`` holds the further parents between which the owner may change the child; ``parent``
+    is the nominal one. ``pose_known`` is False where only the owner knows where the child is;
+    ``pose`` is the identity then.
+    """
+
+    parent: str
+    child: str
+    kind: EdgeKind
+    owner: str
+    node: str
+    pose: UnitPose = field(metadata=FLAT)
+    rate: float | None
+    source: SourceLine
+    joint: Joint | None = field(default=None, metadata=OMITTED)
+    switched: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    pose_known: bool = field(default=True, metadata=OMITTED)
+
+    @property
+    def name(self) -> str:
+        """The edge as people read it."""
+        return f"{self.parent} → {self.child}"
+
+    @property
+    def silent_after_s(self) -> float | None:
+        """How long a moving edge may be quiet, in seconds, or None if it says no rate."""
+        if not self.rate or self.kind == "static":
+            return None
+        return max(SILENT_AT_LEAST_S, SILENT_PERIODS / self.rate)
+
+    def may_hang_on(self, parent: str) -> bool:
+        """Return whether the owner may publish the child below this parent."""
+        return parent == self.parent or parent in self.switched
+
+
+#: In an ``argv``, ``${python}``, ``${plan}``, ``${build_dir}`` and ``${params_file}`` stand for
+#: what only the starting machine knows. As its first word ``${executable:PACKAGE/NAME}`` is a
+#: package's program, and ``${launch:PACKAGE/FILE}`` a package's launch file; the words after that
+#: are the launch file's arguments, ``name:=value``.
+_AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """How a simulated joint moves: to and fro between two positions (rad or m) once in ``period_s``.
+
+    Without them it turns round and round, once in that time.
+    """
+
+    period_s: AboveZero
+    lower: float | None = None
+    upper: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.lower is None) != (self.upper is None):
+            raise ValueError("has one of lower and upper without the other")
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """A stand-in for an owner: a body on a circle, one that stays, or joint states.
+
+    ``joints`` are where joints begin (rad or m), and stay unless ``sweep`` says how they move.
+    """
+
+    kind: SimulationKind
+    rate: AboveZero
+    radius: float = 0.0
+    speed: float = 0.0
+    joints: dict[str, float] = field(default_factory=dict)
+    sweep: dict[str, Sweep] = field(default_factory=dict)
+    pose: UnitPose = field(default_factory=Pose, metadata=FLAT)
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """When a process counts as ready.
+
+    ``text`` is the full name of the topic or the service, the lifecycle state of the process's
+    nodes, or the regular expression that a line of the output holds; ``number`` the exit code, or
+    the seconds after the start. Without ``timeout_s`` the launcher's own time holds.
+    """
+
+    kind: ReadyKind
+    text: str = ""
+    number: float = 0.0
+    timeout_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StopRule:
+    """How a process is ended: the first signal, and the time until a firmer one; None: the launcher's own.
+
+    ``kill_timeout_s`` is the time between SIGTERM and SIGKILL; None: ``timeout_s``.
+    """
+
+    signal: StopSignal = "SIGINT"
+    timeout_s: float | None = None
+    kill_timeout_s: float | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """How the kernel schedules a process: on which processors (empty: any), and by which policy (sched(7)).
+
+    ``priority`` is that of the real-time policies, 1 to 99, and 0 for the others.
+    """
+
+    cpus: tuple[int, ...] = ()
+    policy: SchedulingPolicy = "other"
+    priority: int = 0
+
+
+#: A node's parameter that is not a list.
+ParameterValue = str | int | float | bool
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """A sensor that a process drives. ``publishes`` says that the frames inside the sensor are the driver's.
+
+    ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not
+    its own. ``frames`` says of the frames that the driver publishes inside the sensor whether
+    their poses are exact, nominal or unknown.
+    """
+
+    sensor: str
+    preset: str
+    publishes: bool
+    switch: dict[str, ParameterValue] = field(default_factory=dict)
+    frames: dict[str, PoseKnowledge] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A node that a container loads: it has no operating system's process of its own.
+
+    ``container`` is the process that loads it, ``plugin`` the class, of ``package``. ``params``
+    are by their full names, with dots; a value is true or false, a number, a text, or a list of
+    one kind. ``extra_arguments`` are for the container: ``use_intra_process_comms``.
+    """
+
+    container: str
+    package: str
+    plugin: str
+    params: dict[str, Any] = field(default_factory=dict)
+    extra_arguments: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanProcess:
+    """What is started, or, with kind ``external``, expected to run; of kind ``component``, what a container loads.
+
+    ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought
+    after the start. ``required`` says what ends the plan: True, this process's end; None, its
+    failure; False, neither. ``max_restarts`` None is the default, as is ``ready`` None: the edges
+    that the process owns, or that it was started. ``drives`` are the sensors that it is the driver
+    of, by their presets. ``switches`` holds, by the full names of its nodes, the parameters that
+    were written for them and decide what they publish. ``description`` is the file beside the plan
+    that a publisher sends as ``robot_description``; None: the plan's. ``namespace`` is that of its
+    nodes, without a leading slash; None: the plan's. ``restart_delay`` is how long after its end
+    it is started again, in seconds; None: longer each time. ``prefix`` are the words before its
+    command, a program that runs it. ``emulate_tty`` says that it writes to a pseudo-terminal.
+    """
+
+    name: str
+    kind: ProcessKind
+    argv: tuple[str, ...] = ()
+    env: dict[str, str] = field(default_factory=dict)
+    cwd: str | None = None
+    params_file: str | None = None
+    remap: dict[str, str] = field(default_factory=dict)
+    nodes: tuple[str, ...] = ()
+    restart: RestartPolicy = "no"
+    max_restarts: int | None = None
+    required: bool | None = None
+    stop: StopRule = field(default_factory=StopRule)
+    log_level: LogLevel | None = None
+    lifecycle: dict[str, LifecycleState] = field(default_factory=dict)
+    after: dict[str, StartCondition] = field(default_factory=dict)
+    ready: Ready | None = None
+    host: str | None = None
+    owns: tuple[tuple[str, str], ...] = ()
+    description: str | None = field(default=None, metadata=OMITTED)
+    drives: tuple[Driven, ...] = field(default=(), metadata=OMITTED)
+    switches: dict[str, dict[str, ParameterValue]] = field(default_factory=dict, metadata=OMITTED)
+    namespace: str | None = field(default=None, metadata=OMITTED)
+    simulate: Simulation | None = field(default=None, metadata=OMITTED)
+    restart_delay: float | None = field(default=None, metadata=OMITTED)
+    prefix: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    schedule: Schedule | None = field(default=None, metadata=OMITTED)
+    component: Component | None = field(default=None, metadata=OMITTED)
+    output: OutputPlace = field(default="both", metadata=OMITTED)
+    emulate_tty: bool = field(default=False, metadata=OMITTED)
+
+    @property
+    def topics(self) -> tuple[str, str]:
+        """The topics (moving, fixed) on which it publishes TF."""
+        return self.remap.get("/tf", "/tf"), self.remap.get("/tf_static", "/tf_static")
+
+    @property
+    def restart_limit(self) -> int:
+        """How often it is started again in a row."""
+        return MAX_RESTARTS if self.max_restarts is None else self.max_restarts
+
+
+def known_at_launch(value: Any) -> bool:
+    """Return whether a value holds a path that only the launcher knows."""
+    if isinstance(value, str):
+        return bool(_AT_START.search(value))
+    items = (
+        value.values()
+        if isinstance(value, dict)
+        else value
+        if isinstance(value, (list, tuple))
+        else ()
+    )
+    return any(known_at_launch(item) for item in items)
+
+
+@dataclass(frozen=True, slots=True)
+class RosSettings:
+    """What all processes share."""
+
+    namespace: str = documented(
+        "", "the namespace of nodes and topics without a leading slash", "robot1"
+    )
+    domain_id: int | None = documented(None, "the ROS domain; default: the environment's", 7)
+    discovery: Discovery | None = documented(
+        None, "how far discovery reaches; default: the environment's"
+    )
+    rmw: Rmw | None = documented(
+        None, "the middleware of all processes; default: the environment's", "zenoh", **OMITTED
+    )
+    distro: Distro | None = documented(
+        None,
+        "the release of ROS that they are from; default: the environment's",
+        "kilted",
+        **OMITTED,
+    )
+    router: str | None = documented(
+        None,
+        "with rmw: zenoh, where every process reaches the router; default: port 7447 of its own"
+        " computer",
+        "tcp/10.0.0.2:7447",
+        **OMITTED,
+    )
+    clock: Clock = documented("wall", "one clock for the whole plan; sim: the time of /clock")
+    frame_prefix: str = documented(
+        "", "written in front of every frame as it is, with its slash", "robot1/"
+    )
+    shared_frames: tuple[str, ...] = documented((), "frames that never get the prefix", ["map"])
+
+
+@dataclass(frozen=True, slots=True)
+class PlanHost:
+    """A computer that processes run on: how ssh reaches it, and what runs tfcompose there.
+
+    ``ssh`` is user@address, or a name that ssh knows; ``python`` is a program or its path,
+    ``setup`` are files that are sourced before it. ``node_selector`` are the labels of its node in
+    Kubernetes; empty: its host name is the host's.
+    """
+
+    ssh: str
+    port: int | None = field(default=None, metadata=OMITTED)
+    python: str | None = field(default=None, metadata=OMITTED)
+    setup: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    node_selector: dict[str, str] = field(default_factory=dict, metadata=OMITTED)
+
+
+@dataclass(frozen=True, slots=True)
+class GuardPolicy:
+    """What watches the live tree."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    mode: GuardMode = documented(
+        "watch", "strict: what a process of the plan sends and does not own is held back"
+    )
+    unknown_edges: UnknownEdges = documented(
+        "warn", "what to do about an edge that nobody declared"
+    )
+    on_violation: OnViolation = documented(
+        "report",
+        "stop-offender: stop the plan's own process that is proven to have done it; stop: stop"
+        " everything",
+    )
+    allow: tuple[EdgePattern, ...] = documented(
+        (), "edges that need no declaration", [{"child": "tag36h11:*"}]
+    )
+    fence: FenceWay = documented(
+        "auto",
+        "how strict fences processes off: by a DDS partition, which needs Fast DDS, or by"
+        " remapping /tf and /tf_static",
+        **OMITTED,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PlanClaim:
+    """An edge that a node publishes by default and another process owns; ``switch`` stops it, empty: nothing does."""
+
+    node: str
+    parent: str
+    child: str
+    switch: str
+
+
+def switch_text(switch: dict[str, Any]) -> str:
+    """Return parameters as they are written in YAML."""
+    return ", ".join(
+        f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in switch.items()
+    )
+
+
+VERSION: Literal[1] = 1
+
+#: The file beside the plan that holds the whole robot's description.
+DESCRIPTION = "robot.full.urdf"
+#: What no name of a node may hold.
+_NO_NAME = re.compile(r"\W")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Everything that ``tfcompose up`` needs, and nothing that it has to compile.
+
+    ``host`` is the machine whose share of the processes this is: it starts those that are not
+    ``external``. None is the whole plan, and empty the share of the machine that the plan does not
+    name. ``args`` are the values of the robot file's arguments that it was built with,
+    ``environment`` those of the variables that the file names. ``hosts`` are the computers that
+    processes may name; empty: the file does not say how they are reached.
+    """
+
+    version: Literal[1] = field(default=VERSION, kw_only=True)
+    robot: str
+    spec_digest: str
+    description: str = field(default=DESCRIPTION, kw_only=True)
+    base: str | None
+    host: str | None = field(default=None, kw_only=True, metadata=OMITTED)
+    ros: RosSettings
+    edges: tuple[PlanEdge, ...]
+    processes: tuple[PlanProcess, ...]
+    claims: tuple[PlanClaim, ...] = field(default=(), kw_only=True)
+    guard: GuardPolicy = field(default_factory=GuardPolicy)
+    args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
+    environment: dict[str, str] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
+    hosts: dict[str, PlanHost] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
+
+    def process(self, name: str) -> PlanProcess:
+        """Return the process of that name.
+
+        Raises:
+            KeyError: if there is none.
+        """
+        for process in self.processes:
+            if process.name == name:
+                return process
+        raise KeyError(name)
+
+    @property
+    def started(self) -> tuple[PlanProcess, ...]:
+        """The processes that are started, in the plan's order: all but external ones, and what containers load."""
+        return tuple(
+            process for process in self.processes if process.kind not in ("external", "component")
+        )
+
+    @property
+    def managed(self) -> tuple[PlanProcess, ...]:
+        """What is started or loaded, in the plan's order: all but external processes."""
+        return tuple(process for process in self.processes if process.kind != "external")
+
+    @property
+    def components(self) -> tuple[PlanProcess, ...]:
+        """What containers load, in the plan's order."""
+        return tuple(process for process in self.processes if process.component)
+
+    def guards_of(self, host: str | None) -> tuple[str, ...]:
+        """Return the nodes of the guard of a host's share; None or empty: of the machine that has no name here."""
+        own = [
+            node for process in self.processes if process.kind == "guard" for node in process.nodes
+        ]
+        # No two nodes have one name.
+        return tuple(node.removesuffix(_name_end(self.host)) + _name_end(host) for node in own)
+
+    def claim_on(self, nodes: tuple[str, ...], parent: str, child: str) -> PlanClaim | None:
+        """Return what is known of one of the nodes publishing the edge by default, or None."""
+        ends = (parent, child)
+        return next(
+            (one for one in self.claims if one.node in nodes and (one.parent, one.child) == ends),
+            None,
+        )
+
+    def may_be_undeclared(self, parent: str, child: str) -> bool:
+        """Whether nobody needs to have declared the edge: by policy, or because it is another robot's."""
+        policy, ros = self.guard, self.ros
+        if (
+            ros.frame_prefix
+            and not child.startswith(ros.frame_prefix)
+            and child not in ros.shared_frames
+        ):
+            return True
+        return policy.unknown_edges == "ignore" or any(
+            fnmatchcase(parent, one.parent) and fnmatchcase(child, one.child)
+            for one in policy.allow
+        )
+
+    def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:
+        """Return the edges that the process publishes, in the plan's order."""
+        return tuple(edge for edge in self.edges if edge.owner == owner)
+
+    def started_with(self, process: PlanProcess) -> tuple[Any, ...]:
+        """Return all of the plan that decides how the process runs; an edge's place in the robot file does not."""
+        guards = process.kind == "guard"
+        edges = self.edges if guards else self.edges_of(process.name)
+        fence = (self.robot, self.guard.fence) if self.guard.mode == "strict" else None
+        anywhere = tuple(replace(edge, source=SourceLine("", 0)) for edge in edges)
+        return process, self.ros, fence, anywhere, self.guard if guards else None
+
+
+def _name_end(host: str | None) -> str:
+    return f"_{_NO_NAME.sub('_', host)}" if host else ""

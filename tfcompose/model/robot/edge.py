@@ -1,0 +1,176 @@
+"""An edge of the tree, the joint that moves it with its limits, and a pose that was measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tfcompose.foundation.geometry import angle_between
+from tfcompose.foundation.units import (  # noqa: TC001 (read by them)
+    JointDamping,
+    JointEffort,
+    JointPosition,
+    JointVelocity,
+    Number,
+)
+from tfcompose.model.plan import Joint as PlanJoint
+from tfcompose.model.plan import PlanEdge, SourceLine
+from tfcompose.model.plan.codec import documented, narrowed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.foundation.findings import Edit, Span
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.model.plan import JointType
+
+#: Joints that joint states move; those of them that have ends; and those that have more than one
+#: position, of which joint states say nothing.
+MOVING: tuple[JointType, ...] = ("revolute", "continuous", "prismatic")
+BOUNDED: tuple[JointType, ...] = ("revolute", "prismatic")
+FREE: tuple[JointType, ...] = ("floating", "planar")
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a joint can do: rad or m, N m or N, rad/s or m/s."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    lower: JointPosition | None = documented(None, "the lowest position")
+    upper: JointPosition | None = documented(None, "the highest position")
+    effort: JointEffort | None = documented(
+        None, "the largest torque, or force of a prismatic joint"
+    )
+    velocity: JointVelocity | None = documented(None, "the largest speed")
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """What slows a joint down: N m s/rad and N m, or N s/m and N."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    damping: JointDamping = documented(0.0, "the damping")
+    friction: JointEffort = documented(0.0, "the static friction")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyController:
+    """Where a controller begins to hold a joint back before its limits, and how hard."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    soft_lower_limit: JointPosition = documented(0.0, "where the lower soft limit begins")
+    soft_upper_limit: JointPosition = documented(0.0, "where the upper soft limit begins")
+    k_position: Number = documented(
+        0.0, "the gain from position to velocity inside the soft limits"
+    )
+    k_velocity: Number = documented(MISSING, "the gain from velocity to effort", 10)
+
+
+@dataclass(frozen=True, slots=True)
+class ReferencePositions:
+    """Where a joint's reference switch changes; URDF calls it calibration."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    rising: JointPosition | None = documented(None, "where the switch goes on")
+    falling: JointPosition | None = documented(None, "where the switch goes off")
+
+
+@dataclass(frozen=True, slots=True)
+class Joint(PlanJoint):
+    """A joint of the plan, with what only the compiler knows of it; the axis of a planar one is the plane's normal.
+
+    ``axis_length`` is that of the axis as it was written, ``mimic_at`` the place of the joint that
+    it follows.
+    """
+
+    at: Span = field(kw_only=True)
+    mimic_at: Span | None = field(default=None, kw_only=True)
+    limit: Limit | None = field(default=None, kw_only=True)
+    axis_length: float = field(default=1.0, kw_only=True)
+    dynamics: Dynamics | None = field(default=None, kw_only=True)
+    safety: SafetyController | None = field(default=None, kw_only=True)
+    reference: ReferencePositions | None = field(default=None, kw_only=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """A pose that was measured: that of ``child`` in ``parent``, frames of the robot.
+
+    ``nominal`` is the same by the pose that is written beside it, if one is. ``named_at`` is the
+    place in the robot file, ``at`` the entry in the calibration file, ``entry`` its pose as it is
+    there; ``inverted`` says that it was taken the other way round. The limits (m, rad) say how far
+    from nominal is too far.
+    """
+
+    parent: str
+    child: str
+    pose: Pose
+    entry: Pose
+    at: Span
+    format: str
+    named_at: Span
+    limit_m: float
+    limit_rad: float
+    inverted: bool = False
+    nominal: Pose | None = None
+
+    @property
+    def name(self) -> str:
+        """The measurement, its direction and its source, as people read them."""
+        turned = ", inverted" if self.inverted else ""
+        source = f"from {self.at.file}:{self.at.line} ({self.format}{turned})"
+        return f"pose of {self.child} in {self.parent}, {source}"
+
+    def off(self, pose: Pose) -> tuple[float, float]:
+        """Return how far ``pose`` is from the nominal one, in metres and radians; 0 if there is none."""
+        if self.nominal is None:
+            return (0.0, 0.0)
+        far = math.dist(pose.xyz, self.nominal.xyz)
+        return (far, angle_between(pose.quat_xyzw, self.nominal.quat_xyzw))
+
+
+@dataclass(frozen=True, slots=True)
+class Edge(PlanEdge):
+    """An edge of the plan, with what only the compiler knows of it.
+
+    ``at`` is where it was written, ``source`` the line of that, and ``entry`` the path of the
+    mapping that gives it: of an edge inside a part it begins with the part's own. ``node`` is
+    empty where the owner has one node. ``joint`` moves by joint states. ``free`` is a planar or
+    floating joint, of which joint states say nothing. ``other_axes``: the vendor's name for the
+    frame does not say whether it is optical, or says it wrongly. ``optical_edits`` returns the
+    edits of the file that give the edge the optical rotation of REP-103; none where that is not
+    safe.
+    """
+
+    node: str = field(default="", kw_only=True)
+    rate: float | None = field(default=None, kw_only=True)
+    source: SourceLine = field(init=False, compare=False, repr=False)
+    joint: Joint | None = field(default=None, kw_only=True)
+    at: Span = field(kw_only=True)
+    joint_name: str = field(default="", kw_only=True)
+    given: bool = field(default=True, kw_only=True)
+    entry: tuple[str | int, ...] = field(default=(), compare=False, kw_only=True)
+    owner_at: Span | None = field(default=None, kw_only=True)
+    child_at: Span | None = field(default=None, kw_only=True)
+    joint_at: Span | None = field(default=None, kw_only=True)
+    sensor: str | None = field(default=None, kw_only=True)
+    nominal: bool = field(default=False, kw_only=True)
+    rate_at: Span | None = field(default=None, kw_only=True)
+    calibration: Calibration | None = field(default=None, kw_only=True)
+    free: Joint | None = field(default=None, kw_only=True)
+    other_axes: bool = field(default=False, kw_only=True)
+    optical_edits: Callable[[], tuple[Edit, ...]] = field(
+        default=tuple, compare=False, repr=False, kw_only=True
+    )
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "source", SourceLine(self.at.file, self.at.line))
+
+    def planned(self, **made: Any) -> PlanEdge:
+        """Return the edge as the plan has it, with fields that follow from the whole robot."""
+        return narrowed(PlanEdge, self, **made)

@@ -1,0 +1,86 @@
+"""What ros2_control drives, and elements that stand in the URDF as they were written."""
+
+from __future__ import annotations
+
+import html
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.foundation.findings import Span
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """An interface of ros2_control, with its parameters as texts."""
+
+    name: str
+    params: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A joint, sensor or gpio of a hardware component."""
+
+    kind: str
+    name: str
+    at: Span
+    command: tuple[Interface, ...] = ()
+    state: tuple[Interface, ...] = ()
+    params: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Hardware:
+    """A hardware component of ros2_control: the plugin and what it drives."""
+
+    name: str
+    plugin: str
+    type: str
+    at: Span
+    params: dict[str, str] = field(default_factory=dict)
+    components: tuple[Component, ...] = ()
+    rw_rate: int | None = None
+    is_async: bool | None = None
+
+
+#: What has a name of its own in a raw block.
+_NAMED = re.compile(
+    r"""<(?:transmission|actuator|ros2_control|sensor|gpio)\b[^>]*?\bname\s*=\s*["']([^"']+)"""
+)
+#: All that stands between quotes, or between two tags.
+_HELD = re.compile(r"""(=\s*")([^<"]*)(?=")|(=\s*')([^<']*)(?=')|(>)([^<>]*)(?=<)""")
+
+#: Both, since a value may stand in either.
+_QUOTES = {'"': "&quot;", "'": "&#x27;"}
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Elements that stand in the URDF as the user wrote them; ``places`` are theirs, in order, if known."""
+
+    name: str
+    at: Span
+    text: str
+    places: tuple[Span, ...] = field(default=(), compare=False)
+
+    def own_names(self) -> list[str]:
+        """Return the names of the elements in it that have one for themselves in the whole robot."""
+        return _NAMED.findall(self.text)
+
+    def renamed(self, names: Mapping[str, str]) -> Block:
+        """Return the block with other names: of what an attribute or an element holds, if that is a name alone."""
+
+        def other(found: re.Match[str]) -> str:
+            before, held = (part for part in found.groups() if part is not None)
+            name = held.strip()
+            again = names.get(html.unescape(name))
+            return (
+                found[0] if again is None else before + held.replace(name, escape(again, _QUOTES))
+            )
+
+        return replace(self, text=_HELD.sub(other, self.text))

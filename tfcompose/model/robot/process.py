@@ -1,0 +1,151 @@
+"""A process before it is a command line, its nodes, and what they publish by default."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.model.plan import PlanClaim, PlanHost, PlanProcess, switch_text
+from tfcompose.model.plan.codec import narrowed
+
+STATIC, JOINTS, GUARD = "static", "joints", "guard"
+BUILT_IN = (STATIC, JOINTS, GUARD)
+#: How a command begins that a shell reads.
+SHELL = ("/bin/sh", "-c")
+#: How a command begins that runs launch files.
+ROS2_LAUNCH = ("ros2", "launch")
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.plan import LifecycleState
+
+
+class AsInFile(str):
+    """A parameter as it is without quotes in a parameter file: ROS decides what it is."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One ROS node of a process, by its full name; ``lifecycle`` is the state that it is brought into.
+
+    ``path`` leads to the mapping that holds its ``params``; ``contradicting`` are those, by their
+    full names, that are known to contradict the tree. ``places`` are those of the first level in
+    the robot file; of one that a parameter file gives, where that is named, and then the place in
+    it.
+    """
+
+    name: str
+    at: Span
+    path: tuple[str | int, ...] = ()
+    params: dict[str, Any] = field(default_factory=dict)
+    lifecycle: LifecycleState | None = None
+    contradicting: frozenset[str] = frozenset()
+    places: Mapping[str, tuple[Span, ...]] = field(default_factory=dict, compare=False)
+
+    @property
+    def flat_params(self) -> dict[str, Any]:
+        """The parameters by their full names, with dots."""
+        return {name: _meant(value) for name, value in self.flat_texts.items()}
+
+    @property
+    def flat_texts(self) -> dict[str, Any]:
+        """The same, with what a parameter file says as it stands there."""
+        return _flat(self.params)
+
+
+def _flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in params.items():
+        found |= (
+            _flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": value}
+        )
+    return found
+
+
+def _meant(value: Any) -> Any:
+    """Return a word of a parameter file as ROS reads it, as far as switches and names need it: true, false, or text."""
+    if not isinstance(value, AsInFile):
+        return value
+    return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
+        value.lower(), str(value)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Process(PlanProcess):
+    """A process of the plan, with what only the compiler knows of it.
+
+    It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the
+    command ``argv``, which for the others holds the arguments, until ``planned`` makes the whole
+    command of them. ``part`` is the ``Part`` that it belongs to, if any. ``loads`` says that it is
+    a container of components, ``describes`` that its parameter ``robot_description`` is the URDF
+    for a stock robot_state_publisher. ``rate`` is that of the joint states that it sends.
+    ``host_at`` is where its host was named, if it was.
+    """
+
+    nodes: tuple[str, ...] = field(init=False)
+    lifecycle: dict[str, LifecycleState] = field(init=False)
+    at: Span = field(kw_only=True)
+    ros_nodes: tuple[Node, ...] = field(default=(), kw_only=True)
+    package: str | None = field(default=None, kw_only=True)
+    executable: str | None = field(default=None, kw_only=True)
+    launch: str | None = field(default=None, kw_only=True)
+    rate: float | None = field(default=None, kw_only=True)
+    part: str = field(default="", kw_only=True)
+    describes: bool = field(default=False, kw_only=True)
+    loads: bool = field(default=False, kw_only=True)
+    host_at: Span | None = field(default=None, kw_only=True, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nodes", tuple(node.name for node in self.ros_nodes))
+        states = {node.name: node.lifecycle for node in self.ros_nodes if node.lifecycle}
+        object.__setattr__(self, "lifecycle", states)
+
+    def planned(self, **made: Any) -> PlanProcess:
+        """Return the process as the plan has it, with fields that follow from the whole robot."""
+        return narrowed(PlanProcess, self, **made)
+
+    @property
+    def takes_ros_arguments(self) -> bool:
+        """Whether what follows on the command line reaches a node: a shell and a launch file do not pass it on."""
+        return self.launch is None and self.argv[:2] not in {SHELL, ROS2_LAUNCH}
+
+    @property
+    def node(self) -> str:
+        """The full name of the first node, which is the only one of most processes."""
+        return self.nodes[0] if self.nodes else ""
+
+    @property
+    def params(self) -> dict[str, Any]:
+        """The parameters of the first node."""
+        return self.ros_nodes[0].params if self.ros_nodes else {}
+
+
+@dataclass(frozen=True, slots=True)
+class Host(PlanHost):
+    """A computer of the plan, with the place of its name."""
+
+    at: Span = field(kw_only=True, compare=False)
+
+    def planned(self) -> PlanHost:
+        """Return the computer as the plan has it."""
+        return narrowed(PlanHost, self)
+
+
+@dataclass(frozen=True, slots=True)
+class Claim(PlanClaim):
+    """A claim of the plan, with the parameters that stop it, which ``switch`` is the text of."""
+
+    switch: str = field(init=False)
+    off: dict[str, Any] = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "switch", switch_text(self.off))
+
+    def planned(self) -> PlanClaim:
+        """Return the claim as the plan has it."""
+        return PlanClaim(self.node, self.parent, self.child, self.switch)

@@ -1,0 +1,278 @@
+"""A robot, its parts and sensors, and the numbers as they were written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import slip_of
+from tfcompose.foundation.tree import below, children_of
+from tfcompose.model.plan import EdgePattern, GuardPolicy, RosSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from tfcompose.foundation.findings import Note, Span
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.plan import ParameterValue
+    from tfcompose.model.robot.body import Link
+    from tfcompose.model.robot.edge import Edge
+    from tfcompose.model.robot.hardware import Block, Hardware
+    from tfcompose.model.robot.optics import Optics
+    from tfcompose.model.robot.process import Claim, Host, Process
+
+#: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, a link's,
+#: and a short one.
+OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical_link", "_optical")
+
+
+def is_optical(frame: str) -> bool:
+    """Return whether the frame's name says that z is its viewing direction."""
+    return frame.endswith(OPTICAL_ENDINGS)
+
+
+@dataclass(frozen=True, slots=True)
+class MountedSensor:
+    """A sensor as the rules see it: the frames that it brings, and its driver.
+
+    ``driver`` is the name of the driver's process, empty without one; ``switch`` holds the
+    parameters that keep the driver from publishing frames (None: there are none), ``publishes``
+    says that it may, ``by_default`` that it does where no parameter says so. ``claims`` are the
+    edges outside the sensor that it publishes by default and does not own, each with the
+    parameters that keep it from that. ``serial_option`` is the preset's option for a serial
+    number, empty where it has none. ``optics`` says what each of its streams sees, as far as that
+    is known.
+    """
+
+    name: str
+    preset: str
+    kind: str
+    at: Span
+    mount: str
+    frames: tuple[str, ...] = ()
+    driver_frames: tuple[str, ...] = ()
+    driver: str = ""
+    switch: dict[str, Any] | None = None
+    publishes: bool = False
+    claims: dict[str, dict[str, Any]] = field(default_factory=dict)
+    by_default: bool = True
+    serial_option: str = ""
+    serial: str | None = None
+    tf_at: Span | None = None
+    optics: tuple[Optics, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """A box that sensors have to see: its middle and lengths in ``frame``, in metres.
+
+    ``by`` names kinds of streams, or sensors, of which one has to see it; ``least`` is the part
+    that must be seen.
+    """
+
+    name: str
+    at: Span
+    frame: str
+    center: Vector
+    size: Vector
+    by: tuple[str, ...] = ()
+    least: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class SourceNumbers:
+    """The numbers of one pose or joint limit as the source file gives them, in SI, each with its place.
+
+    ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each
+    number whether it stands there with a unit, and ``place`` where the number of an index stands.
+    ``in_part`` is the entry's name in the whole robot where the file is that of a part.
+    """
+
+    path: tuple[str | int, ...]
+    numbers: tuple[float, ...]
+    with_unit: tuple[bool, ...]
+    place: Callable[[int], Span] = field(compare=False, repr=False)
+    in_part: str = ""
+
+    @property
+    def key(self) -> str:
+        """The value's key: ``xyz``, ``rpy``, ``look``, …."""
+        return str(self.path[-1])
+
+    @property
+    def entry(self) -> str:
+        """The name of the frame, link, joint, sensor or process that the value belongs to, as in its file."""
+        return str(self.path[1])
+
+    @property
+    def name(self) -> str:
+        """The entry's name in the robot."""
+        return self.in_part or self.entry
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part that is a robot of its own beside others, with its own ``static``, ``joints`` and description.
+
+    ``robot`` has the names of the part's own file; in the robot that holds it, frames and joints
+    have ``prefix`` too.
+    """
+
+    name: str
+    prefix: str
+    robot: Robot
+
+
+def may_be_refused(name: str, broken: frozenset[tuple[str, str]], known: Iterable[str]) -> bool:
+    """Return whether a name is one that an entry among the ``broken`` ones, (section, name), would have brought.
+
+    A part without a prefix may have brought any name; one that is a letter off the ``known`` ones
+    is wrong still.
+    """
+    if ("parts", "") in broken:
+        known = tuple(known)
+        return name in known or slip_of(name, known) is None
+    names, beginnings = _brought(broken)
+    return name in names or name.startswith(beginnings)
+
+
+def left_out_by(conditions: Mapping[tuple[str, str], str], name: str) -> str:
+    """Return advice about a name that an entry would have brought which its condition leaves out; empty else."""
+    for entry, condition in conditions.items():
+        names, beginnings = _brought(frozenset({entry}))
+        if name in names or name.startswith(beginnings):
+            return (
+                f"{entry[1]} is left out by its when: {condition}; give this entry the same when"
+            )
+    return ""
+
+
+@lru_cache(maxsize=8)  # a robot's names are looked up in the same entries
+def _brought(broken: frozenset[tuple[str, str]]) -> tuple[frozenset[str], tuple[str, ...]]:
+    """Return the names that refused entries would have brought, and how further ones would have begun."""
+    beginnings = [f"{entry}_" for section, entry in broken if section == "sensors"]
+    beginnings += [entry for section, entry in broken if section == "parts"]
+    return frozenset(entry for _, entry in broken), tuple(beginnings)
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot, resolved.
+
+    ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF
+    begins, or None where the tree has no single root; ``sensors`` are those with a known preset,
+    ``source_numbers`` the numbers of poses and limits before they became poses, ``unused`` the
+    paths of variables and arguments that nothing uses; ``args`` and ``environment`` are the values
+    that it was built with; ``source_data`` is the plain data that the robot was made from,
+    profiles laid over it; ``broken`` holds the entries (section, name) that were refused already,
+    of a part how its names begin; ``refused`` is where the refused entries of the file are.
+    ``parts`` are those that are robots of their own, ``mounted`` the root frame of each part by
+    its name, ``part_notes`` what to add to findings in a part's file. ``foreign`` are files of
+    other tools, in which nothing can be fixed here. A robot that ``is_variant`` is a file's with
+    profiles or overlays merged over it. ``zones`` are those that sensors have to see, ``limits``
+    what the file sets instead of the limits of codes, ``conditions`` those of the entries that
+    they leave out, by (section, name). ``hosts`` are the computers that it may run on, its parts'
+    among them; empty: not declared.
+    """
+
+    name: str
+    file: str
+    frames: dict[str, Span]
+    edges: tuple[Edge, ...]
+    links: dict[str, Link]
+    processes: tuple[Process, ...]
+    base: str | None
+    ros: RosSettings = field(default_factory=RosSettings)
+    guard: GuardPolicy = field(default_factory=GuardPolicy)
+    sensors: tuple[MountedSensor, ...] = ()
+    source_numbers: tuple[SourceNumbers, ...] = field(default=(), compare=False, repr=False)
+    unused: dict[tuple[str, str], Span] = field(default_factory=dict, compare=False)
+    args: dict[str, ParameterValue] = field(default_factory=dict, compare=False)
+    environment: dict[str, str] = field(default_factory=dict, compare=False)
+    source_data: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    broken: frozenset[tuple[str, str]] = frozenset()
+    claims: tuple[Claim, ...] = ()
+    parts: tuple[Part, ...] = ()
+    mounted: dict[str, str] = field(default_factory=dict, compare=False)
+    hardware: tuple[Hardware, ...] = ()
+    blocks: tuple[Block, ...] = ()
+    foreign: frozenset[str] = field(default=frozenset(), compare=False)
+    refused: tuple[Span, ...] = field(default=(), compare=False)
+    part_notes: dict[str, list[Note]] = field(default_factory=dict, compare=False)
+    is_variant: bool = field(default=False, compare=False)
+    zones: tuple[Zone, ...] = ()
+    limits: dict[str, float] = field(default_factory=dict, compare=False)
+    conditions: dict[tuple[str, str], str] = field(default_factory=dict, compare=False)
+    hosts: dict[str, Host] = field(default_factory=dict)
+
+    def final(self, frame: str) -> str:
+        """Return the frame's name on the live tree: with the prefix, unless it is shared."""
+        return frame if frame in self.ros.shared_frames else f"{self.ros.frame_prefix}{frame}"
+
+    def with_final_names(self) -> Robot:
+        """Return the robot with every frame named as on the live tree. URDF keeps plain names; RViz adds the prefix."""
+        if not self.ros.frame_prefix:
+            return self
+        final = self.final
+        allow = tuple(
+            EdgePattern(
+                *(final(name) if name in self.frames else name for name in (one.parent, one.child))
+            )
+            for one in self.guard.allow
+        )
+        return replace(
+            self,
+            frames={final(frame): at for frame, at in self.frames.items()},
+            edges=tuple(
+                replace(
+                    edge,
+                    parent=final(edge.parent),
+                    child=final(edge.child),
+                    switched=tuple(final(parent) for parent in edge.switched),
+                )
+                for edge in self.edges
+            ),
+            base=self.base and final(self.base),
+            claims=tuple(
+                replace(one, parent=final(one.parent), child=final(one.child))
+                for one in self.claims
+            ),
+            guard=replace(self.guard, allow=allow),
+        )
+
+    def excuses(self, name: str) -> bool:
+        """Return whether a frame, process or joint may be missing only because an entry was refused already."""
+        return may_be_refused(
+            name, self.broken, chain(self.frames, (process.name for process in self.processes))
+        )
+
+    def is_foreign(self, at: Span | None) -> bool:
+        """Return whether the place is in a URDF, or what xacro made: advice speaks of XML there."""
+        return at is not None and at.file in self.foreign
+
+    def parent_edge(self, child: str) -> Edge | None:
+        """Return the first edge whose child is the frame, or None for a root."""
+        return next((edge for edge in self.edges if edge.child == child), None)
+
+    def roots(self) -> list[str]:
+        """Return the declared frames that no edge has as its child, in the order of declaration."""
+        children = {edge.child for edge in self.edges}
+        return [frame for frame in self.frames if frame not in children]
+
+    def children(self) -> dict[str, list[Edge]]:
+        """Return the edges of each parent, in the order of declaration."""
+        table: dict[str, list[Edge]] = {}
+        for edge in self.edges:
+            table.setdefault(edge.parent, []).append(edge)
+        return table
+
+    def described(self) -> set[str]:
+        """Return the frames that a URDF can hold: the base, and what is below it over edges of known pose."""
+        known = [(edge.parent, edge.child) for edge in self.edges if edge.pose_known]
+        return below(children_of(known), self.base) if self.base is not None else set()
+
+    def below(self, frame: str) -> set[str]:
+        """Return the frame and every frame that hangs below it, over edges of any owner."""
+        return below(children_of((edge.parent, edge.child) for edge in self.edges), frame)

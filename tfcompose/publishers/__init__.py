@@ -1,5 +1,0 @@
-"""tfcompose's own publishers: static edges, moving joints, simulations, and the robot's description.
-
-Each is a process of the plan: ``python -m tfcompose.publishers.static PLAN_FILE PROCESS_NAME``, ``.joints``,
-``.simulate``. Must not import ``launcher``, ``guard``, ``live``, ``pydantic``.
-"""

@@ -1,4 +1,0 @@
-"""Makes text of what commands print: findings for people and programs, a robot's tree, and poses.
-
-Must not import ``cli``, ``compile``, ``plan``: it returns text and prints nothing.
-"""

@@ -1,5 +1,0 @@
-"""All that touches ROS: nodes, QoS, the bytes of TFMessage, the graph, and services.
-
-The only importer of rclpy. Stamps are nanoseconds; poses are metres and quaternions x, y, z, w. Must not import
-``live``, ``model``, ``tf2``, ``verdict``: it observes nothing by itself.
-"""

@@ -1,0 +1,47 @@
+"""The language of robot files, presets and calibration sections: pydantic models, and what merges files.
+
+The models are the one description of validation, JSON Schema and reference. ``overlay`` merges
+sources, ``validate`` makes a ``RobotSpec`` of one.
+"""
+
+from tfcompose.spec.language.args import ArgSpec, Given, GivenArg
+from tfcompose.spec.language.fleet import FleetSpec
+from tfcompose.spec.language.overlay import (
+    as_part,
+    composed,
+    lay_over,
+    profiles_in,
+    set_value,
+    with_includes,
+)
+from tfcompose.spec.language.pose import DIRECTIONS
+from tfcompose.spec.language.validate import (
+    Validated,
+    levels_of,
+    validate,
+    validate_fleet,
+    validate_node_preset,
+    validate_preset,
+)
+from tfcompose.spec.language.variables import alternatives_of
+
+__all__ = [
+    "DIRECTIONS",
+    "ArgSpec",
+    "FleetSpec",
+    "Given",
+    "GivenArg",
+    "Validated",
+    "alternatives_of",
+    "as_part",
+    "composed",
+    "lay_over",
+    "levels_of",
+    "profiles_in",
+    "set_value",
+    "validate",
+    "validate_fleet",
+    "validate_node_preset",
+    "validate_preset",
+    "with_includes",
+]

@@ -1,0 +1,287 @@
+"""``args``: values that a robot is built with, given by the command line, the environment or what holds the robot."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator
+from pydantic_core import PydanticCustomError
+
+from tfcompose.foundation.findings import Span, did_you_mean
+from tfcompose.foundation.units import (
+    NUMBER,
+    Quantity,
+    Truth,
+    UnitError,
+    quantity,
+    refused,
+    shown,
+    with_article,
+)
+from tfcompose.spec.language.expressions import IDENTIFIER, Value, inserted
+from tfcompose.spec.language.spec import Checked, key
+from tfcompose.spec.language.values import Text, VariableName, plain
+from tfcompose.spec.load import Path
+from tfcompose.spec.load.scalars import plain as scalar
+
+ArgType = Literal["bool", "int", "float", "string"]
+#: What a value of a type is called.
+_CALLED: dict[ArgType, str] = {
+    "bool": "true or false",
+    "int": "a whole number",
+    "float": "a number",
+    "string": "a string",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class GivenArg:
+    """A value that an argument is given, and where; on the command line and in the environment it is a text."""
+
+    value: Any
+    at: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a robot file is built with: values of its arguments by name, and the environment."""
+
+    args: Mapping[str, GivenArg] = field(default_factory=dict)
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+
+class ArgError(ValueError):
+    """A value is not one that the argument can have; ``code`` is the finding's, ``advice`` its help."""
+
+    def __init__(self, code: str, message: str, advice: str = "") -> None:
+        super().__init__(message)
+        self.code = code
+        self.advice = advice
+
+
+def _scalar(value: Any) -> Any:
+    value = plain(value)
+    if isinstance(value, (dict, list)):
+        raise refused("TF103", f"{shown(value)} is not a string, number, true or false")
+    return value
+
+
+Scalar = Annotated[Any, BeforeValidator(_scalar, str | float | bool)]
+
+
+class ArgSpec(Checked):
+    """A value that is given when the robot is built: NAME:=VALUE. Without a default it has to be given."""
+
+    type: ArgType | None = key(
+        None, "default: what default, or the first of choices, is; else string", "int"
+    )
+    default: Scalar | None = key(None, "its value where none is given", 2, "30 cm", False)
+    choices: tuple[Scalar, ...] = key((), "the values that it can have", ["velodyne", "ouster"])
+    min: Scalar | None = key(None, "the least that it can be", 0)
+    max: Scalar | None = key(None, "the most that it can be", 8)
+    description: Text | None = key(
+        None, "what it is for; --show-args prints it", "how many cameras there are"
+    )
+    env: VariableName | None = key(
+        None, "the environment variable that gives it where the command line does not", "CAMERAS"
+    )
+
+    @property
+    def kind(self) -> ArgType:
+        """Its type, as declared, or as its default, first choice or bounds have it."""
+        if self.type is not None:
+            return self.type
+        known = [
+            one for one in (self.default, *self.choices, self.min, self.max) if one is not None
+        ]
+        kinds = [_kind(one) for one in known]
+        return (
+            "float"
+            if "float" in kinds[:1] or (kinds[:1] == ["int"] and "float" in kinds)
+            else (*kinds, "string")[0]
+        )
+
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """The values that are judged, as the command line gives them: all, or an integer's bounds and default.
+
+        Empty where there is neither a choice nor a bound.
+        """
+        if self.choices:
+            return tuple(as_given(one) for one in self.choices)
+        if self.kind == "int" and (self.min is not None or self.max is not None):
+            try:
+                known = {
+                    inserted(self.typed(one)): None
+                    for one in (self.min, self.default, self.max)
+                    if one is not None
+                }
+            except ArgError:
+                return ()  # it is refused for that
+            return tuple(known)
+        return ("false", "true") if self.kind == "bool" else ()
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also choices, bounds and a default that are of another type, or a default that it cannot have."""
+        yield from super().check(data)
+        try:
+            spec = cls.model_validate(
+                {name: data[name] for name in data if name in cls.model_fields}
+            )
+        except ValueError:
+            return  # it is refused for that
+        for name in ("min", "max"):
+            if name in data and spec.kind not in {"int", "float"}:
+                message = f"{name} is for numbers, and the argument is {_CALLED[spec.kind]}"
+                yield (name,), refused("TF107", message, on_key=True)
+                return
+        for path, value in ((("min",), spec.min), (("max",), spec.max), *_indexed(spec.choices)):
+            try:
+                if value is not None:
+                    spec.typed(value)
+            except ArgError as error:
+                yield path, refused(error.code, str(error), error.advice)
+                return
+        try:
+            if spec.default is not None:
+                spec.value(spec.default)
+        except ArgError as error:
+            yield ("default",), refused(error.code, str(error), error.advice)
+
+    def value(self, given: Any) -> Value:
+        """Return what an expression has for a value that is given, or is the default.
+
+        Raises:
+            ArgError: if the argument cannot have it.
+        """
+        value = self.typed(given)
+        if self.choices:
+            choices = [self.typed(one) for one in self.choices]
+            if value not in choices:
+                words = [as_given(one) for one in self.choices]
+                raise ArgError(
+                    "TF106",
+                    f"{shown(given)} is not one of the choices",
+                    _one_of(inserted(value), words),
+                )
+        for bound, sign, what in ((self.min, 1, "less"), (self.max, -1, "greater")):
+            limit = self.typed(bound) if bound is not None else None
+            if (
+                isinstance(limit, Quantity)
+                and isinstance(value, Quantity)
+                and sign * (value.value - limit.value) < 0
+            ):
+                raise ArgError("TF106", f"{shown(given)} is {what} than {bound}", self._range())
+        return value
+
+    def _range(self) -> str:
+        bounds = [
+            f"at least {self.min}" if self.min is not None else "",
+            f"at most {self.max}" if self.max is not None else "",
+        ]
+        return ", ".join(filter(None, bounds))
+
+    def typed(self, given: Any) -> Value:
+        """Return the value as one of the argument's type.
+
+        Raises:
+            ArgError: if it is of another type.
+        """
+        kind = self.kind
+        given = plain(given)
+        read = _read(given) if isinstance(given, str) and kind != "string" else given
+        if kind == "string" and isinstance(given, str):
+            return given
+        if kind == "bool" and isinstance(read, bool):
+            return read
+        number = read if isinstance(read, Quantity) else None
+        if isinstance(read, (int, float)) and not isinstance(read, bool):
+            number = Quantity(read)
+        if (
+            number
+            and kind == "int"
+            and number.dimension == NUMBER
+            and number.value == int(number.value)
+        ):
+            return Quantity(int(number.value))
+        if number and kind == "float":
+            self._refuse_dimension(number, given)
+            return (
+                Quantity(float(number.value)) if number.dimension == NUMBER else number
+            )  # a node's double
+        advice = {"bool": "true or false", "string": "put it in quotes"}.get(kind, "")
+        raise ArgError("TF103", f"{shown(given)} is not {_CALLED[kind]}", advice)
+
+    def _refuse_dimension(self, number: Quantity, given: Any) -> None:
+        known = (self.default, *self.choices, self.min, self.max)
+        own = [
+            found.dimension
+            for one in known
+            if isinstance(one, str) and isinstance(found := _read(one), Quantity)
+        ]
+        other = next((one for one in own if one != NUMBER), number.dimension)
+        if number.dimension not in {NUMBER, other}:
+            raise ArgError(
+                "TF104",
+                f"{shown(given)} is {with_article(number.dimension)}, not {with_article(other)}",
+            )
+
+
+def _indexed(values: tuple[Any, ...]) -> Iterator[tuple[Path, Any]]:
+    for index, value in enumerate(values):
+        yield ("choices", index), value
+
+
+def _one_of(word: str, words: list[str]) -> str:
+    listed = f"one of: {', '.join(words)}"
+    near = did_you_mean(word, words)
+    return f"{near} {listed}" if near else listed
+
+
+def _kind(value: Any) -> ArgType:
+    if isinstance(value, bool):
+        return "bool"
+    if isinstance(value, (int, float)):
+        return "int" if isinstance(value, int) else "float"
+    read = _read(value)
+    return "float" if isinstance(read, Quantity) and read.dimension != NUMBER else "string"
+
+
+def _read(text: str) -> Any:
+    """Return what a text says: a number, a quantity, true or false, or itself."""
+    try:
+        value = scalar(text.strip())
+        return value if isinstance(value, (bool, int, float)) else quantity(text)
+    except (UnitError, OverflowError):
+        return text
+
+
+def as_given(value: Any) -> str:
+    """Return a value as the command line gives it."""
+    return shown(value) if isinstance(value, bool) else str(value)
+
+
+def _is_name(name: str) -> str:
+    if not IDENTIFIER.fullmatch(name):
+        raise refused(
+            "TF106",
+            f"{name!r} cannot name an argument",
+            "letters, digits and _: for example cameras",
+        )
+    return name
+
+
+def full(value: Any) -> Any:
+    """Return an argument as a mapping; a value alone is its default."""
+    return (
+        value
+        if isinstance(value, dict)
+        else {"default": value.value if isinstance(value, Truth) else value}
+    )
+
+
+Args = dict[
+    Annotated[Text, AfterValidator(_is_name)],
+    Annotated[ArgSpec, BeforeValidator(full, str | float | bool | ArgSpec)],
+]

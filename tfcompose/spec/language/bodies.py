@@ -1,0 +1,183 @@
+"""Bodies as users write them: shapes, colours, masses and links."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Discriminator, Tag
+from pydantic_core import PydanticCustomError
+
+from tfcompose.foundation.units import Density, Inertia, Mass, Size, refused
+from tfcompose.spec.language.pose import MountKeys, Posed, Rotated
+from tfcompose.spec.language.spec import Spec, key
+from tfcompose.spec.language.values import Colour, Name, Scale, Sizes, Text, Xyz, listed, short
+from tfcompose.spec.load import Path
+
+
+class Cylinder(Spec):
+    """A cylinder along z, its middle at the origin."""
+
+    radius: Size = key(..., "the radius")
+    length: Size = key(..., "the length along z")
+
+
+class Capsule(Spec):
+    """A cylinder along z with a half sphere on either end, its middle at the origin."""
+
+    radius: Size = key(..., "the radius of the cylinder and of its ends")
+    length: Size = key(..., "the length of the cylinder alone: the capsule is two radii longer")
+
+
+class Sphere(Spec):
+    """A sphere around the origin."""
+
+    radius: Size = key(..., "the radius")
+
+
+class Mesh(Spec):
+    """A file of triangles."""
+
+    uri: Text = key(
+        ...,
+        "package://…, file://…, or a path relative to the file that names it",
+        "package://my_robot/meshes/base.stl",
+        "meshes/base.stl",
+    )
+    scale: Scale = key(
+        (1.0, 1.0, 1.0), "metres in one unit of the file; or along x, y and z", 0.001
+    )
+
+
+class Material(Spec):
+    """A colour or a texture, and its name. The name alone refers to the material that has it elsewhere."""
+
+    name: Name | None = key(None, "its name; default: named after the colour", "blue")
+    rgba: Colour | None = key(
+        None, "red, green, blue and opacity, from 0 to 1; or a name", [0.2, 0.4, 0.8, 1], "blue"
+    )
+    texture: Text | None = key(
+        None, "an image: package://…, file://…, or a relative path", "textures/wood.png"
+    )
+
+
+SHAPES = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
+
+
+class Shape(Posed):
+    """One shape and where it is in its link: a box, cylinder, sphere, capsule or mesh."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
+        *Posed.EXCLUSIVE,
+        SHAPES,
+        frozenset({"color", "material"}),
+    )
+
+    box: Sizes | None = key(
+        None, "a box of these lengths along x, y and z, its middle at the origin", [0.5, 0.4, 0.15]
+    )
+    cylinder: Cylinder | None = key(None, "a cylinder along z", {"radius": 0.1, "length": "5 cm"})
+    sphere: Sphere | None = key(None, "a sphere", {"radius": 0.1})
+    capsule: Capsule | None = key(
+        None,
+        "a cylinder along z with round ends; in URDF a cylinder and two spheres, which every"
+        " reader takes",
+        {"radius": 0.1, "length": 0.3},
+    )
+    mesh: Annotated[Mesh, short("uri", Mesh)] | None = key(
+        None, "a file, or {uri, scale}", "meshes/base.stl"
+    )
+    color: Colour | None = key(
+        None,
+        "red, green, blue and, if need be, opacity, from 0 to 1; or a name",
+        [0, 0, 1],
+        "blue",
+    )
+    material: Annotated[Material, short("name", Material)] | None = key(
+        None,
+        "its colour or texture; or the name of one, or of a colour",
+        {"rgba": [0.2, 0.4, 0.8, 1]},
+        "blue",
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also that no shape is given."""
+        yield from super().check(data)
+        if not SHAPES & data.keys() and data.keys() <= cls.model_fields.keys():
+            advice = f"one of {', '.join(sorted(SHAPES))}"
+            yield (), refused("TF102", "no shape is given", advice, on_key=True, keeps=True)
+
+
+class Tensor(Spec):
+    """A moment of inertia about the centre of mass."""
+
+    ixx: Inertia = key(..., "the moment about x", 0.01)
+    iyy: Inertia = key(..., "the moment about y", 0.01)
+    izz: Inertia = key(..., "the moment about z", 0.02)
+    ixy: Inertia = key(0.0, "the product of x and y")
+    ixz: Inertia = key(0.0, "the product of x and z")
+    iyz: Inertia = key(0.0, "the product of y and z")
+
+
+MASSES = frozenset({"mass", "density"})
+
+
+class Inertial(Rotated):
+    """A link's mass and its distribution; the pose is that of the centre of mass, by default that of the shapes."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*Rotated.EXCLUSIVE, MASSES)
+
+    xyz: Xyz | None = key(
+        None, "position of the centre of mass; default: that of the shapes", [0, 0, 0.05]
+    )
+    mass: Mass | None = key(None, "the mass of the whole link", "10 kg")
+    density: Density | None = key(
+        None, "the density of the link's shapes, instead of the mass", "1 g/cm^3", 2700
+    )
+    inertia: Tensor | None = key(
+        None,
+        "the tensor about the centre of mass; default: computed from the shapes",
+        {"ixx": 0.01, "iyy": 0.01, "izz": 0.02},
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also that no mass is given."""
+        yield from super().check(data)
+        if not MASSES & data.keys():
+            advice = "for example mass: 10 kg, or density: 1 g/cm^3"
+            yield (), refused("TF102", "mass is missing", advice, on_key=True, keeps=True)
+
+
+#: A list of shapes, or one shape for a list of one.
+Shapes = Annotated[tuple[Shape, ...], BeforeValidator(listed, Shape | tuple[Shape, ...])]
+Collision = Annotated[
+    Annotated[Literal["same"], Tag("[same]")] | Annotated[Shapes, Tag("[shapes]")],
+    Discriminator(lambda value: "[same]" if isinstance(value, str) else "[shapes]"),
+]
+
+
+class LinkSpec(MountKeys):
+    """A body, in URDF's words. With a parent it has a fixed edge."""
+
+    visual: Shapes = key(
+        (), "the shape that is seen, or a list of them", {"box": [0.5, 0.4, 0.15]}
+    )
+    collision: Collision = key(
+        (), "the shape that collides, or a list of them; same: those of visual", "same"
+    )
+    inertial: Inertial | None = key(None, "the mass and its distribution", {"mass": "10 kg"})
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also a mass of which no distribution follows."""
+        yield from super().check(data)
+        inertial = data.get("inertial")
+        if not isinstance(inertial, dict) or not MASSES & inertial.keys():
+            return
+        shapes = [data[key] for key in ("visual", "collision") if key in data]
+        if all(one in ([], "same") for one in shapes) and (
+            "inertia" not in inertial or "density" in inertial
+        ):
+            advice = "give a visual or a collision shape, or mass and inertia: {ixx, iyy, izz}"
+            message = "no shape and no inertia: the mass has no distribution"
+            yield ("inertial",), refused("TF102", message, advice, on_key=True, keeps=True)

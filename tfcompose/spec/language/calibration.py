@@ -1,0 +1,551 @@
+"""What a calibration file says: poses with a direction and a place.
+
+Every entry is the pose of its ``child`` in its ``parent``. Sources of the formats:
+
+- autoware: ``sensors_calibration.yaml`` of a sensor kit, parent: {child: {x, y, z, roll, pitch,
+  yaw}}, metres and radians about fixed axes, as xacro puts them into a joint's origin.
+- easy_handeye2: its HandeyeCalibration message as YAML; the parent is robot_effector_frame for
+  eye_in_hand, else robot_base_frame, the child is tracking_base_frame. Its first version and
+  easy_handeye wrote ``transformation``.
+- moveit: the launch file that "Save camera pose" writes, with one static_transform_publisher.
+- kalibr: camchain and imucam files. ``T_cam_imu`` takes points from the IMU to the camera, so it
+  is the pose of the IMU in the camera; ``T_cn_cnm1`` of cam1 takes points from cam0 to cam1: the
+  pose of cam0 in cam1.
+- transform_stamped: geometry_msgs/TransformStamped and tf2_msgs/TFMessage: the pose of
+  child_frame_id in frame_id.
+- matrix: four rows of four numbers that take points from the child to the parent; it has no names.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
+
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, model_validator
+
+from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, finding
+from tfcompose.foundation.geometry import (
+    Pose,
+    Quaternion,
+    normalised,
+    quat_from_matrix,
+    quat_from_rpy,
+)
+from tfcompose.foundation.units import Number, refused, shown
+from tfcompose.spec.language.pose import CalibrationFormat, has_unit_length, is_rotation
+from tfcompose.spec.language.reading import Refusal, read
+from tfcompose.spec.language.spec import Spec
+from tfcompose.spec.language.values import InARow, Text
+from tfcompose.spec.load.calibration import load_calibration
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.load.calibration import Form
+
+FORMATS: tuple[CalibrationFormat, ...] = get_args(CalibrationFormat)
+
+_LONGEST_NUMBER = 60
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+_EXACT = 1e-9
+#: What is wrong with a rotation itself, not with how it is written.
+_NO_ROTATION = frozenset({"TF402", "TF403", "TF614"})
+
+
+def _is_no_expression(value: Any) -> Any:
+    if isinstance(value, str) and ("${" in value or "(" in value):
+        advice = "write the number; an angle in degrees: !degrees 15"
+        raise refused(
+            "TF103", f"{shown(value)} is an expression, which is not computed here", advice
+        )
+    if isinstance(value, str) and len(value) > _LONGEST_NUMBER:
+        raise refused("TF103", f"{shown(value)} is not a number")
+    return value
+
+
+def _frame(name: str) -> str:
+    if not name.strip("/"):
+        raise refused("TF103", f"{shown(name)} is not a frame's name")
+    return name.lstrip("/")
+
+
+CalibrationNumber = Annotated[Number, BeforeValidator(_is_no_expression)]
+FrameName = Annotated[Text, AfterValidator(_frame)]
+_Row = Annotated[
+    tuple[CalibrationNumber, CalibrationNumber, CalibrationNumber, CalibrationNumber],
+    InARow(4, "[1, 0, 0, 0.2]"),
+]
+_Rows = tuple[_Row, _Row, _Row, _Row]
+
+
+def _last_row(rows: _Rows) -> _Rows:
+    if any(abs(a - b) > _EXACT for a, b in zip(rows[3], _LAST_ROW, strict=True)):
+        is_transposed = all(abs(rows[i][3]) <= _EXACT for i in range(3))
+        advice = (
+            "it is transposed: the position belongs in the last column" if is_transposed else ""
+        )
+        message = f"the last row is {' '.join(f'{value:g}' for value in rows[3])}, not 0 0 0 1"
+        raise refused("TF614", message, advice)
+    a, b, c, _ = rows
+    is_rotation(((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])))
+    return rows
+
+
+#: A homogeneous 4×4 matrix, in rows.
+MatrixRows = Annotated[_Rows, InARow(4, "four rows of four numbers"), AfterValidator(_last_row)]
+
+
+class FileEntry(Spec):
+    """A mapping in a calibration file; what else it holds does not matter here."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
+class Translation(FileEntry):
+    """geometry_msgs/Vector3, in metres."""
+
+    x: CalibrationNumber
+    y: CalibrationNumber
+    z: CalibrationNumber
+
+
+class Rotation(FileEntry):
+    """geometry_msgs/Quaternion."""
+
+    x: CalibrationNumber
+    y: CalibrationNumber
+    z: CalibrationNumber
+    w: CalibrationNumber
+
+    @property
+    def quat_xyzw(self) -> Quaternion:
+        """The quaternion x, y, z, w."""
+        return (self.x, self.y, self.z, self.w)
+
+
+def _unit(rotation: Rotation) -> Rotation:
+    has_unit_length(rotation.quat_xyzw)
+    return rotation
+
+
+class Transform(FileEntry):
+    """geometry_msgs/Transform."""
+
+    translation: Translation
+    rotation: Annotated[Rotation, AfterValidator(_unit)]
+
+    @property
+    def pose(self) -> Pose:
+        """The pose that it is."""
+        xyz = (self.translation.x, self.translation.y, self.translation.z)
+        return Pose(xyz, normalised(self.rotation.quat_xyzw))
+
+
+class Header(FileEntry):
+    """std_msgs/Header, of which the frame matters."""
+
+    frame_id: FrameName
+
+
+class TransformStamped(FileEntry):
+    """geometry_msgs/TransformStamped."""
+
+    header: Header
+    child_frame_id: FrameName
+    transform: Transform
+
+
+class PoseXyzRpy(FileEntry):
+    """A position, and angles about fixed axes: as Autoware writes them, and as arguments."""
+
+    x: CalibrationNumber
+    y: CalibrationNumber
+    z: CalibrationNumber
+    roll: CalibrationNumber
+    pitch: CalibrationNumber
+    yaw: CalibrationNumber
+
+    @property
+    def pose(self) -> Pose:
+        """The pose that it is."""
+        return Pose((self.x, self.y, self.z), quat_from_rpy(self.roll, self.pitch, self.yaw))
+
+
+class PoseXyzQuat(FileEntry):
+    """A position and a unit quaternion: as easy_handeye wrote them, and as arguments."""
+
+    x: CalibrationNumber
+    y: CalibrationNumber
+    z: CalibrationNumber
+    qx: CalibrationNumber
+    qy: CalibrationNumber
+    qz: CalibrationNumber
+    qw: CalibrationNumber
+
+    @property
+    def pose(self) -> Pose:
+        """The pose that it is."""
+        return Pose((self.x, self.y, self.z), normalised((self.qx, self.qy, self.qz, self.qw)))
+
+    @model_validator(mode="after")
+    def _has_unit_length(self) -> PoseXyzQuat:
+        has_unit_length((self.qx, self.qy, self.qz, self.qw))
+        return self
+
+
+class HandeyeTransform(FileEntry):
+    """HandeyeCalibration of easy_handeye2, without its parameters."""
+
+    transform: Transform
+
+
+class HandeyeTransformation(FileEntry):
+    """The same as its first version, and easy_handeye, wrote it."""
+
+    transformation: PoseXyzQuat
+
+
+class EyeInHand(FileEntry):
+    """Parameters of a camera on the hand."""
+
+    robot_effector_frame: FrameName
+    tracking_base_frame: FrameName
+
+
+class EyeOnBase(FileEntry):
+    """Parameters of a camera beside the robot."""
+
+    robot_base_frame: FrameName
+    tracking_base_frame: FrameName
+
+
+class HandeyeKind(FileEntry):
+    """Which of the two it is, as easy_handeye2 has it."""
+
+    calibration_type: Text
+
+
+class KalibrCamera(FileEntry):
+    """One camera of a camchain: the IMU, and the camera before it, as seen from this one."""
+
+    T_cam_imu: MatrixRows | None = None
+    T_cn_cnm1: MatrixRows | None = None
+
+
+class MatrixFile(FileEntry):
+    """A file that is one matrix."""
+
+    matrix: MatrixRows
+
+
+#: What a static_transform_publisher takes for a flag that is not given.
+_DEFAULTS: dict[type[PoseXyzQuat | PoseXyzRpy], dict[str, str]] = {
+    PoseXyzQuat: dict.fromkeys(PoseXyzQuat.model_fields, "0") | {"qw": "1"},
+    PoseXyzRpy: dict.fromkeys(PoseXyzRpy.model_fields, "0"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """The pose of ``child`` in ``parent``, by the names of the file; ``what`` is the key that holds it, if it matters.
+
+    A matrix has no names.
+    """
+
+    pose: Pose
+    at: Span
+    parent: str | None = None
+    child: str | None = None
+    what: str = ""
+
+    @property
+    def name(self) -> str:
+        """The entry as people read it."""
+        return f"{self.parent} → {self.child}" if self.parent else "the matrix"
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationFile:
+    """What a calibration file says; ``found`` holds what is wrong with it, at the place that names it."""
+
+    file: str
+    format: str
+    entries: tuple[Entry, ...]
+    found: tuple[Finding, ...]
+
+
+def unreadable(file: str, form: str, at: Span, found: Iterable[Finding]) -> CalibrationFile:
+    """Return what a file says that cannot be read: nothing, and why."""
+    exact = (replace(one, span=None) if one.span == Span(file) else one for one in found)
+    return CalibrationFile(file, form, (), tuple(_inside("TF610", one, file, at) for one in exact))
+
+
+def _inside(code: str, found: Finding, file: str, at: Span) -> Finding:
+    """Return a finding inside a calibration file as one at the place that names the file."""
+    notes = [Note("here", found.span), *found.notes] if found.span else found.notes
+    return finding(code, f"{file}: {found.message}", at, help=found.help, notes=notes)
+
+
+def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFile:
+    """Return what the text says, read in the format, which ``auto`` recognises; ``at`` is where the file is named."""
+    try:
+        kind, documents = load_calibration(text, file)
+    except RejectedError as error:
+        return unreadable(file, form, at, error.findings)
+    wrong = [one for document in documents for one in document.found]
+    if wrong:
+        return CalibrationFile(
+            file, form, (), tuple(_inside("TF610", one, file, at) for one in wrong)
+        )
+    known = _recognised(kind, documents)
+    chosen = known if form == "auto" else form
+    if chosen is None or not documents:
+        what = "is empty" if not documents else "is in no known format"
+        advice = f"formats: {', '.join(FORMATS)}; tfcompose help calibration shows them"
+        return CalibrationFile(file, form, (), (_of_no_format(file, what, at, advice),))
+    if chosen != known and (kind != "yaml" or chosen == "moveit"):
+        advice = (
+            f"leave format out; it reads like {known}"
+            if known
+            else f"formats: {', '.join(FORMATS)}"
+        )
+        return CalibrationFile(
+            file, chosen, (), (_of_no_format(file, f"is not a {chosen} file", at, advice),)
+        )
+    reader = _Reader(at)
+    for document in documents:
+        reader.source = document
+        reader.entries += _READERS[chosen](reader, document.data)
+    if not reader.entries and not reader.found:
+        reader.found.append(_of_no_format(file, f"holds no pose, read as {chosen}", at))
+    return CalibrationFile(file, chosen, tuple(reader.entries), tuple(reader.found))
+
+
+def _of_no_format(file: str, what: str, at: Span, advice: str = "") -> Finding:
+    return finding("TF611", f"{file} {what}", at, help=advice, notes=[Note("here", Span(file))])
+
+
+_AUTOWARE_KEYS = frozenset(PoseXyzRpy.model_fields)
+_CAMERA = re.compile(r"cam(\d+)\Z")
+
+
+def _recognised(kind: Form, documents: tuple[Source, ...]) -> str | None:
+    """Return the format that the documents look like, or None."""
+    if kind != "yaml":
+        return {"rows": "matrix", "launch": "moveit"}[kind]
+    data: Any = documents[0].data if documents else None
+    if isinstance(data, list):
+        return "matrix" if data and all(isinstance(row, list) for row in data) else None
+    if not isinstance(data, dict):
+        return None
+    if "transforms" in data or {"transform", "header"} <= set(data):
+        return "transform_stamped"
+    if {"transform", "transformation"} & set(data):
+        return "easy_handeye2"
+    inner = [value for value in data.values() if isinstance(value, dict)]
+    if any(map(_CAMERA.match, data)) and inner:
+        return "kalibr"
+    leaves = [leaf for child in inner for leaf in child.values() if isinstance(leaf, dict)]
+    return "autoware" if any(_AUTOWARE_KEYS & set(leaf) for leaf in leaves) else None
+
+
+M = TypeVar("M", bound=FileEntry)
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Reads documents in each of the formats; an entry that is wrong is a finding, and the others are taken."""
+
+    named_at: Span
+    source: Source = field(init=False)
+    entries: list[Entry] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
+
+    def model(self, model: type[M], data: Any, path: Path) -> M | None:
+        """Return what is at a path as the model, or None after noting what is wrong with it."""
+        made, refusals = read(model, data)
+        missing: set[Path] = set()
+        for one in refusals:
+            if one.code == "TF102" and one.path in missing:
+                continue  # one of several keys tells what the mapping should have been
+            missing.add(one.path)
+            at = (*path, *one.path[1:]) if model is MatrixFile else (*path, *one.path)
+            self._refused(replace(one, path=at, on_key=False))
+        return None if refusals else made
+
+    def refuse(self, path: Path, message: str, advice: str = "") -> None:
+        """Note what is wrong at a path."""
+        self._refused(Refusal("TF610", path, message, advice))
+
+    def _refused(self, one: Refusal) -> None:
+        code = "TF614" if one.code in _NO_ROTATION else "TF610"
+        self.found.append(_inside(code, one.finding(self.source), self.source.file, self.named_at))
+
+    def entry(
+        self,
+        path: Path,
+        pose: Pose,
+        parent: str | None = None,
+        child: str | None = None,
+        what: str = "",
+    ) -> Entry:
+        """Return the entry at a path."""
+        span = self.source.at_key(path) if self.source.has_key(path) else self.source.at(path)
+        return Entry(pose, span, parent, child, what)
+
+    def autoware(self, data: Any) -> Iterator[Entry]:
+        """Yield the entries of a sensor kit."""
+        for parent, children in data.items() if isinstance(data, dict) else ():
+            for child, values in children.items() if isinstance(children, dict) else ():
+                one = self.model(PoseXyzRpy, values, (parent, child))
+                if one:
+                    yield self.entry(
+                        (parent, child), one.pose, parent.lstrip("/"), child.lstrip("/")
+                    )
+
+    def easy_handeye2(self, data: Any) -> Iterator[Entry]:
+        """Yield the one entry of a hand-eye calibration."""
+        at: Path = ("parameters",) if isinstance(data, dict) and "parameters" in data else ()
+        names = self._handeye_names(data["parameters"] if at else data, at)
+        if names is None:
+            return
+        if "transformation" in data:
+            old = self.model(HandeyeTransformation, data, ())
+            if old:
+                yield self.entry(("transformation",), old.transformation.pose, *names)
+            return
+        new = self.model(HandeyeTransform, data, ())
+        if new:
+            yield self.entry(("transform",), new.transform.pose, *names)
+
+    def _handeye_names(self, data: Any, path: Path) -> tuple[str, str] | None:
+        """Return the frames that it is about."""
+        is_in_hand = data.get("eye_on_hand") if isinstance(data, dict) else None
+        if is_in_hand is None:
+            kind = self.model(HandeyeKind, data, path)
+            if kind is None:
+                return None
+            is_in_hand = kind.calibration_type in {"eye_in_hand", "eye_on_hand"}
+        if is_in_hand:
+            hand = self.model(EyeInHand, data, path)
+            return (hand.robot_effector_frame, hand.tracking_base_frame) if hand else None
+        base = self.model(EyeOnBase, data, path)
+        return (base.robot_base_frame, base.tracking_base_frame) if base else None
+
+    def transform_stamped(self, data: Any) -> Iterator[Entry]:
+        """Yield the entries of a message, or of a message with several."""
+        is_list = isinstance(data, dict) and "transforms" in data
+        messages = data["transforms"] if is_list else [data]
+        if not isinstance(messages, list):
+            self.refuse(("transforms",), f"{shown(messages)} is not a list of transforms")
+            return
+        for index, message in enumerate(messages):
+            path: Path = ("transforms", index) if is_list else ()
+            one = self.model(TransformStamped, message, path)
+            if one:
+                yield self.entry(path, one.transform.pose, one.header.frame_id, one.child_frame_id)
+
+    def kalibr(self, data: Any) -> Iterator[Entry]:
+        """Yield what each camera sees: the IMU, and the camera before it."""
+        for camera, values in data.items() if isinstance(data, dict) else ():
+            number = _CAMERA.match(camera)
+            if not number or not isinstance(values, dict):
+                continue
+            before = f"cam{int(number[1][:9]) - 1}"
+            for key, child in (("T_cam_imu", "imu"), ("T_cn_cnm1", before)):
+                one = (
+                    self.model(KalibrCamera, {key: values[key]}, (camera,))
+                    if key in values
+                    else None
+                )
+                rows = getattr(one, key) if one else None
+                if rows:
+                    yield self.entry((camera, key), _pose_of(rows), camera, child, key)
+
+    def matrix(self, data: Any) -> Iterator[Entry]:
+        """Yield the one entry of a file that is a matrix."""
+        one = self.model(MatrixFile, {"matrix": data}, ())
+        if one:
+            yield self.entry((), _pose_of(one.matrix))
+
+    def moveit(self, data: Any) -> Iterator[Entry]:
+        """Yield an entry for each static_transform_publisher of a launch file."""
+        for index, words in enumerate(data):
+            if any(word.startswith("--") for word in words):
+                yield from self._flags(index, words)
+            else:
+                yield from self._positions(index, words)
+
+    def _positions(self, index: int, words: list[str]) -> Iterator[Entry]:
+        """Read x y z qx qy qz qw parent child."""
+        if len(words) == 8:  # noqa: PLR2004 (x y z, three angles, two names)
+            message = (
+                "three angles: the first versions of MoveIt wrote them in another order than their"
+                " reader takes"
+            )
+            self.refuse((index,), message, "write the quaternion: x y z qx qy qz qw parent child")
+        elif len(words) != 9:  # noqa: PLR2004 (x y z, quaternion, two names)
+            self.refuse(
+                (index,), f"expected x y z qx qy qz qw parent child, got {len(words)} arguments"
+            )
+        else:
+            names = dict(zip(PoseXyzQuat.model_fields, words[:7], strict=True))
+            where = {name: at for at, name in enumerate(names)}
+            pose = self._arguments(PoseXyzQuat, names, index, where)
+            if pose:
+                yield self.entry((index,), pose, words[7].lstrip("/"), words[8].lstrip("/"))
+
+    def _flags(self, index: int, words: list[str]) -> Iterator[Entry]:
+        """Read --x … --qw or --roll --pitch --yaw, --frame-id and --child-frame-id."""
+        given = {flag[2:]: value for flag, value in zip(words[::2], words[1::2], strict=False)}
+        missing = [name for name in ("frame-id", "child-frame-id") if name not in given]
+        if missing:
+            self.refuse(
+                (index,), f"--{missing[0]} is missing", "it must be a string, not a variable"
+            )
+            return
+        where = {word[2:]: 2 * at + 1 for at, word in enumerate(words[::2])}
+        model = PoseXyzQuat if {"qx", "qy", "qz", "qw"} & set(given) else PoseXyzRpy
+        pose = self._arguments(model, given, index, where)
+        if pose:
+            yield self.entry(
+                (index,), pose, given["frame-id"].lstrip("/"), given["child-frame-id"].lstrip("/")
+            )
+
+    def _arguments(
+        self,
+        model: type[PoseXyzQuat | PoseXyzRpy],
+        given: dict[str, str],
+        index: int,
+        where: dict[str, int],
+    ) -> Pose | None:
+        """Return the pose that arguments are; ``where`` is each argument's place among the words."""
+        made, refusals = read(model, _DEFAULTS[model] | given)
+        for one in refusals:
+            path = (
+                (index, where[str(one.path[0])])
+                if one.path and str(one.path[0]) in where
+                else (index,)
+            )
+            self._refused(replace(one, path=path, on_key=False))
+        return made.pose if made and not refusals else None
+
+
+def _pose_of(rows: _Rows) -> Pose:
+    a, b, c, _ = rows
+    xyz = (a[3], b[3], c[3])
+    return Pose(
+        xyz, quat_from_matrix(((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])))
+    )
+
+
+_READERS = {
+    "autoware": _Reader.autoware,
+    "easy_handeye2": _Reader.easy_handeye2,
+    "moveit": _Reader.moveit,
+    "kalibr": _Reader.kalibr,
+    "matrix": _Reader.matrix,
+    "transform_stamped": _Reader.transform_stamped,
+}

@@ -1,0 +1,310 @@
+"""``when`` and ``for``: which entries of a robot file there are, decided before the keys are read.
+
+An entry whose ``when`` is false is not there, and nothing waits for it. One with ``for`` is there
+once for each value, under the names that its own name makes of them: ``camera_${i}``. The places
+of both are those of the entry as it is written.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.units import Quantity, shown
+from tfcompose.spec.language.expressions import (
+    IDENTIFIER,
+    MOST_ITEMS,
+    RESERVED,
+    ExpressionError,
+    inserted,
+    items,
+)
+from tfcompose.spec.language.reading import Refusal
+from tfcompose.spec.language.variables import NothingNewError, Variables
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.spec.language.expressions import Value
+    from tfcompose.spec.load import Path, Place, Source
+
+#: The sections whose entries may have ``when`` and ``for``.
+SECTIONS = (
+    "links",
+    "joints",
+    "ros2_control",
+    "frames",
+    "sensors",
+    "parts",
+    "containers",
+    "processes",
+    "hosts",
+)
+_KEYS = frozenset({"when", "for"})
+Scope = dict[str, "Value"]
+
+
+@dataclass(slots=True)
+class Unfolded:
+    """A source with the entries that there are; ``scopes`` are the values of their loops, by (section, name).
+
+    ``found`` is what is wrong with conditions and loops, and ``refused`` are their paths.
+    ``conditions`` are those of the entries that they leave out, as they are written, by (section,
+    name).
+    """
+
+    source: Source
+    scopes: dict[Path, Mapping[str, Value]] = field(default_factory=dict)
+    found: list[Finding] = field(default_factory=list)
+    refused: list[Path] = field(default_factory=list)
+    conditions: dict[tuple[str, str], str] = field(default_factory=dict)
+
+
+def unfolded(source: Source, variables: Variables) -> Unfolded:
+    """Return the source with the entries that conditions leave, once for each value of their loops."""
+    return _Unfolding(source, variables).unfolded()
+
+
+def holds(condition: Any, variables: Variables) -> bool:
+    """Return whether a condition is true.
+
+    Raises:
+        ExpressionError: if it is neither true nor false.
+    """
+    return _decided(condition, variables, {})
+
+
+def _decided(condition: Any, variables: Variables, scope: Scope) -> bool:
+    value = (
+        variables.value_in(condition, scope)
+        if isinstance(condition, str) and "${" in condition
+        else condition
+    )
+    if isinstance(value, bool):
+        return value
+    is_bare = isinstance(condition, str) and "${" not in condition
+    advice = (
+        f"when: ${{{condition}}}"
+        if is_bare
+        else "for example when: ${args.sim}, or ${args.cameras > 1}"
+    )
+    shown_value = shown(condition) if isinstance(condition, (str, dict, list)) else shown(value)
+    raise ExpressionError(f"when takes true or false, and {shown_value} is neither", advice)
+
+
+class _Unfolding:
+    def __init__(self, source: Source, variables: Variables) -> None:
+        self.source = source
+        self.variables = variables
+        self.done = Unfolded(source)
+        self.replaced = dict(source.replaced)
+        self.gone: list[re.Pattern[str]] = []
+
+    def unfolded(self) -> Unfolded:
+        data, inside, is_changed = dict(self.source.data), dict(self.source.places.inside), False
+        for section in SECTIONS:
+            entries = data.get(section)
+            if not isinstance(entries, dict):
+                continue
+            if any(
+                isinstance(entry, dict) and not _KEYS.isdisjoint(entry)
+                for entry in entries.values()
+            ):
+                data[section], inside[section] = self._section(section, entries, inside[section])
+                is_changed = True
+        if not is_changed:
+            return self.done
+        self._drop_waits(data)
+        places = self.source.places.with_inside(inside, self.source.places.keys)
+        self.done.source = replace(self.source, data=data, places=places, replaced=self.replaced)
+        return self.done
+
+    def _section(
+        self, section: str, entries: dict[str, Any], place: Place
+    ) -> tuple[dict[str, Any], Place]:
+        data: dict[str, Any] = {}
+        inside: dict[Any, Place] = {}
+        keys: dict[Any, Place] = {}
+        for template, entry in entries.items():
+            at: Path = (section, template)
+            is_plain = not isinstance(entry, dict) or _KEYS.isdisjoint(entry)
+            made = (
+                [(template, entry, place.inside[template])]
+                if is_plain
+                else list(self._made(at, entry))
+            )
+            for name, one, where in made:
+                if name in data:
+                    message = f"{template} and another entry are both {name}"
+                    self._refuse(
+                        at, ExpressionError(message, "give them other names"), on_key=True
+                    )
+                    continue
+                data[name], inside[name], keys[name] = one, where, place.keys[template]
+        return data, place.with_inside(inside, keys)
+
+    def _made(
+        self, at: Path, entry: dict[str, Any]
+    ) -> Iterator[tuple[str, dict[str, Any], Place]]:
+        """Yield the names, the data and the places of what an entry stands for."""
+        section, template = str(at[0]), str(at[1])
+        place = self.source.places.nearest(at)
+        decided = {
+            key for key in _KEYS if entry.get(key) is not None
+        }  # one without a value is refused later
+        try:
+            scopes = self._scopes(entry["for"], template) if "for" in decided else [{}]
+        except ExpressionError as error:
+            self._refuse((*at, "for"), error)
+            return
+        self.gone.append(
+            re.compile(
+                _HOLE.sub(".+", re.escape(template).replace(r"\$\{", "${").replace(r"\}", "}"))
+                + "(/.*)?"
+            )
+        )
+        for scope in scopes:
+            try:
+                name = inserted(self.variables.value_in(template, scope)) if scope else template
+            except ExpressionError as error:
+                self._refuse(at, error, on_key=True)
+                continue
+            try:
+                if "when" in decided and not _decided(entry["when"], self.variables, scope):
+                    self.done.conditions[section, name] = (
+                        entry["when"] if isinstance(entry["when"], str) else shown(entry["when"])
+                    )
+                    continue
+            except ExpressionError as error:  # with the entry there, nothing else is missing
+                self._refuse((*at, "when"), error)
+            inner = {key: value for key, value in entry.items() if key not in decided}
+            where = place.with_inside(
+                {key: below for key, below in place.inside.items() if key not in decided},
+                {key: below for key, below in place.keys.items() if key not in decided},
+            )
+            if scope:
+                self.done.scopes[section, name] = scope
+                inner, where = self._named(inner, where, scope)
+                for old, spans in self.source.replaced.items():
+                    if old[:2] == at:
+                        self.replaced[(section, name) + old[2:]] = spans  # noqa: RUF005 (Python 3.10 cannot)
+            yield name, inner, where
+
+    def _scopes(self, loops: Any, template: str) -> list[Scope]:
+        """Return the values of the loops' variables, for each turn.
+
+        Raises:
+            ExpressionError: if they are no loops, or the name does not hold a variable.
+        """
+        if not isinstance(loops, dict) or not loops:
+            raise ExpressionError(
+                f"for is {shown(loops)}", 'for: {i: "${range(3)}"}, or for: {side: [left, right]}'
+            )
+        for name in loops:
+            if name in self.variables.given or name in RESERVED or not IDENTIFIER.fullmatch(name):
+                what = (
+                    "a variable already"
+                    if name in self.variables.given
+                    else RESERVED.get(name, "not a name")
+                )
+                raise ExpressionError(
+                    f"for cannot take {name}: it is {what}", "another name, such as i"
+                )
+            if not re.search(rf"\$\{{[^{{}}]*\b{name}\b[^{{}}]*\}}", template):
+                raise ExpressionError(
+                    f"the name {template} is the same for each {name}",
+                    f"put it into the name: {template}_${{{name}}}",
+                )
+        lists = [self._items(value) for value in loops.values()]
+        count = 1
+        for one in lists:
+            count *= len(one)
+        if count > MOST_ITEMS:
+            raise ExpressionError(f"for makes {count:,} entries; at most {MOST_ITEMS:,}")
+        return [dict(zip(loops, values, strict=True)) for values in product(*lists)]
+
+    def _items(self, value: Any) -> list[Value]:
+        if isinstance(value, str):
+            return items(value, self.variables.lookup)
+        if not isinstance(value, list):
+            raise ExpressionError(
+                f"{shown(value)} is not a list of items",
+                "a list, or ${range(3)}, or ${range(1, 4)}",
+            )
+        found: list[Value] = []
+        for one in value:
+            if isinstance(one, (dict, list)) or one is None:
+                raise ExpressionError(
+                    f"{shown(one)} cannot be an item of a loop", "a string, or a number"
+                )
+            item = self.variables.value_in(one, {}) if isinstance(one, str) else one
+            found.append(
+                Quantity(item)
+                if isinstance(item, (int, float)) and not isinstance(item, bool)
+                else item
+            )
+        return found
+
+    def _named(self, value: Any, place: Place, scope: Scope) -> tuple[Any, Place]:
+        """Return the mapping with the loops' variables in the names of keys filled in."""
+        if not isinstance(value, dict):
+            return value, place
+        data: dict[str, Any] = {}
+        inside: dict[Any, Place] = {}
+        keys: dict[Any, Place] = {}
+        for key, item in value.items():
+            name = key
+            if "${" in key:
+                try:
+                    name = inserted(self.variables.value_in(key, scope))
+                except ExpressionError as error:
+                    at = place.keys[key].span
+                    self.done.found.append(finding("TF105", str(error), at, help=error.advice))
+            data[name], inside[name] = self._named(item, place.inside[key], scope)
+            keys[name] = place.keys[key]
+        return data, place.with_inside(inside, keys)
+
+    def _refuse(self, path: Path, error: ExpressionError, *, on_key: bool = False) -> None:
+        self.done.refused.append(path)
+        if not isinstance(error, NothingNewError):
+            refusal = Refusal("TF105", path, str(error), error.advice, on_key)
+            self.done.found.append(refusal.finding(self.source))
+
+    def _drop_waits(self, data: dict[str, Any]) -> None:
+        """Let nothing wait for what is not there only because of its condition or its loop."""
+        there = {
+            name
+            for section in ("sensors", "containers", "processes")
+            for name in data.get(section, ())
+        }
+        parts = tuple(f"{name}/" for name in data.get("parts", ()))
+
+        def is_gone(name: str) -> bool:
+            return (
+                name not in there
+                and not name.startswith(parts)
+                and any(one.fullmatch(name) for one in self.gone)
+            )
+
+        for section, inside in (("sensors", ("driver",)), ("containers", ()), ("processes", ())):
+            entries = data.get(section)
+            for name, entry in list(entries.items()) if isinstance(entries, dict) else ():
+                around = entry
+                for step in inside:
+                    around = around.get(step) if isinstance(around, dict) else None
+                waits = around.get("after") if isinstance(around, dict) else None
+                if isinstance(waits, dict) and any(is_gone(other) for other in waits):
+                    kept = around | {
+                        "after": {
+                            other: what for other, what in waits.items() if not is_gone(other)
+                        }
+                    }
+                    for step in reversed(inside):
+                        kept = entry | {step: kept}
+                    data[section] = data[section] | {name: kept}
+
+
+_HOLE = re.compile(r"\$\{[^{}]*\}")

@@ -1,0 +1,126 @@
+"""The language of ``fleet.yaml``, version 1: the robots of a fleet, their Zenoh routers, and which edges leave them."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator
+
+from tfcompose.foundation.units import Rate
+from tfcompose.model.plan.middleware import ENDPOINT
+from tfcompose.spec.language.spec import Spec, key
+from tfcompose.spec.language.values import Matches, Name, Namespace, Text, Texts
+
+_ARROW = re.compile(r"\s*(?:→|->)\s*")
+
+#: A robot's name, which becomes part of keys and of frames.
+RobotName = Annotated[
+    Text,
+    Matches(r"[A-Za-z][A-Za-z0-9_-]*", "a robot's name: a letter, then letters, digits, _ and -"),
+]
+Edge = Annotated[
+    Text,
+    Matches(
+        r"[^\s→>]+\s*(→|->)\s*[^\s→>]+",
+        "an edge: parent → child (or ->); as an entry of share also parent → child at 5 Hz",
+    ),
+]
+
+
+class SharedEdge(Spec):
+    """An edge that leaves the robot, and how often at most."""
+
+    edge: Edge = key(
+        ..., "parent → child, by the names that they have on the robot", "odom → base_link"
+    )
+    rate: Rate = key(
+        5.0, "how often it is sent at most; an edge that is fixed is sent twice a second", "5 Hz"
+    )
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """The parent and the child, by their names on the robot."""
+        parent, child = _ARROW.split(self.edge.strip())
+        return parent, child
+
+
+def _by_name(value: Any) -> Any:
+    """Return ``parent → child``, or ``parent → child at 5 Hz``, as the mapping that it stands for."""
+    if not isinstance(value, str):
+        return value
+    edge, at, rate = value.partition(" at ")
+    return {"edge": edge.strip(), "rate": rate.strip()} if at else {"edge": edge}
+
+
+Shared = Annotated[SharedEdge, BeforeValidator(_by_name, Text | SharedEdge)]
+
+
+class FleetMember(Spec):
+    """Which robot of a fleet this is: it shares the edges that the fleet's file names."""
+
+    file: Text = key(..., "the fleet's file, relative to the file that names it", "fleet.yaml")
+    robot: Text | None = key(
+        None, "which of the fleet's robots this is; default: the robot's name", "r1"
+    )
+
+
+def _by_file(value: Any) -> Any:
+    return {"file": value} if isinstance(value, str) else value
+
+
+Member = Annotated[FleetMember, BeforeValidator(_by_file, Text | FleetMember)]
+
+
+class FleetRobot(Spec):
+    """A robot: where its router is, and what of its tree the others get."""
+
+    router: Annotated[
+        Text, Matches(ENDPOINT, "an endpoint of Zenoh such as tcp/10.0.0.2:7447")
+    ] = key(..., "where the robot's Zenoh router listens", "tcp/10.0.0.11:7447")
+    share: tuple[Shared, ...] | None = key(
+        None, "the edges that leave this robot; default: those of the fleet", ["map → odom"]
+    )
+    namespace: Namespace = key("", "the namespace of the robot's /tf and /tf_static", "robot1")
+    prefix: Text | None = key(
+        None,
+        "written in front of its frames for others, unless they have it; default: NAME/",
+        "r1/",
+    )
+
+
+class FleetSpec(Spec):
+    """A fleet."""
+
+    fleet: Literal[1] = key(..., "the version of this language", 1)
+    name: Name = key("fleet", "its name; fleets of different names do not mix", "warehouse")
+    robots: dict[RobotName, FleetRobot] = key(
+        ...,
+        "the robots by name",
+        {"r1": {"router": "tcp/10.0.0.11:7447"}, "r2": {"router": "tcp/10.0.0.12:7447"}},
+    )
+    share: tuple[Shared, ...] = key(
+        (), "the edges that leave each robot", ["map → odom", "odom → base_link at 5 Hz"]
+    )
+    shared_frames: Texts = key(
+        ("map",), "frames that are the same for all robots, and get no prefix", ["map", "dock"]
+    )
+
+    def edges_of(self, robot: str) -> tuple[SharedEdge, ...]:
+        """Return the edges that leave a robot."""
+        own = self.robots[robot].share
+        return self.share if own is None else own
+
+    def final(self, robot: str, frame: str) -> str:
+        """Return the name that a robot's frame has for others."""
+        own = self.robots[robot].prefix
+        prefix = f"{robot}/" if own is None else own
+        return (
+            frame
+            if frame in self.shared_frames or frame.startswith(prefix)
+            else f"{prefix}{frame}"
+        )
+
+    def key_of(self, robot: str) -> str:
+        """Return where on Zenoh a robot's edges are: this key, with ``/tf`` or ``/tf_static`` behind it."""
+        return f"tfcompose/fleet/{self.name}/{robot}"

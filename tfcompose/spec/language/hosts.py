@@ -1,0 +1,58 @@
+"""The computers that a robot's processes run on, and how they are reached."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, Strict
+
+from tfcompose.foundation.units import refused, shown
+from tfcompose.spec.language.spec import Entry, key
+from tfcompose.spec.language.values import Integral, Matches, OneOrMore, Text
+
+_WITH_PORT = re.compile(r"((?:[^@:]+@)?[^@:]+):([0-9]+)")
+
+
+def _without_port(value: str) -> str:
+    if found := _WITH_PORT.fullmatch(value):
+        raise refused("TF106", f"{shown(value)} has a port", f"ssh: {found[1]}, port: {found[2]}")
+    return value
+
+
+#: What ssh takes; it must not read an option in it.
+SshAddress = Annotated[
+    Text,
+    Matches(r"([A-Za-z0-9_][A-Za-z0-9._-]*@)?[A-Za-z0-9:\[][A-Za-z0-9._:%\[\]-]*", "user@address"),
+    AfterValidator(_without_port),
+]
+
+
+#: It becomes part of the names of folders, units and nodes.
+HostName = Annotated[
+    Text, Matches(r"[A-Za-z0-9][A-Za-z0-9._-]*", "a host's name: letters, digits, ., _ and -")
+]
+
+
+class HostSpec(Entry):
+    """A computer: how ssh reaches it, and what runs tfcompose there."""
+
+    ssh: SshAddress | None = key(
+        None,
+        "user@address, or a name of ~/.ssh/config; default: the host's name",
+        "pi@192.168.1.20",
+    )
+    port: Annotated[int, Strict(), Field(ge=1, le=65535), Integral] | None = key(
+        None, "the port of ssh; default: as ~/.ssh/config says, or 22", 2222
+    )
+    python: Text | None = key(
+        None,
+        "the Python there that has tfcompose; default: python3",
+        "/opt/robot/.venv/bin/python",
+    )
+    setup: OneOrMore = key((), "files there that are sourced first", "/opt/ros/jazzy/setup.bash")
+    node_selector: dict[str, Text] = key(
+        {},
+        "labels of its node in Kubernetes; default: kubernetes.io/hostname: NAME",
+        {"robot.example.com/computer": "brain"},
+    )

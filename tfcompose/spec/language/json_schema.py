@@ -1,0 +1,353 @@
+"""The language as JSON Schema (draft 2020-12), made from the models; editors and check-jsonschema read it."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from typing import TYPE_CHECKING, Any
+
+from pydantic.json_schema import GenerateJsonSchema
+
+from tfcompose.foundation.catalogue import CATALOGUE
+from tfcompose.foundation.units import EXPRESSION
+from tfcompose.spec.language.fleet import FleetSpec
+from tfcompose.spec.language.node_preset import NodePresetSpec
+from tfcompose.spec.language.preset import PresetSpec
+from tfcompose.spec.language.robot import RobotSpec
+from tfcompose.spec.language.spec import described, examples_of, fields_of, walk
+from tfcompose.spec.language.values import COMPUTED
+from tfcompose.spec.load.scalars import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
+    from pydantic.fields import FieldInfo
+
+    from tfcompose.spec.language.preset import Option
+    from tfcompose.spec.language.spec import Spec
+
+LANGUAGES: dict[str, type[Spec]] = {
+    "robot": RobotSpec,
+    "preset": PresetSpec,
+    "node": NodePresetSpec,
+    "fleet": FleetSpec,
+}
+
+
+def json_schema(
+    language: str, presets: Mapping[str, PresetSpec], nodes: Iterable[str]
+) -> dict[str, Any]:
+    """Return the schema of ``robot``, of an ``overlay`` of one, of ``preset``, or of ``node``, a node's preset.
+
+    The schemas of robots know the names and options of ``presets``, and the names of ``nodes``,
+    their presets.
+    """
+    root = RobotSpec if language == "overlay" else LANGUAGES[language]
+    own = _with_named_types(
+        root.model_json_schema(schema_generator=_Generator), {one for _, one in walk(root)}
+    )
+    if root is not RobotSpec:
+        own = _without_expressions(own)
+    definitions = own.pop("$defs", {})
+    for _, kind in walk(root):
+        schema = own if kind is root else definitions[kind.__name__]
+        for name, field in fields_of(kind).items():
+            form = schema["properties"][name]
+            form.pop(
+                "to", None
+            )  # which processes a key applies to: JSON Schema would not warn, it would refuse
+            form |= {"description": described(field), "examples": _examples(field, form)}
+        if kind is not root:
+            schema["title"] = kind.__name__.removesuffix("Spec")
+        _exclude(schema, getattr(kind, "EXCLUSIVE", ()), definitions)
+    if language == "preset":
+        _overlaid(own, definitions)
+    if root is RobotSpec:
+        own["patternProperties"] = {
+            "^x-": {"description": "your own anchors, which tfcompose does not read"}
+        }
+        _add_codes(own["properties"]["rules"], definitions)
+        _add_presets(own, definitions, presets)
+        for kind in ("NamedNode", "NodeSpec"):
+            definitions[kind]["properties"]["preset"] |= {
+                "anyOf": [{"enum": sorted(nodes)}, _COMPUTED]
+            }
+        _add_profiles(own, definitions, at="#/$defs/Robot" if language == "overlay" else "#")
+    if language == "overlay":
+        definitions["Robot"], profile = own, definitions["Profile"]
+        properties = {
+            name: schema for name, schema in profile["properties"].items() if name != "when"
+        }
+        own = profile | {"properties": properties | {"profiles": own["properties"]["profiles"]}}
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"tfcompose {language}, version 1",
+    }
+    return head | own | {"$defs": dict(sorted(definitions.items()))}
+
+
+def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict[str, Any]:
+    """Return the schema with every type that is no mapping where it is used: beside ``$ref`` editors read nothing."""
+    names = {kind.__name__ for kind in mappings}
+    types = {f"#/$defs/{name}": one for name, one in schema["$defs"].items() if name not in names}
+
+    def inlined(value: Any) -> Any:
+        if isinstance(value, list):
+            return [inlined(item) for item in value]
+        if not isinstance(value, dict):
+            return value
+        other = {key: inlined(item) for key, item in value.items()}
+        if value.get("$ref") not in types:
+            return other
+        return dict(sorted((inlined(types[other.pop("$ref")]) | other).items()))
+
+    inside = {name: one for name, one in schema["$defs"].items() if name in names}
+    made: dict[str, Any] = inlined(schema | {"$defs": inside})
+    return made
+
+
+def _without_expressions(schema: Any) -> Any:
+    """Return the schema without ``${…}``, which only robot files compute."""
+    if isinstance(schema, list):
+        return [_without_expressions(item) for item in schema if item not in _EXPRESSIONS]
+    if not isinstance(schema, dict):
+        return schema
+    made = {key: _without_expressions(item) for key, item in schema.items()}
+    if isinstance(made.get("pattern"), str):
+        made["pattern"] = made["pattern"].removeprefix(f"{EXPRESSION}|")
+    if len(made.get("anyOf", ())) == 1:
+        made |= made.pop("anyOf")[0]
+    return made
+
+
+_EXPRESSIONS = ({"type": "string", "pattern": EXPRESSION}, COMPUTED)
+
+
+class _Generator(GenerateJsonSchema):
+    """Leaves out what tells an editor nothing: titles, empty defaults, and null for what may be left out."""
+
+    def get_title_from_name(self, name: str) -> str:
+        """Return no title: the key says it."""
+        del name
+        return ""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """Return that no key has one."""
+        del schema
+        return False
+
+    def model_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of a model with its docstring."""
+        made = super().model_schema(schema)
+        made.pop("title", None)
+        return {"description": inspect.getdoc(schema["cls"]), **made}
+
+    def dataclass_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of a dataclass with its docstring."""
+        made = super().dataclass_schema(schema)
+        made.pop("title", None)
+        return {"description": inspect.getdoc(schema["cls"]), **made}
+
+    def nullable_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema without null, which only an overlay holds, to remove a key."""
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema with its default, where that is a plain value."""
+        made = super().default_schema(schema)
+        if made.get("default") in (None, [], {}, "") or isinstance(made.get("default"), dict):
+            made.pop("default", None)
+        return made
+
+    def literal_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the choice alone."""
+        return {"enum": list(schema["expected"])}
+
+    def tagged_union_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of forms that differ by their value, not by a key."""
+        made = super().tagged_union_schema(schema)
+        return {"anyOf": made["oneOf"]} if "oneOf" in made else made
+
+    def tuple_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of a list; editors know ``items`` and not ``prefixItems``."""
+        made = super().tuple_schema(schema)
+        items = made.pop("prefixItems", None)
+        return made | {"items": items[0]} if items else made
+
+
+def _examples(field: FieldInfo, form: dict[str, Any]) -> list[Any]:
+    """Return the examples that an editor can insert: where a key has several forms it shows a mapping as one word."""
+    examples = examples_of(field)
+    return [one for one in examples if not isinstance(one, dict)] if "anyOf" in form else examples
+
+
+def _exclude(
+    schema: dict[str, Any], several: Iterable[frozenset[str]], definitions: dict[str, Any]
+) -> None:
+    """Let a mapping hold only one key of each set."""
+    for keys in map(sorted, several):
+        name = f"OneOf_{'_'.join(keys)}"
+        definitions[name] = {
+            "allOf": [
+                {
+                    "if": {"required": [key]},
+                    "then": {"properties": {other: False for other in keys if other != key}},
+                }
+                for key in keys
+            ]
+        }
+        schema.setdefault("allOf", []).append({"$ref": f"#/$defs/{name}"})
+
+
+def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """Let a file that is merged over another one leave out what that one has, and remove it with null."""
+    own["required"] = ["preset"]
+    for model in (own, *(one for one in definitions.values() if "properties" in one)):
+        if model is not own:
+            model.pop("required", None)
+        model["properties"] = {
+            name: schema if name == "preset" else _removable(schema)
+            for name, schema in model["properties"].items()
+        }
+
+
+def _removable(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of what may be null instead, and so may what is in it."""
+    about = {key: schema[key] for key in ("description", "examples", "default") if key in schema}
+    form = {key: value for key, value in schema.items() if key not in about}
+    if isinstance(form.get("additionalProperties"), dict) and form["additionalProperties"]:
+        form["additionalProperties"] = {"anyOf": [form["additionalProperties"], {"type": "null"}]}
+    return about | ({"anyOf": [form, {"type": "null"}]} if form else {})
+
+
+def _add_codes(rules: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """Let ``rules`` know the codes of findings that can be switched."""
+    definitions["RuleSetting"] = rules.pop("additionalProperties")
+    setting = {"$ref": "#/$defs/RuleSetting"}
+    codes = [code for code in CATALOGUE.values() if code.can_be_allowed]
+    rules["properties"] = {
+        code.code: setting | {"description": code.name.replace("_", " ")} for code in codes
+    }
+    rules["additionalProperties"] = False
+
+
+def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> None:
+    """Let a profile hold whatever a robot file does but profiles, with nothing required and null for what it removes.
+
+    That goes for each mapping in it too, but not for those in lists, which a profile replaces as a
+    whole. ``at`` points to the schema of the robot, ``own``.
+    """
+    mappings = {
+        f"#/$defs/{name}": schema for name, schema in definitions.items() if "properties" in schema
+    }
+    for pointer, schema in mappings.items():
+        definitions[f"{pointer.rpartition('/')[2]}Overlay"] = _overlay(pointer, schema, mappings)
+    robot = {
+        key: own[key]
+        for key in ("type", "properties", "additionalProperties", "patternProperties")
+    }
+    robot["properties"] = {
+        name: schema for name, schema in own["properties"].items() if name != "profiles"
+    }
+    definitions["Profile"] = {"description": "What is merged over the robot."} | _overlay(
+        at, robot, mappings
+    )
+    when = definitions["FrameSpec"]["properties"]["when"]
+    about = (
+        "merged also where this holds, without --profile; it is decided by the file with the other"
+        " profiles"
+    )
+    definitions["Profile"]["properties"]["when"] = when | {"description": about}
+    own["properties"]["profiles"]["additionalProperties"] = {"$ref": "#/$defs/Profile"}
+
+
+def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict[str, Any]:
+    """Return the schema of a mapping that is merged over one of the schema that stands at a pointer."""
+
+    def merged(value: Any) -> Any:
+        if isinstance(value, list):
+            return [merged(item) for item in value]
+        if not isinstance(value, dict):
+            return value
+        if value.get("$ref") in mappings:
+            return value | {"$ref": f"{value['$ref']}Overlay"}
+        return {
+            key: item if key in {"items", "default", "examples"} else merged(item)
+            for key, item in value.items()
+        }
+
+    def optional(name: str, value: dict[str, Any]) -> dict[str, Any]:
+        again = merged(value)
+        form = {"$ref": f"{at}/properties/{name}"} if again == value else again
+        return _removable({"description": value["description"]} | form)
+
+    made = {key: value for key, value in schema.items() if key != "required"}
+    return made | {
+        "properties": {name: optional(name, value) for name, value in schema["properties"].items()}
+    }
+
+
+#: A name in which something is computed.
+_COMPUTED = {"pattern": r"\$\{"}
+
+
+def _add_presets(
+    own: dict[str, Any], definitions: dict[str, Any], presets: Mapping[str, PresetSpec]
+) -> None:
+    """Let ``preset`` know the presets, and ``options`` those of the one that is chosen.
+
+    A name that is not known can only be a user's own, from ``preset_path`` or an included file
+    that has one.
+    """
+    sensor = definitions["SensorSpec"]
+    sensor["properties"]["preset"] |= {
+        "anyOf": [{"enum": sorted(presets)}, {"pattern": "^[^/]+/[^/]+$"}, _COMPUTED]
+    }
+    by_options: dict[str, list[str]] = {}
+    schemas: dict[str, dict[str, Any]] = {}
+    for name, preset in sorted(presets.items()):
+        options = {key: _option(option) for key, option in preset.options.items()}
+        by_options.setdefault(repr(options), []).append(name)
+        schemas[repr(options)] = options
+    sensor["allOf"].append({"$ref": "#/$defs/SensorOptions"})
+    definitions["SensorOptions"] = {
+        "allOf": [
+            {
+                "if": {"properties": {"preset": {"enum": names}}, "required": ["preset"]},
+                "then": {
+                    "properties": {
+                        "options": {"properties": schemas[key], "additionalProperties": False}
+                    }
+                },
+            }
+            for key, names in by_options.items()
+        ]
+    }
+    vendors = sorted({re.escape(name.partition("/")[0]) for name in presets})
+    known = {
+        "anyOf": [
+            {"enum": sorted(presets)},
+            {"pattern": f"^(?!({'|'.join(vendors)})/)"},
+            _COMPUTED,
+        ]
+    }
+    own["if"] = {"anyOf": [{"required": ["preset_path"]}, {"required": ["include"]}]}
+    own["else"] = {
+        "properties": {"sensors": {"additionalProperties": {"properties": {"preset": known}}}},
+    }
+
+
+def _option(option: Option) -> dict[str, Any]:
+    """Return the schema of one of a preset's options."""
+    forms: dict[str, dict[str, Any]] = {
+        "bool": {"type": "boolean"},
+        "text": {"type": "string"},
+        "choice": {"enum": list(dict.fromkeys([*option.variants, *map(plain, option.variants)]))},
+        "set": {"type": "array", "items": {"enum": list(option.values)}},
+    }
+    schema: dict[str, Any] = {"anyOf": [forms[option.type], COMPUTED]}
+    if option.about:
+        schema["description"] = option.about
+    if option.default is not None:
+        schema["default"] = option.default
+    return schema

@@ -1,0 +1,494 @@
+"""Robots from several files: ``include``, profiles, overlays, and single values from the command line.
+
+Mappings merge; scalars and lists replace; ``null`` in an overlay removes the key, and its default
+returns. Where a mapping holds one choice out of several keys (how a process runs, how a rotation
+is written), setting one in an overlay drops the others. ``include: [base.yaml]`` lays the file
+over what it includes; paths are relative to the file that writes them.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.spec.language.args import Given
+from tfcompose.spec.language.conditions import holds
+from tfcompose.spec.language.expressions import ExpressionError
+from tfcompose.spec.language.robot import RobotSpec
+from tfcompose.spec.language.spec import Spec, mappings_at
+from tfcompose.spec.language.variables import NothingNewError, Variables
+from tfcompose.spec.load import DEEPEST, Path, Place, Source, load
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.spec.language.robot import RosSpec
+
+    Reader = Callable[[str], str]
+
+
+_NOTHING = Given()
+
+
+def composed(
+    source: Source,
+    profiles: Sequence[str] = (),
+    overlays: Sequence[Source] = (),
+    given: Given = _NOTHING,
+) -> Source:
+    """Return the robot with its named profiles laid over it, in order, then the overlays; without ``profiles``.
+
+    Before the named ones come those whose own condition, ``when``, holds for what is ``given`` to
+    the others. An overlay may bring profiles of its own.
+
+    Raises:
+        RejectedError: if a profile is not there.
+    """
+    for overlay in overlays:
+        if "profiles" in overlay.data:
+            source = lay_over(source, _only(overlay, "profiles"))
+    known = source.data.get("profiles")
+    known = known if isinstance(known, dict) else {}
+    wrong = _wrong_profiles(source)
+    missing = [name for name in dict.fromkeys(profiles) if name not in known]
+    unusable = [name for name in profiles if not isinstance(known.get(name), dict)]
+    if unusable:
+        unknown = (_unknown_profile(source, name, list(known)) for name in missing)
+        raise RejectedError([*source.found, *wrong, *unknown])
+    base = replace(without(source, "profiles"), found=(*source.found, *wrong))
+    result = _laid_over_all(base, source, profiles, overlays)
+    if any(isinstance(profile, dict) and "when" in profile for profile in known.values()):
+        holding, refused = _holding(source, result, given)
+        profiles = [*(name for name in holding if name not in profiles), *profiles]
+        result = _laid_over_all(
+            replace(base, found=(*base.found, *refused)), source, profiles, overlays
+        )
+    return replace(result, is_variant=bool(profiles or overlays))
+
+
+def _laid_over_all(
+    base: Source, source: Source, profiles: Sequence[str], overlays: Sequence[Source]
+) -> Source:
+    for name in profiles:
+        base = lay_over(base, without(source.part(("profiles", name)), "when"))
+    for overlay in overlays:
+        rest = without(overlay, "profiles")
+        if rest.data or rest is overlay:
+            base = lay_over(base, rest)
+    return base
+
+
+def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], list[Finding]]:
+    """Return the profiles whose condition holds with the values of the others, and what is wrong with conditions."""
+    variables = Variables(others, given)
+    names: list[str] = []
+    found = []
+    for name, profile in profiles_in(source).items():
+        at: Path = ("profiles", name)
+        if "when" not in profile:
+            continue
+        if "args" in profile:
+            advice = "a profile that is named with --profile may"
+            message = "a profile with a condition cannot change args, which decide it"
+            found.append(finding("TF107", message, source.at_key((*at, "args")), help=advice))
+            continue
+        try:
+            if holds(profile["when"], variables):
+                names.append(name)
+        except NothingNewError:
+            continue
+        except ExpressionError as error:
+            found.append(finding("TF105", str(error), source.at((*at, "when")), help=error.advice))
+    return names, found
+
+
+def lay_over(
+    base: Source, overlay: Source, *, is_overlay: bool = True, of: type[Spec] = RobotSpec
+) -> Source:
+    """Return ``base`` with ``overlay`` merged into it; each key remembers where it is from, and what it replaced.
+
+    With ``is_overlay`` a value that changes nothing is a finding. ``of`` is the language that both
+    are written in.
+    """
+    if of is RobotSpec:
+        base, overlay = _with_full_args(base), _with_full_args(overlay)
+    merger = _Merger(base.replaced, overlay.replaced, of, is_overlay=is_overlay)
+    if is_overlay and not overlay.data:
+        merger.found.append(_idle("nothing is merged over the robot here", overlay.places))
+    data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
+    found = (*base.found, *overlay.found, *merger.found)
+    allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
+    return replace(
+        base,
+        data=data,
+        places=places,
+        found=found,
+        allows=allows,
+        replaced=merger.replaced,
+        has_nulls=base.has_nulls or overlay.has_nulls,
+    )
+
+
+def _with_full_args(source: Source) -> Source:
+    """Return the source with each argument as a mapping: a value alone, laid over one, is its default."""
+    declared = source.data.get("args")
+    if not isinstance(declared, dict) or all(
+        isinstance(one, dict) or one is None for one in declared.values()
+    ):
+        return source
+    place = source.places.inside["args"]
+    inside, keys, data = dict(place.inside), dict(place.keys), dict(declared)
+    for name, value in declared.items():
+        if not isinstance(value, dict) and value is not None:
+            data[name] = {"default": value}
+            at = place.inside[name]
+            inside[name] = Place(at.span, {"default": at}, {"default": at})
+    places = {**source.places.inside, "args": place.with_inside(inside, keys)}
+    return replace(
+        source,
+        data=source.data | {"args": data},
+        places=source.places.with_inside(places, source.places.keys),
+    )
+
+
+Replaced = dict[Path, tuple["Span", ...]]
+"""Where values stood that others were laid over, the last one first."""
+
+Part = tuple[dict[str, Any], Place]
+"""A mapping, and where it and what is in it stands."""
+
+
+class _Merger:
+    """Merges in time proportional to the overlay and to the mappings that it reaches; neither side is changed."""
+
+    def __init__(
+        self, below: Replaced, above: Replaced, of: type[Spec], *, is_overlay: bool
+    ) -> None:
+        self.is_overlay = is_overlay
+        self.of = of
+        self.below = below
+        self.above = above
+        self.replaced = below | above
+        self.found: list[Finding] = []
+
+    def merge(self, base: Part, overlay: Part, path: Path) -> Part:
+        """Return ``base`` with ``overlay`` laid over it."""
+        data, inside, keys = dict(base[0]), dict(base[1].inside), dict(base[1].keys)
+        for choice in self.choices_at(path, overlay[0]):
+            for dropped in choice & (data.keys() - overlay[0].keys()):
+                new = next(
+                    key for key in overlay[0] if key in choice and overlay[0][key] is not None
+                )
+                self.remember((*path, new), inside[dropped])
+                _drop(dropped, data, inside, keys)
+        for key, value in overlay[0].items():
+            at, place = (*path, key), overlay[1].inside[key]
+            if value is None and not is_for_later(path):
+                self.note_removal(key in data, overlay[1].keys[key], at)
+                _drop(key, data, inside, keys)
+            elif isinstance(value, dict):
+                old = data.get(key)
+                if self.is_overlay and not value and isinstance(old, dict):
+                    message = (
+                        f"{'.'.join(map(str, at))} is there already, and {{}} changes nothing"
+                    )
+                    self.found.append(_idle(message, place, inside[key]))
+                if key in data and not isinstance(old, dict):
+                    self.remember(at, inside[key])
+                under = (
+                    (old, inside[key])
+                    if isinstance(old, dict)
+                    else ({}, place.with_inside({}, {}))
+                )
+                data[key], inside[key] = self.merge(under, (value, place), at)
+                keys[key] = overlay[1].keys[key]
+            else:
+                if key in data:
+                    self.note(data[key], inside[key], value, place, at)
+                data[key], inside[key], keys[key] = value, place, overlay[1].keys[key]
+        return data, base[1].with_inside(inside, keys)
+
+    def choices_at(self, path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
+        """Return the choices that a mapping at the path makes: of each, it holds a key with a value."""
+        return [
+            keys
+            for kind in mappings_at(self.of, path)
+            for keys in getattr(kind, "EXCLUSIVE", ())
+            if any(data.get(key) is not None for key in keys)
+        ]
+
+    def note_removal(self, was_there: bool, key: Place, path: Path) -> None:  # noqa: FBT001 (the fact itself)
+        """Say so if nothing was removed."""
+        if not was_there:
+            message = f"{'.'.join(map(str, path))} is removed here, but does not exist"
+            self.found.append(finding("TF010", message, key.span))
+
+    def remember(self, path: Path, old: Place) -> None:
+        """Remember that the value at the path was laid over the old one."""
+        self.replaced[path] = (*self.above.get(path, ()), old.span, *self.below.get(path, ()))
+
+    def note(self, old: Any, old_place: Place, new: Any, place: Place, path: Path) -> None:
+        """Remember what is replaced, and say so if that changes nothing."""
+        self.remember(path, old_place)
+        if self.is_overlay and type(old) is type(new) and old == new and path != ("tfcompose",):
+            message = f"{'.'.join(map(str, path))} is {_shown(new)} already"
+            self.found.append(_idle(message, place, old_place))
+
+
+def _idle(message: str, place: Place, old: Place | None = None) -> Finding:
+    notes = [Note("here", old.span)] if old else []
+    return finding("TF014", message, place.span, notes=notes, help="remove it")
+
+
+def is_for_later(path: Path) -> bool:
+    """Return whether what stands there is merged over something only later: a profile, or a variant of a preset."""
+    return path[:1] == ("profiles",) or (path[:1] == ("options",) and path[2:3] == ("variants",))
+
+
+def _drop(key: str, *tables: dict[Any, Any]) -> None:
+    for table in tables:
+        table.pop(key, None)
+
+
+def _shown(value: Any) -> str:
+    return "that list" if isinstance(value, list) else str(value)
+
+
+def _only(source: Source, key: str) -> Source:
+    return replace(source, data={key: source.data[key]})
+
+
+#: What all processes of a plan share; a part cannot have its own.
+_SHARED_SETTINGS = ("clock", "domain_id", "discovery", "rmw", "distro", "router")
+
+
+def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the other)
+    part: Source,
+    holder: Source,
+    path: Path,
+    ros: RosSpec,
+    settings: dict[str, Any],
+    variables: dict[str, Any],
+) -> tuple[Source, list[Finding]]:
+    """Return a robot file as a part of another one, and a finding for each setting of its own that it cannot have.
+
+    ``path`` leads to the part in its ``holder``. Laid over the part are the holder's settings
+    ``ros``, of which the part has some of its own, ``settings``, and the ``variables`` that it is
+    given.
+    """
+    key = holder.at_key(path)
+    own: Any = part.data.get("ros")
+    found = []
+    for name in _SHARED_SETTINGS:
+        wanted = getattr(ros, name)
+        if isinstance(own, dict) and name in own and own[name] != wanted:
+            message = (
+                f"{name} of the part {path[-1]} is {own[name]}, and of the robot that holds it"
+                f" {wanted}"
+            )
+            notes = [Note("set here", part.at(("ros", name)))]
+            advice = f"ros: {{{name}: {own[name]}}} here, or leave it out there"
+            found.append(finding("TF312", message, key, notes=notes, help=advice))
+    frames = _frame_names(part.data)
+    settings = {
+        **settings,
+        "shared_frames": [name for name in ros.shared_frames if name in frames],
+        **{
+            name: getattr(ros, name) for name in _SHARED_SETTINGS if getattr(ros, name) is not None
+        },
+    }
+    here = Place(key)
+    inside = {"ros": Place(key, dict.fromkeys(settings, here), dict.fromkeys(settings, here))}
+    data: dict[str, Any] = {"ros": settings}
+    if variables:
+        data["vars"] = dict(variables)
+        inside["vars"] = holder.places.nearest((*path, "vars"))
+    over = Source(
+        holder.file, data, Place(key, inside, dict.fromkeys(data, here)), has_nulls=False
+    )
+    return lay_over(part, over, is_overlay=False), found
+
+
+def _frame_names(data: dict[str, Any]) -> set[str]:
+    """Return every name that the data use for a frame."""
+    names: set[str] = set()
+    for section in ("frames", "links", "joints", "sensors"):
+        entries = data.get(section)
+        for name, entry in entries.items() if isinstance(entries, dict) else ():
+            names.add(name)
+            if isinstance(entry, dict):
+                names.update(
+                    entry[key] for key in ("parent", "child") if isinstance(entry.get(key), str)
+                )
+    return names
+
+
+def extended_by(preset: Source) -> str | None:
+    """Return the name of the preset that a preset's file is merged over, or None."""
+    base = preset.data.get("extends")
+    return base if isinstance(base, str) else None
+
+
+def profiles_in(source: Source) -> dict[str, dict[str, Any]]:
+    """Return the file's profiles by name, without those that cannot be laid over anything."""
+    profiles = source.data.get("profiles")
+    known = profiles if isinstance(profiles, dict) else {}
+    return {name: value for name, value in known.items() if isinstance(value, dict)}
+
+
+def without(source: Source, key: str) -> Source:
+    """Return the source without one of its sections."""
+    if key not in source.data:
+        return source
+    place = source.places
+    inside = {step: below for step, below in place.inside.items() if step != key}
+    keys = {name: below for name, below in place.keys.items() if name != key}
+    data = {name: value for name, value in source.data.items() if name != key}
+    return replace(source, data=data, places=place.with_inside(inside, keys))
+
+
+def _wrong_profiles(source: Source) -> list[Finding]:
+    """Return a finding for each profile that is no mapping, or that holds profiles itself."""
+    profiles = source.data.get("profiles", {})
+    if not isinstance(profiles, dict):
+        advice = "for example profiles: {demo: {…}}"
+        return [
+            finding("TF103", "profiles is not a mapping", source.at(("profiles",)), help=advice)
+        ]
+    found = []
+    for name, profile in profiles.items():
+        if not isinstance(profile, dict):
+            message, span = (
+                f"the profile {name} is not a mapping",
+                source.at_key(("profiles", name)),
+            )
+            found.append(
+                finding("TF103", message, span, help=f"for example {name}: {{sensors: {{…}}}}")
+            )
+        elif "profiles" in profile:
+            message, span = (
+                f"the profile {name} holds profiles",
+                source.at_key(("profiles", name, "profiles")),
+            )
+            found.append(
+                finding(
+                    "TF101",
+                    message,
+                    span,
+                    help="combine profiles instead: --profile a --profile b",
+                )
+            )
+    return found
+
+
+def _unknown_profile(source: Source, name: str, known: list[str]) -> Finding:
+    there = f"there is {', '.join(known)}" if known else "the file has no profiles"
+    span = source.at_key(("profiles",))
+    return finding("TF009", f"unknown profile {name}", span, help=did_you_mean(name, known, there))
+
+
+MOST_FILES = 50
+
+
+def with_includes(source: Source, read: Reader) -> Source:
+    """Return the source laid over the files that it includes, and they over theirs; ``read`` gives a file's text.
+
+    Raises:
+        RejectedError: if a file cannot be read or is not YAML, if files include each other, or are
+        too many.
+    """
+    return _Includer(read).include(source, (source.file,))
+
+
+class _Includer:
+    def __init__(self, read: Reader) -> None:
+        self.read = read
+        self.files = 0
+
+    def include(self, source: Source, chain: tuple[str, ...]) -> Source:
+        if "include" not in source.data:
+            return source
+        base: Source | None = None
+        for index, name in self._names(source):
+            at = source.at(
+                ("include", index) if isinstance(source.data["include"], list) else ("include",)
+            )
+            file = posixpath.normpath(posixpath.join(posixpath.dirname(source.file), name))
+            self.files += 1
+            if file in chain or self.files > MOST_FILES:
+                circle = " → ".join([*chain, file])
+                message = (
+                    f"files include each other: {circle}"
+                    if file in chain
+                    else f"more than {MOST_FILES} files"
+                )
+                raise RejectedError(
+                    [*source.found, finding("TF015", message, at, help="remove one include")]
+                )
+            included = self.include(self._load(file, at, source), (*chain, file))
+            base = lay_over(base, included, is_overlay=False) if base else included
+        own = without(source, "include")
+        if base is None:
+            return own
+        merged = lay_over(base, own, is_overlay=False)
+        return replace(merged, file=source.file)
+
+    def _names(self, source: Source) -> list[tuple[int, str]]:
+        included = source.data["include"]
+        names = included if isinstance(included, list) else [included]
+        wrong = [
+            index for index, name in enumerate(names) if not isinstance(name, str) or not name
+        ]
+        if wrong:
+            advice = "for example include: [base.yaml]"
+            found = finding(
+                "TF103", "include takes the names of files", source.at(("include",)), help=advice
+            )
+            raise RejectedError([*source.found, found])
+        return list(enumerate(names))
+
+    def _load(self, file: str, at: Span, source: Source) -> Source:
+        try:
+            return load(self.read(file), file)
+        except RejectedError as error:
+            raise RejectedError(
+                [*source.found, *(_included(one, at) for one in error.findings)]
+            ) from None
+
+
+def _included(found: Finding, at: Span) -> Finding:
+    """Return the finding about an included file, with the place that includes it."""
+    return replace(found, notes=(*found.notes, Note("included here", at)))
+
+
+def set_value(setting: str) -> Source:
+    """Return the overlay that ``PATH=VALUE`` means; the value is read as YAML: ``sensors.camera.xyz=[0.2, 0, 10 cm]``.
+
+    Raises:
+        RejectedError: if there is no ``=``, the value is not YAML, or the key is one that is read
+        before.
+    """
+    span = Span(f"--set {setting}")
+    path_text, sign, value_text = setting.partition("=")
+    path: Path = tuple(path_text.strip().split("."))
+    if not sign or not all(path):
+        message = f"--set takes PATH=VALUE, not {setting!r}"
+        raise RejectedError(
+            [finding("TF016", message, span, help="for example sensors.camera.tf=driver")]
+        )
+    if len(path) > DEEPEST:
+        message = f"--set names a key in {len(path)} levels; a robot has no more than {DEEPEST}"
+        raise RejectedError([finding("TF016", message, Span("--set"))])
+    if path[0] == "include":
+        message = "--set cannot include files: it is merged over them"
+        raise RejectedError([finding("TF016", message, span, help="--overlay FILE")])
+    read = load(f"value: {value_text.strip() or 'null'}", span.file)
+    data: Any = read.data["value"]
+    below = read.places.inside["value"]
+    full = Place(Span(span.file, 1, 1, below.span.end_line, below.span.end_column))
+    place = full.with_inside(below.inside, below.keys)
+    for step in reversed(path):
+        data, place = {step: data}, full.with_inside({step: place}, {str(step): full})
+    return Source(span.file, data, place, read.found)

@@ -1,0 +1,288 @@
+"""Poses and edges as users write them: a position, one rotation out of five ways, a parent, and who publishes it.
+
+What is written stays as it is: ``rotation`` and ``Posed.xyz`` are what it means.
+"""
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, Discriminator, Tag
+from typing_extensions import TypeAliasType
+
+from tfcompose.foundation.geometry import (
+    Matrix,
+    Quaternion,
+    Vector,
+    norm,
+    normalised,
+    quat_from_axis_angle,
+    quat_from_matrix,
+    quat_from_rpy,
+)
+from tfcompose.foundation.units import Angle, Length, Number, Rate, refused
+from tfcompose.spec.language.spec import Checked, Entry, Spec, key, several
+from tfcompose.spec.language.values import (
+    Axis,
+    Boolean,
+    InARow,
+    Numbers,
+    OneOrMore,
+    Text,
+    Texts,
+    Xyz,
+    short,
+)
+
+#: How far a quaternion's or a matrix row's length may be from 1: what four written decimals can
+#: do.
+UNIT_TOLERANCE = 1e-3
+
+Direction = Literal["forward", "backward", "left", "right", "up", "down"]
+DIRECTIONS: dict[Direction, Vector] = {
+    "forward": (0, 0, 0),
+    "backward": (0, 0, math.pi),
+    "left": (0, 0, math.pi / 2),
+    "right": (0, 0, -math.pi / 2),
+    "up": (0, -math.pi / 2, 0),
+    "down": (0, math.pi / 2, 0),
+}
+
+
+def has_unit_length(quat_xyzw: Quaternion) -> Quaternion:
+    """Return the quaternion.
+
+    Raises:
+        PydanticCustomError: if its length is not nearly 1.
+    """
+    length = norm(quat_xyzw)
+    if abs(length - 1) <= UNIT_TOLERANCE:
+        return quat_xyzw
+    advice = "the order is x, y, z, w"
+    if length:
+        advice = (
+            f"normalised it is [{', '.join(f'{part:.6g}' for part in normalised(quat_xyzw))}];"
+            f" {advice}"
+        )
+    raise refused("TF402", f"the quaternion has length {length:.6g}, not 1", advice)
+
+
+def is_rotation(rows: Matrix) -> Matrix:
+    """Return the rows of a matrix.
+
+    Raises:
+        PydanticCustomError: if they are not nearly those of a rotation.
+    """
+    pairs = [(i, j) for i in range(3) for j in range(i + 1)]
+    worst = max(
+        abs(sum(a * b for a, b in zip(rows[i], rows[j], strict=True)) - (i == j)) for i, j in pairs
+    )
+    if worst > UNIT_TOLERANCE:
+        message = (
+            f"the matrix is not a rotation: its rows are not orthonormal (off by {worst:.3g})"
+        )
+        raise refused("TF403", message, "three rows; column i is the child's axis i in the parent")
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
+        advice = "frames are right-handed; one axis is flipped"
+        raise refused("TF403", "the matrix mirrors: its determinant is -1", advice)
+    return rows
+
+
+class AxisAngle(Spec):
+    """A rotation about an axis, right-handed."""
+
+    axis: Axis = key(..., "the axis of rotation, of any length", [0, 0, 1])
+    angle: Angle = key(..., "the angle of rotation")
+
+
+class LookAngles(Checked):
+    """A direction by the angles that lead to it from straight ahead."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
+        frozenset({"up", "down"}),
+        frozenset({"left", "right"}),
+    )
+
+    up: Angle | None = key(None, "how far the direction points up")
+    down: Angle | None = key(None, "how far the direction points down")
+    left: Angle | None = key(None, "how far the direction points left")
+    right: Angle | None = key(None, "how far the direction points right")
+    roll: Angle = key(0.0, "roll about the viewing direction, right-handed")
+
+    @property
+    def rotation(self) -> Quaternion:
+        """The rotation x, y, z, w: pitch is down − up, yaw is left − right (REP-103: looking down is positive)."""
+        return quat_from_rpy(
+            self.roll,
+            (self.down or 0.0) - (self.up or 0.0),
+            (self.left or 0.0) - (self.right or 0.0),
+        )
+
+
+def _look_form(value: Any) -> str:
+    return "[angles]" if isinstance(value, (dict, LookAngles)) else "[direction]"
+
+
+Rpy = TypeAliasType("Rpy", Annotated[tuple[Angle, Angle, Angle], InARow(3, "[0, 15 deg, 0]")])
+QuatXyzw = TypeAliasType(
+    "QuatXyzw",
+    Annotated[
+        tuple[Number, Number, Number, Number],
+        InARow(4, "[0, 0, 0, 1]"),
+        AfterValidator(has_unit_length),
+    ],
+)
+RotationMatrix = TypeAliasType(
+    "RotationMatrix",
+    Annotated[
+        tuple[Numbers, Numbers, Numbers],
+        InARow(3, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"),
+        AfterValidator(is_rotation),
+    ],
+)
+Look = TypeAliasType(
+    "Look",
+    Annotated[
+        Annotated[Direction, Tag("[direction]")] | Annotated[LookAngles, Tag("[angles]")],
+        Discriminator(_look_form),
+    ],
+)
+
+ROTATIONS = frozenset({"rpy", "quat_xyzw", "axis_angle", "matrix", "look"})
+
+
+class Rotated(Checked):
+    """At most one rotation of the child in its parent."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (ROTATIONS,)
+
+    rpy: Rpy | None = key(
+        None,
+        "roll, pitch and yaw about fixed axes; looking down is positive pitch",
+        [0, "15 deg", 0],
+    )
+    quat_xyzw: QuatXyzw | None = key(
+        None, "a unit quaternion in the order x, y, z, w", [0, 0, 0, 1]
+    )
+    axis_angle: AxisAngle | None = key(
+        None, "a rotation about an axis, right-handed", {"axis": [0, 0, 1], "angle": "90 deg"}
+    )
+    matrix: RotationMatrix | None = key(
+        None,
+        "3×3 rows; column i is the child's axis i in the parent",
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    )
+    look: Look | None = key(
+        None,
+        "where x points, or the lens of an optical frame: a direction, or angles from straight"
+        " ahead",
+        "down",
+        {"down": "15 deg"},
+    )
+
+    @property
+    def rotation(self) -> Quaternion | None:
+        """The rotation as a unit quaternion x, y, z, w, or None where none is written."""
+        if self.look is not None:
+            return (
+                self.look.rotation
+                if isinstance(self.look, LookAngles)
+                else quat_from_rpy(*DIRECTIONS[self.look])
+            )
+        if self.rpy is not None:
+            return quat_from_rpy(*self.rpy)
+        if self.quat_xyzw is not None:
+            return normalised(self.quat_xyzw)
+        if self.axis_angle is not None:
+            return quat_from_axis_angle(self.axis_angle.axis, self.axis_angle.angle)
+        return quat_from_matrix(self.matrix) if self.matrix is not None else None
+
+
+class Posed(Rotated):
+    """A pose: where the child is, in its parent."""
+
+    xyz: Xyz = key((0.0, 0.0, 0.0), "position: x forward, y left, z up", [0.2, 0, "30 cm"])
+
+
+def _each_once(names: Texts) -> Texts:
+    if not names:
+        raise refused("TF103", "an empty list names no parent", "name the parent frame")
+    twice = next((index for index, name in enumerate(names) if name in names[:index]), None)
+    if twice is not None:
+        raise several(
+            ((twice,), refused("TF106", f"{names[twice]} is in the list already", "remove it"))
+        )
+    return names
+
+
+#: A parent, or several of which the first is nominal; either way a tuple.
+Parents = TypeAliasType("Parents", Annotated[OneOrMore, AfterValidator(_each_once)])
+
+
+class EdgeKeys(Posed, Entry):
+    """The keys that may stand wherever a parent is."""
+
+    parent: Parents | None = key(
+        None,
+        "the parent frame; a list for one that changes between them, as with a tool changer",
+        "base_link",
+    )
+    relative_to: Text | None = key(
+        None, "the frame in which the pose is given; the parent stays the parent", "base_link"
+    )
+    owner: Text | None = key(None, "the process that publishes this edge", "base_drive")
+    rate: Rate | None = key(None, "how often the owner sends it", "50 Hz")
+    static: Boolean | None = key(
+        None, "true: the owner, which is not tfcompose, sends it on /tf_static", True
+    )
+
+
+#: The formats of calibration files; ``tfcompose.spec.language.calibration`` says what each holds.
+CalibrationFormat = Literal[
+    "autoware", "easy_handeye2", "moveit", "kalibr", "matrix", "transform_stamped"
+]
+
+
+class CalibrationLimit(Spec):
+    """How far a calibration may be from the pose that is written beside it."""
+
+    xyz: Length = key(0.05, "the largest distance", "5 cm")
+    rot: Angle = key(math.radians(5), "the largest angle", "5 deg")
+
+
+class CalibrationSpec(Spec):
+    """A measured pose, in a file. The pose beside it is the nominal one."""
+
+    file: Text = key(
+        ..., "the file, relative to the file that names it", "calibration/sensors.yaml"
+    )
+    format: Literal["auto", CalibrationFormat] = key("auto", "the format of the file", "kalibr")
+    parent: Text | None = key(
+        None, "the entry's parent in that file; default: the parent of this frame", "tool0"
+    )
+    child: Text | None = key(
+        None,
+        "the entry's child in that file; default: this frame, or one of the sensor's",
+        "camera_link",
+    )
+    limit: CalibrationLimit = key(
+        CalibrationLimit(), "how far from nominal is too far", {"xyz": "5 cm", "rot": "5 deg"}
+    )
+
+
+Calibration = TypeAliasType(
+    "Calibration", Annotated[CalibrationSpec, short("file", CalibrationSpec)]
+)
+
+
+class MountKeys(EdgeKeys):
+    """The keys of what is bolted on, and so can be measured."""
+
+    calibration: Calibration | None = key(
+        None,
+        "a file with the measured pose; the pose beside it is the nominal one",
+        "calibration/hand_eye.yaml",
+    )
+    joint: Text | None = key(
+        None, "the name of the fixed joint in URDF; default: PARENT_to_CHILD", "camera_mount_joint"
+    )

@@ -1,0 +1,371 @@
+"""A sensor's preset: its frames, body and driver as data.
+
+In names ``{name}`` stands for the sensor's name, and a word of ``words`` for what it says there.
+In a driver's parameters and arguments there is also ``{prefix}``, the robot's frame prefix.
+"""
+
+import re
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Tag
+
+from tfcompose.foundation.findings import did_you_mean
+from tfcompose.foundation.units import Mass, Rate
+from tfcompose.model.plan import SensorPublisher
+from tfcompose.spec.language.bodies import Shape
+from tfcompose.spec.language.node_preset import Fact
+from tfcompose.spec.language.optics import OpticsSpec
+from tfcompose.spec.language.pose import Rotated
+from tfcompose.spec.language.reading import Refusal
+from tfcompose.spec.language.spec import Spec, key
+from tfcompose.spec.language.values import (
+    Anything,
+    Boolean,
+    Matches,
+    NoMapping,
+    Parameters,
+    Text,
+    Xyz,
+)
+from tfcompose.spec.load import Path
+
+UNKNOWN = "unknown"
+
+#: A position, or that it is not known: of that nothing is left.
+KnownXyz = Annotated[
+    Xyz | None,
+    BeforeValidator(lambda value: None if value == UNKNOWN else value, Literal["unknown"] | Xyz),
+]
+SensorKind = Literal[
+    "camera", "stereo", "rgbd", "lidar2d", "lidar3d", "imu", "gnss", "radar", "ultrasonic"
+]
+_WHEN = (
+    "the value of each option that it takes, or for a set one that it holds; tf: driver or"
+    " tfcompose; all must hold"
+)
+
+
+class Option(Spec):
+    """A choice that the user has."""
+
+    type: Literal["set", "bool", "text", "choice"] = key(..., "what kind of value it takes", "set")
+    values: tuple[Text, ...] = key((), "what a set may hold", ["color", "depth"])
+    variants: dict[str, Parameters] = key(
+        {}, "of a choice: what each value merges over the preset"
+    )
+    default: Anything = key(None, "its value where none is given", ["color", "depth"])
+    about: Text = key("", "what it does")
+
+
+class ByDriver(Rotated):
+    """What differs when the driver publishes the frame; what is left out is the same."""
+
+    parent: Text = key(..., "the parent frame", "{name}_link")
+    xyz: Xyz | None = key(None, "position in that parent", [0, 0.0148, 0])
+
+
+class PresetFrame(Rotated):
+    """A frame inside the sensor, in its parent."""
+
+    parent: Text = key(..., "the parent frame", "{name}_link")
+    xyz: KnownXyz = key(
+        (0.0, 0.0, 0.0),
+        "position: x forward, y left, z up; unknown where the vendor does not say, and then a"
+        " rotation that is left out is unknown as well",
+        [0, -0.05, 0],
+        UNKNOWN,
+    )
+    nominal: Boolean = key(False, "true: calibration or the device overrides the value")
+    driver: Literal["static", "dynamic"] | None = key(
+        None, "the driver publishes this edge, on /tf_static or /tf, unless it is switched off"
+    )
+    by_driver: ByDriver | None = key(None, "what differs when the driver publishes it")
+    when: Parameters = key({}, _WHEN, {"streams": "depth"})
+    other_axes: Boolean = key(
+        False, "true: its name does not say whether it is optical, or says it wrongly"
+    )
+    about: Text = key("", "what it is")
+
+
+class Body(Spec):
+    """The sensor's body, on one of its frames."""
+
+    frame: Text = key(..., "the frame that it is on", "{name}_link")
+    shape: Shape = key(..., "its shape", {"box": [0.025, 0.09, 0.025]})
+    mass: Mass | None = key(
+        None, "where the vendor's is credible; the inertia is computed", "72 g"
+    )
+
+
+class PresetOptics(OpticsSpec):
+    """What one stream sees. It is there where its frame is."""
+
+    frame: Text = key(..., "the frame that it is in", "{name}_depth_optical_frame")
+    when: Parameters = key({}, _WHEN, {"streams": "depth"})
+
+
+class Chosen(Spec):
+    """A value that an option decides: the option's own, if given; or one of two, by a condition."""
+
+    option: Text | None = key(
+        None, "the option whose value it is; without one the parameter is left out", "serial"
+    )
+    when: Parameters | None = key(None, _WHEN, {"streams": "depth"})
+    value: Anything = key(True, "the value when the condition holds")
+    otherwise: Anything = key(False, "the value when it does not")
+
+
+class DriverClaim(Spec):
+    """An edge outside the sensor that its driver publishes by default. Switched off, unless the driver owns it."""
+
+    parent: Text = key(..., "the parent frame", "map")
+    child: Text = key(..., "the child frame", "odom")
+    off: Parameters = key(
+        ..., "the parameters that keep the driver from it", {"publish_tf": False}
+    )
+    about: Text = key("", "what it is")
+
+
+#: A parameter; a mapping says what its value depends on.
+Parameter = Annotated[
+    Annotated[Chosen, Tag("[chosen]")] | Annotated[NoMapping, Tag("[value]")],
+    Discriminator(lambda value: "[chosen]" if isinstance(value, dict) else "[value]"),
+]
+
+
+class PresetProcess(Spec):
+    """A process of the vendor's driver: what is started, and with what."""
+
+    package: Text = key(..., "its package", "realsense2_camera")
+    executable: Text | None = key(
+        None, "a node, which takes a parameter file", "realsense2_camera_node"
+    )
+    launch: Text | None = key(
+        None, "or a launch file of the package, which takes arguments", "launch/rs_launch.py"
+    )
+    node: Text = key(..., "the name of the node that publishes", "{name}")
+    namespace: Text = key("", "the namespace of that node")
+    lifecycle: Literal["active"] | None = key(
+        None, "a lifecycle node, which does nothing until it is active"
+    )
+    params: dict[str, Parameter] = key(
+        {}, "parameters of the node; left out where they hold an empty {prefix}"
+    )
+    args: dict[str, Parameter] = key({}, "arguments of the launch file")
+
+
+class FurtherProcess(PresetProcess):
+    """A process that the driver needs besides: it publishes no frames."""
+
+    when: Parameters = key({}, _WHEN, {"streams": "depth"})
+
+
+class PresetDriver(PresetProcess):
+    """The vendor's driver; its first process is the one that publishes frames."""
+
+    also: dict[Text, FurtherProcess] = key(
+        {}, "its further processes, each by what its name adds to the sensor's, after a _"
+    )
+    versions: Text = key("", "the versions that were read", "4.55 to 4.57")
+    naming: dict[str, Text] = key(
+        {}, "the parameters, or arguments, that name frames", {"base_frame_id": "{name}_link"}
+    )
+    prefixed: Boolean = key(False, "true: a parameter takes the robot's frame prefix")
+    tf: SensorPublisher = key("driver", "who publishes the frames that the driver can, by default")
+    by_default: Boolean = key(True, "false: it publishes them only if a parameter says so")
+    on: Parameters = key(
+        {}, "parameters, or arguments, that make it publish them", {"publish_tf": True}
+    )
+    off: Parameters | None = key(
+        None, "those that keep it from that; left out: there is no switch", {"publish_tf": False}
+    )
+    claims: tuple[DriverClaim, ...] = key((), "edges outside the sensor that it publishes")
+    about: Text = key("", "what else is to be known")
+
+
+class Topic(Spec):
+    """A topic that the driver publishes."""
+
+    type: Text = key(..., "its type", "sensor_msgs/Image")
+    frame: Text = key(..., "the frame of its header", "{name}_color_optical_frame")
+    hard_coded: Boolean = key(False, "true: no parameter changes that frame, and no preset has it")
+    rate: Rate | None = key(None, "how often it comes by default")
+    when: Parameters = key({}, _WHEN, {"streams": "color"})
+
+
+class PresetSpec(Spec):
+    """One model of sensor."""
+
+    preset: Literal[1] = key(..., "the version of this language", 1)
+    extends: Text | None = key(
+        None,
+        "a preset that this one is merged over; null removes; a name that begins with _ is only"
+        " there to be extended",
+        "realsense/_d400",
+    )
+    vendor: Text = key(..., "who makes it", "Intel RealSense")
+    model: Text = key(..., "what it is called", "D435i")
+    kind: SensorKind = key(..., "what kind of sensor it is", "rgbd")
+    about: Text = key(..., "what it is, in a sentence")
+    mount: Text = key(
+        ...,
+        "the frame that a person bolts on; it has no entry under frames",
+        "{name}_bottom_screw_frame",
+    )
+    root: Text | None = key(
+        None, "the frame from which on the driver publishes; default: the mount", "{name}_link"
+    )
+    words: dict[str, Annotated[Text, Matches(r"[A-Za-z0-9_]*", "a part of a frame's name")]] = key(
+        {}, "used in names as {word}", {"side": "left"}
+    )
+    options: dict[str, Option] = key({}, "the choices that the user has")
+    frames: dict[str, PresetFrame] = key({}, "the frames by name")
+    body: Body | None = key(None, "the sensor's body")
+    optics: dict[str, PresetOptics] = key({}, "what each stream sees")
+    driver: PresetDriver | None = key(None, "the vendor's driver")
+    topics: dict[str, Topic] = key(
+        {}, "what the driver publishes; below its node where the name begins with ~/"
+    )
+    source: tuple[Fact, ...] = key((), "where the figures are from")
+
+
+_HOLE = re.compile(r"\{([^{}]*)\}")
+_TF = ("driver", "tfcompose")
+
+
+def wrong_names(preset: PresetSpec) -> Iterator[Refusal]:
+    """Yield what the preset names and does not have: frames, options and their values; its frames are one tree."""
+    yield from _frames(preset)
+    yield from _options(preset)
+    for path, process in _processes(preset):
+        if (process.executable is None) == (process.launch is None):
+            yield Refusal("TF606", path, "give either executable or launch", on_key=True)
+        if process.args and not process.launch:
+            yield Refusal(
+                "TF606",
+                (*path, "args"),
+                "a node takes params; args are a launch file's",
+                on_key=True,
+            )
+
+
+def _processes(preset: PresetSpec) -> Iterator[tuple[Path, PresetProcess]]:
+    """Yield the processes of the driver, and where they are."""
+    if preset.driver:
+        yield ("driver",), preset.driver
+        for name, process in preset.driver.also.items():
+            yield ("driver", "also", name), process
+
+
+def _frames(preset: PresetSpec) -> Iterator[Refusal]:
+    known = [preset.mount, *preset.frames]
+    for path, name in _named_frames(preset):
+        if name not in known:
+            advice = did_you_mean(name, known, f"there is {', '.join(known)}")
+            yield Refusal("TF606", path, f"{preset.model} has no frame {name}", advice)
+    for name in known:
+        for word in _HOLE.findall(name):
+            if word != "name" and word not in preset.words:
+                yield Refusal(
+                    "TF606",
+                    ("words",),
+                    f"{name}: no word {word}",
+                    "there is {name}, and what words has",
+                )
+    if preset.mount in preset.frames:
+        message = f"{preset.mount} is the mount; where it is, the robot says"
+        yield Refusal("TF606", ("frames", preset.mount), message, on_key=True)
+    for name in preset.frames:
+        above, steps = name, 0
+        while above in preset.frames and steps <= len(preset.frames):
+            above, steps = preset.frames[above].parent, steps + 1
+        if above in preset.frames:
+            yield Refusal("TF606", ("frames", name), f"{name} is above itself", on_key=True)
+
+
+def _named_frames(preset: PresetSpec) -> Iterator[tuple[Path, str]]:
+    """Yield each frame that is named somewhere, and where."""
+    for name, frame in preset.frames.items():
+        yield ("frames", name, "parent"), frame.parent
+        if frame.by_driver:
+            yield ("frames", name, "by_driver", "parent"), frame.by_driver.parent
+    if preset.root:
+        yield ("root",), preset.root
+    if preset.body:
+        yield ("body", "frame"), preset.body.frame
+    for name, frame_name in (preset.driver.naming if preset.driver else {}).items():
+        yield ("driver", "naming", name), frame_name
+    for name, optics in preset.optics.items():
+        yield ("optics", name, "frame"), optics.frame
+    for name, topic in preset.topics.items():
+        if not topic.hard_coded:
+            yield ("topics", name, "frame"), topic.frame
+
+
+def _options(preset: PresetSpec) -> Iterator[Refusal]:
+    for name, option in preset.options.items():
+        known: tuple[str, ...] = (
+            tuple(option.variants) if option.type == "choice" else option.values
+        )
+        if option.type in {"choice", "set"}:
+            given = option.default if option.type == "set" else [option.default]
+            for value in given if isinstance(given, list) else [given]:
+                if value not in known:
+                    message = f"the option {name} cannot be {value!r}"
+                    yield Refusal(
+                        "TF606",
+                        ("options", name),
+                        message,
+                        f"one of: {', '.join(known)}",
+                        on_key=True,
+                    )
+    for path, condition in _conditions(preset):
+        for name, wanted in condition.items():
+            yield from _condition(preset, (*path, name), wanted)
+    for at, value in _chosen(preset):
+        if value.option and value.option not in preset.options:
+            advice = did_you_mean(value.option, preset.options)
+            yield Refusal("TF606", at, f"{preset.model} has no option {value.option}", advice)
+
+
+def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[Refusal]:
+    name = str(path[-1])
+    option = preset.options.get(name)
+    if option is None and name != "tf":
+        advice = did_you_mean(name, [*preset.options, "tf"], "the word tf, or an option")
+        yield Refusal("TF606", path, f"{preset.model} has no option {name}", advice, on_key=True)
+        return
+    known = (
+        {"set": option.values, "choice": tuple(option.variants), "bool": (True, False)}
+        if option
+        else {}
+    )
+    values: tuple[Any, ...] = known.get(option.type, ()) if option else _TF
+    for one in wanted if isinstance(wanted, list) else [wanted]:
+        if values and one not in values:
+            advice = f"one of: {', '.join(map(str, values))}"
+            yield Refusal("TF606", path, f"{name} is never {one!r}", advice)
+
+
+def _conditions(preset: PresetSpec) -> Iterator[tuple[Path, dict[str, Any]]]:
+    for name, frame in preset.frames.items():
+        yield ("frames", name, "when"), frame.when
+    for name, optics in preset.optics.items():
+        yield ("optics", name, "when"), optics.when
+    for name, topic in preset.topics.items():
+        yield ("topics", name, "when"), topic.when
+    for name, process in preset.driver.also.items() if preset.driver else ():
+        yield ("driver", "also", name, "when"), process.when
+    for at, value in _chosen(preset):
+        if value.when:
+            yield (*at, "when"), value.when
+
+
+def _chosen(preset: PresetSpec) -> Iterator[tuple[Path, Chosen]]:
+    """Yield the parameters and arguments that depend on options, and where they are."""
+    for path, process in _processes(preset):
+        for section, table in (("params", process.params), ("args", process.args)):
+            for name, value in table.items():
+                if isinstance(value, Chosen):
+                    yield (*path, section, name), value

@@ -1,0 +1,617 @@
+"""Processes as users describe them: what is started, or expected to run, and how."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal, get_args
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic_core import PydanticCustomError
+from typing_extensions import TypeAliasType
+
+from tfcompose.foundation.units import (
+    AngularVelocity,
+    Duration,
+    JointPosition,
+    Quantity,
+    Rate,
+    Size,
+    Truth,
+    refused,
+    shown,
+)
+from tfcompose.model.plan import (
+    LifecycleState,
+    LogLevel,
+    OutputPlace,
+    PlanProcess,
+    ReadyKind,
+    RestartPolicy,
+    SchedulingPolicy,
+    SimulationKind,
+    StartCondition,
+    StopSignal,
+)
+from tfcompose.spec.language.expressions import inserted
+from tfcompose.spec.language.node_preset import ClaimSpec
+from tfcompose.spec.language.pose import Posed
+from tfcompose.spec.language.spec import Checked, Entry, Spec, fields_of, key, more_of, several
+from tfcompose.spec.language.values import (
+    Boolean,
+    Integral,
+    Matches,
+    Namespace,
+    NodeName,
+    OnlyTrue,
+    Parameters,
+    RosName,
+    Text,
+    TopicName,
+    VariableName,
+    short,
+)
+from tfcompose.spec.load import Path
+
+#: What a process of the plan is where nothing is said.
+DEFAULTS = PlanProcess("", "run")
+
+
+def _inserted(value: Any) -> Any:
+    computed = isinstance(value, (Quantity, Truth))
+    value = value.value if isinstance(value, Truth) else value
+    return inserted(value) if computed else value
+
+
+#: A string; a computed number is written as one.
+Word = Annotated[Text, BeforeValidator(_inserted)]
+Words = tuple[Word, ...]
+
+
+def _split(value: Any) -> Any:
+    """Return the words of a text, as a shell has them."""
+    try:
+        return shlex.split(value) if isinstance(value, str) else value
+    except ValueError as error:
+        raise refused(
+            "TF106", f"{shown(value)} cannot be split into words: {error}", "a list of words"
+        ) from None
+
+
+#: A command before another one, as words or as a text of words.
+Prefix = Annotated[Words, BeforeValidator(_split, Text | Words)]
+
+
+def _arguments(value: Any) -> Any:
+    """Return a command's arguments as words; a launch file's are given by name."""
+    if not isinstance(value, dict):
+        return value
+    wrong = [name for name, item in value.items() if isinstance(item, (dict, list))]
+    if wrong:
+        raise several(
+            *(
+                (
+                    (name,),
+                    refused("TF103", f"expected a string or a number, got {shown(value[name])}"),
+                )
+                for name in wrong
+            )
+        )
+    return [f"{name}:={_argument(item)}" for name, item in value.items()]
+
+
+def _argument(value: Any) -> str:
+    if isinstance(value, Quantity):
+        value = int(value.value) if value.value == int(value.value) else value.value
+    return value if isinstance(value, str) else shown(value)
+
+
+Arguments = Annotated[Words, BeforeValidator(_arguments, Words | dict[str, Any])]
+
+COMMANDS = (
+    *(frozenset({"argv", name}) for name in ("package", "executable", "args", "launch")),
+    *(frozenset({"launch", name}) for name in ("package", "executable")),
+)
+
+
+class Run(Checked):
+    """An installed executable, a launch file, or a command, word by word."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = COMMANDS
+
+    package: Text | None = key(None, "the package of an executable", "slam_toolbox")
+    executable: Text | None = key(None, "an executable of the package", "async_slam_toolbox_node")
+    launch: Annotated[Text, Matches(r"[^/]+/[^/]+(/[^/]+)*", "package/file.launch.py")] | None = (
+        key(
+            None,
+            "a package's launch file, run as one process",
+            "nav2_bringup/navigation_launch.py",
+        )
+    )
+    args: Arguments = key(
+        (), "arguments; of a launch file by name", ["--verbose"], {"use_composition": False}
+    )
+    argv: Words = key(
+        (),
+        "the whole command, instead of package and executable",
+        ["python3", "-m", "my_robot.drive"],
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[tuple[str], PydanticCustomError]]:
+        """Yield that a launch file is none of a package's executables."""
+        yield from super().check(data)  # type: ignore[misc]
+        file = data.get("executable")
+        if isinstance(file, str) and re.search(r"[._]launch\.(py|xml|yaml|yml)$", file):
+            advice = f"a launch file is run: {{launch: {data.get('package', 'PACKAGE')}/{file}}}"
+            yield (
+                ("executable",),
+                refused("TF106", f"{file} is a launch file, not an executable", advice),
+            )
+
+    @property
+    def is_startable(self) -> bool:
+        """Whether it says what to start."""
+        return bool(self.argv or self.launch or (self.package and self.executable))
+
+
+def _command(value: Any) -> Any:
+    return (
+        {"argv": value if isinstance(value, list) else [value]}
+        if isinstance(value, (list, str))
+        else value
+    )
+
+
+Command = TypeAliasType(
+    "Command",
+    Annotated[
+        Run,
+        BeforeValidator(
+            _command,
+            Annotated[Words, Field(min_length=1)]
+            | Annotated[Text, Field(description="with shell: true")]
+            | Run,
+        ),
+    ],
+)
+
+
+class Circle(Spec):
+    """A body that drives on a circle, counter-clockwise."""
+
+    radius: Size = key(1.0, "the circle's radius")
+    speed: AngularVelocity = key(0.5, "how fast it turns")
+
+
+SWEEP = "sweep"
+
+
+def _form(value: Any) -> str:
+    return "[word]" if isinstance(value, str) and value.isalpha() else "[other]"
+
+
+SimulatedJoint = Annotated[
+    Annotated[Literal["sweep"], Tag("[word]")] | Annotated[JointPosition, Tag("[other]")],
+    Discriminator(_form),
+]
+SimulatedJoints = Annotated[
+    Annotated[Literal["zero", "sweep"], Tag("[word]")]
+    | Annotated[dict[str, SimulatedJoint], Tag("[other]")],
+    Discriminator(lambda value: "[word]" if isinstance(value, str) else "[other]"),
+]
+SIMULATIONS = frozenset[str](get_args(SimulationKind))
+
+
+class Simulate(Checked):
+    """A simulated owner: on a circle, at a fixed pose, or a publisher of joint states."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (SIMULATIONS,)
+
+    circle: Circle | None = key(
+        None, "its edge moves on a circle", {"radius": "1 m", "speed": "0.5 rad/s"}
+    )
+    fixed: Posed | None = key(None, "its edge stays at one pose", {"xyz": [1, 0, 0]})
+    joints: SimulatedJoints | None = key(
+        None,
+        "joint states: zero, sweep, or a position or sweep by joint; the others are at 0",
+        "zero",
+        {"lift": 0.2},
+    )
+    rate: Rate = key(20.0, "how often it publishes")
+
+
+class ScheduleSpec(Checked):
+    """How the kernel schedules a process."""
+
+    cpus: tuple[Annotated[int, Strict(), Field(ge=0, le=4095), Integral], ...] = key(
+        (), "the processors that it runs on, counted from 0; default: any", [2, 3]
+    )
+    policy: SchedulingPolicy | None = key(
+        None,
+        "as in sched(7); fifo and rr are real-time policies; default: fifo with a priority, else"
+        " other",
+    )
+    priority: Annotated[int, Strict(), Field(ge=1, le=99), Integral] | None = key(
+        None, "the priority of fifo and rr, 1 to 99", 80
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also a priority of a policy that has none, and one that is missing."""
+        yield from super().check(data)
+        policy, is_given = data.get("policy"), "priority" in data
+        if is_given and policy in {"other", "batch", "idle"}:
+            message = f"the policy {policy} has no priority"
+            yield (
+                ("priority",),
+                refused("TF107", message, "policy: fifo, or rr", on_key=True, other="policy"),
+            )
+        elif not is_given and policy in {"fifo", "rr"}:
+            yield (
+                (),
+                refused(
+                    "TF102",
+                    f"the policy {policy} needs a priority",
+                    "for example priority: 80",
+                    on_key=True,
+                ),
+            )
+
+
+class StopSpec(Spec):
+    """How a process is stopped: a first signal to its whole group, then firmer ones."""
+
+    signal: StopSignal = key(DEFAULTS.stop.signal, "the first signal")
+    timeout: Duration | None = key(None, "how long until the next, firmer one", "5 s")
+    kill_timeout: Duration | None = key(
+        None, "how long from SIGTERM to SIGKILL; default: timeout", "10 s"
+    )
+
+
+def _is_regular(value: str) -> str:
+    try:
+        re.compile(value)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise refused("TF106", f"{shown(value)} is not a regular expression: {error}") from None
+    return value
+
+
+READY_WAYS = frozenset[str](get_args(ReadyKind))
+
+
+class ReadySpec(Checked):
+    """When a process counts as ready; by default, when all the edges that it owns are live."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (READY_WAYS,)
+
+    edges: OnlyTrue | None = key(None, "true: when all the edges that it owns are live", True)
+    topic: TopicName | None = key(
+        None,
+        "when this topic has a publisher; below the process's namespace unless it begins with /",
+        "scan",
+    )
+    service: TopicName | None = key(
+        None,
+        "when this service is there; below the process's namespace unless it begins with /",
+        "map_server/load_map",
+    )
+    lifecycle: LifecycleState | None = key(
+        None, "when its nodes are in this state, whoever brought them there"
+    )
+    log: Annotated[Text, AfterValidator(_is_regular)] | None = key(
+        None, "when a line of its output matches this regular expression", "server started"
+    )
+    exit: Annotated[int, Strict(), Field(ge=0, le=255), Integral] | None = key(
+        None, "when it has ended with this exit code", 0
+    )
+    time: Duration | None = key(None, "this long after its start", "2 s")
+    timeout: Duration | None = key(
+        None, "when to stop waiting and report what was there instead", "30 s"
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also that nothing is waited for."""
+        yield from super().check(data)
+        if not READY_WAYS & data.keys():
+            advice = f"one of: {', '.join(sorted(READY_WAYS))}"
+            yield (), refused("TF102", "ready does not say what to wait for", advice, on_key=True)
+
+
+Ready = TypeAliasType(
+    "Ready",
+    Annotated[
+        ReadySpec,
+        BeforeValidator(
+            lambda value: {"edges": True} if value == "edges" else value,
+            Literal["edges"] | ReadySpec,
+        ),
+    ],
+)
+
+_PARAMS = (
+    "the node's parameters, passed on as they are; file: names parameter files, which the others"
+    " are merged over"
+)
+_PUBLISHES = "edges that the node publishes by default, and what stops it; a preset knows them"
+_PRESET = "what is known about this node: its edges and parameters"
+
+
+class NodeSpec(Spec):
+    """One node of a process."""
+
+    preset: Text | None = key(None, _PRESET, "slam_toolbox")
+    publishes: tuple[ClaimSpec, ...] = key(
+        (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}]
+    )
+    params: Parameters = key({}, _PARAMS, {"use_sim_time": False})
+    lifecycle: LifecycleState | None = key(
+        None, "the state that a lifecycle node is brought into after the start"
+    )
+
+
+class NamedNode(Spec):
+    """The one node of a process: its name, and what is known about it."""
+
+    name: NodeName | None = key(
+        None,
+        "its name; default: the process's, or its usual one where others start it",
+        "slam_toolbox",
+    )
+    preset: Text | None = key(None, _PRESET, "slam_toolbox")
+
+
+#: Whether components share an executor, and how many threads one has.
+Isolation = Literal["shared", "isolated"]
+Executor = Literal["single", "multi"]
+
+RUNNING = frozenset({"run", "simulate", "external", "component"})
+Way = Literal["run", "simulate", "external", "component", "container", "built-in"]
+"""How a process runs, by the key that says so; built-in: one of tfcompose's own."""
+#: To which processes a key applies, if not only to those that ``run``.
+ALL: tuple[Way, ...] = ("run", "simulate", "external", "component", "container", "built-in")
+NOT_OWN: tuple[Way, ...] = ("run", "simulate", "external", "component", "container")
+REMAPPED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
+NOT_EXTERNAL: tuple[Way, ...] = ("run", "simulate", "container", "built-in")
+NOT_SIMULATED: tuple[Way, ...] = ("run", "external", "component", "container")
+OF_NODES: tuple[Way, ...] = ("run", "external", "component")
+PROGRAM: tuple[Way, ...] = ("run", "container")
+KEPT_ALIVE: tuple[Way, ...] = ("run", "simulate", "component", "container")
+STARTED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
+ENDED: tuple[Way, ...] = ("run", "simulate", "container")
+LOADED: tuple[Way, ...] = ("component",)
+OWN: tuple[Way, ...] = ("built-in",)
+
+
+class Supervised(Checked):
+    """What every process has: its place, its start, and what follows its end."""
+
+    params: Parameters = key({}, _PARAMS, {"use_sim_time": False}, to=NOT_SIMULATED)
+    log_level: LogLevel | None = key(None, "the level of its nodes' loggers", to=PROGRAM)
+    remap: dict[RosName, RosName] = key(
+        {}, "topics, services and actions under other names", {"scan": "front/scan"}, to=REMAPPED
+    )
+    env: dict[VariableName, Word] = key(
+        {}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL
+    )
+    cwd: Text | None = key(
+        None,
+        "the folder that it runs in, relative to this file; default: where up is called",
+        "maps",
+        to=PROGRAM,
+    )
+    output: OutputPlace = key(
+        DEFAULTS.output,
+        "where its output goes: to the terminal of up and into its log, or to one of them",
+        to=STARTED,
+    )
+    emulate_tty: Boolean = key(
+        DEFAULTS.emulate_tty,
+        "true: it writes to a pseudo-terminal, line by line and in colours",
+        to=PROGRAM,
+    )
+    host: Text | None = key(None, "the computer that it runs on", "jetson", to=ALL)
+    required: Boolean | None = key(
+        None,
+        "true: its end stops everything, unless another process waits until it is done; false: the"
+        " rest goes on when it fails; default: its failure stops everything",
+        to=KEPT_ALIVE,
+    )
+    restart: RestartPolicy = key(
+        DEFAULTS.restart, "when it is started again after it has ended", to=KEPT_ALIVE
+    )
+    max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Integral] | None = key(
+        None, "how often in a row it is started again before it is given up", 5, to=KEPT_ALIVE
+    )
+    restart_delay: Duration | None = key(
+        None,
+        "how long after its end it is started again; default: 1 s, doubled each time, up to 30 s",
+        to=KEPT_ALIVE,
+    )
+    prefix: Prefix = key(
+        (),
+        "a program that runs it, with its arguments: gdb, valgrind, nice, …",
+        ["nice", "-n", "10"],
+        to=PROGRAM,
+    )
+    schedule: ScheduleSpec | None = key(
+        None,
+        "its processors and real-time priority",
+        {"cpus": [2, 3], "priority": 80},
+        to=NOT_EXTERNAL,
+    )
+    stop: StopSpec | None = key(
+        None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"}, to=ENDED
+    )
+    ready: Ready | None = key(None, "when it counts as ready", {"topic": "scan"}, to=NOT_SIMULATED)
+    after: dict[str, StartCondition] = key(
+        {}, "what must have happened before it is started", {"base_drive": "ready"}, to=ALL
+    )
+
+
+#: A component: the package that has it, and its class.
+Plugin = Annotated[
+    Text,
+    Matches(
+        r"[A-Za-z][A-Za-z0-9_]*/[A-Za-z_][A-Za-z0-9_:]*",
+        "package/class, such as image_proc/ns::RectifyNode",
+    ),
+]
+
+
+class Started(Supervised):
+    """What is started, simulated, or expected to run."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (RUNNING,)
+
+    run: Command | None = key(
+        None,
+        "{package, executable, args}, {launch, args}, or a command as a list",
+        {"package": "slam_toolbox", "executable": "async_slam_toolbox_node"},
+    )
+    simulate: Simulate | None = key(
+        None, "a simulation of it", {"circle": {"radius": "1 m"}, "rate": "50 Hz"}
+    )
+    external: OnlyTrue | None = key(None, "true: tfcompose does not start it", True)
+    component: Plugin | None = key(
+        None,
+        "a node that a container loads, as package/class",
+        "image_proc/image_proc::RectifyNode",
+    )
+    container: Text | None = key(
+        None, "the container that loads the component", "perception", to=LOADED
+    )
+    extra_arguments: Parameters = key(
+        {},
+        "what the container is told about the component",
+        {"use_intra_process_comms": True},
+        to=LOADED,
+    )
+    shell: OnlyTrue | None = key(None, "true: run is one string, which /bin/sh reads", True)
+    node: Annotated[NamedNode, short("name", NamedNode)] | None = key(
+        None,
+        "its node's name, or {preset, name}; below its namespace unless it begins with /",
+        "slam_toolbox",
+        {"preset": "slam_toolbox"},
+        to=NOT_OWN,
+    )
+    namespace: Namespace | None = key(
+        None,
+        "the namespace of its nodes; below ros.namespace unless it begins with /",
+        "front",
+        to=NOT_OWN,
+    )
+    publishes: tuple[ClaimSpec, ...] = key(
+        (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}], to=OF_NODES
+    )
+    lifecycle: LifecycleState | None = key(
+        None, "the state that its lifecycle node is brought into after the start", to=OF_NODES
+    )
+    rate: Rate | None = key(None, "of joints alone: how often joint states come", "50 Hz", to=OWN)
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also a command in one string that is not marked for a shell, and the other way round."""
+        yield from super().check(data)
+        run, shell = data.get("run"), data.get("shell") is True
+        if isinstance(run, str) and not shell:
+            advice = (
+                "write a list, one item a word; or {package: …, executable: …}; or add shell: true"
+            )
+            yield (
+                ("run",),
+                refused("TF103", "the command is one string, which only a shell reads", advice),
+            )
+        elif shell and run is not None and not isinstance(run, str):
+            advice = "run: one string, for example 'zcat log.gz | player'"
+            yield (
+                ("shell",),
+                refused(
+                    "TF107",
+                    "shell: true, but run is not a string",
+                    advice,
+                    on_key=True,
+                    keeps=True,
+                ),
+            )
+        if "component" in data and "container" not in data:
+            yield (
+                ("component",),
+                refused(
+                    "TF102", "a component without a container", "container: NAME", on_key=True
+                ),
+            )
+        for name in ("container", "extra_arguments") if "component" not in data else ():
+            if name in data:
+                advice = "component: PACKAGE/CLASS"
+                yield (
+                    (name,),
+                    refused(
+                        "TF102", f"{name} without a component", advice, on_key=True, keeps=True
+                    ),
+                )
+
+
+class ProcessSpec(Started, Entry):
+    """What is started, simulated, or expected to run."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
+        *Started.EXCLUSIVE,
+        *(frozenset({"nodes", name}) for name in ("node", "lifecycle", "component")),
+    )
+
+    nodes: dict[NodeName, NodeSpec] = key(
+        {},
+        "the nodes of a process that holds several, by name; node, params and lifecycle are the"
+        " short form for one",
+        {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
+        to=NOT_OWN,
+    )
+
+
+@cache
+def keys_of(way: Way) -> frozenset[str]:
+    """Return the keys that apply to processes that run so, but for those that say how it runs."""
+    known = fields_of(ProcessSpec).items()
+    return (
+        frozenset(name for name, field in known if way in more_of(field, "to", ("run",))) - RUNNING
+    )
+
+
+class ContainerSpec(Supervised, Entry):
+    """A process that loads components: one of rclcpp_components' containers, or one that is started elsewhere."""
+
+    isolation: Isolation = key(
+        "shared",
+        "isolated: each component has an executor of its own; shared: one executor runs all of"
+        " them",
+    )
+    executor: Executor = key("single", "with how many threads an executor runs")
+    package: Text = key(
+        "rclcpp_components", "the package of the container's program", "my_containers"
+    )
+    executable: Text | None = key(
+        None,
+        "the container's program; default: component_container, and by isolation and executor",
+        "my_container",
+    )
+    args: Words = key((), "further arguments of the program", ["--verbose"])
+    external: OnlyTrue | None = key(
+        None, "true: tfcompose does not start it, and loads components into it", True
+    )
+    node: NodeName | None = key(
+        None, "its node's name; default: the container's", "perception_container"
+    )
+    namespace: Namespace | None = key(
+        None, "the namespace of its node; below ros.namespace unless it begins with /", "front"
+    )
+
+
+class DriverSpec(Started):
+    """Keys over those of the preset's driver; or the name of the process that drives this sensor; or none."""
+
+    process: Text | None = key(None, "the process that drives this sensor, or none", "camera_rig")
+
+
+Driver = Annotated[DriverSpec, short("process", DriverSpec)]

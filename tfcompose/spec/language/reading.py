@@ -1,0 +1,415 @@
+"""From plain data to a model: everything that is refused, in this project's words, and a model of the rest.
+
+pydantic gives all or nothing. So what it refuses is taken out of the data and the rest is read
+again; each turn finds everything at once, and what is refused then only because something is gone
+is not reported. Most files with faults take two turns, and none takes more than it has levels.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
+
+from pydantic import ValidationError
+
+from tfcompose.foundation.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
+from tfcompose.foundation.units import shown
+from tfcompose.spec.language.habits import habit, usual_value
+from tfcompose.spec.language.spec import FIRST, at, fields_of, kinds_of, mapping_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pydantic_core import ErrorDetails
+
+    from tfcompose.spec.language.spec import Spec
+    from tfcompose.spec.load import Path, Source
+
+M = TypeVar("M", bound="Spec")
+
+#: How often the rest is read again at most: no file is nested deeper.
+_MAX_ATTEMPTS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """One value or key that the language does not take. ``path`` is its place.
+
+    ``on_key`` says that the key is wrong, not its value; ``other`` is the key that it conflicts
+    with. ``instead`` is the key or string that belongs there, where only one can be meant.
+    """
+
+    code: str
+    path: Path
+    message: str
+    help: str = ""
+    on_key: bool = False
+    other: Path | None = None
+    instead: str | None = None
+
+    def finding(self, source: Source) -> Finding:
+        """Return the finding at its place in the source."""
+        span = source.at_key(self.path) if self.on_key else source.at(self.path)
+        notes = [Note("the other one", source.at_key(self.other))] if self.other else []
+        edits = [Edit(span, self.instead)] if self.instead is not None else []
+        meant = (
+            _laid_over_nothing(source, self.path)
+            if self.code == "TF102" and source.is_variant
+            else ""
+        )
+        if meant:  # one finding, whatever it lacks
+            return finding(
+                "TF102",
+                f"{self.path[-1]} does not exist, and is not complete as a new entry",
+                span,
+                help=meant,
+                notes=notes,
+            )
+        return finding(self.code, self.message, span, help=self.help, notes=notes, edits=edits)
+
+
+def _laid_over_nothing(source: Source, path: Path) -> str:
+    """Return advice for an entry that a profile or an overlay adds, if it probably means one that is there."""
+    around = source.places.get(path[:-1])
+    names = list(around.keys) if around else []
+    before = names[: names.index(path[-1])] if path and path[-1] in names else []
+    return did_you_mean(str(path[-1]), before) if before else ""
+
+
+def read(
+    model: type[M], data: Any, already: Iterable[Path] = ()
+) -> tuple[M | None, list[Refusal]]:
+    """Return the model of the data without what is refused, and the refusals.
+
+    ``already`` are paths of what was refused before: it is left out, and so is what is refused
+    only because of it. The model is None where a required key of the whole is missing.
+    """
+    refusals: list[Refusal] = []
+    gone: set[Path] = set()
+    rest = _without(data, already, gone)
+    for attempt in range(_MAX_ATTEMPTS):
+        if rest is None:
+            break
+        try:
+            return model.model_validate(rest, context=None if attempt else FIRST), refusals
+        except ValidationError as error:
+            errors = [(_path_of(one["loc"], data), one) for one in error.errors(include_url=False)]
+        follows = {path[:end] for path in gone for end in range(1, len(path) + 1)}
+        new = [
+            (path, one)
+            for path, one in errors
+            if path not in (gone if one["type"] in UNKNOWN_KEYS else follows)
+        ]
+        refusals += _refusals(model, new, data)
+        rest = _without(
+            rest,
+            [_culprit(path, one) for path, one in errors if not one.get("ctx", {}).get("keeps")],
+            gone,
+        )
+    return None, refusals
+
+
+def _culprit(path: Path, error: ErrorDetails) -> Path:
+    """Return the path of what has to go: of a key that is missing, the mapping that it is missing in."""
+    return path[:-1] if error["type"] == "missing" else path
+
+
+def _path_of(loc: tuple[int | str, ...], data: Any) -> Path:
+    """Return the path in the file: pydantic's has labels of unions, and indexes where one item stands for a list."""
+    steps: list[int | str] = []
+    for step in loc:
+        is_index = isinstance(step, int)
+        if (isinstance(data, dict) and step in data) or (isinstance(data, list) and is_index):
+            data = data[step]  # type: ignore[index]
+        elif (
+            is_index or isinstance(data, list) or str(step).startswith("[")
+        ):  # [key], and labels of unions
+            continue
+        else:
+            data = None
+        steps.append(step)
+    return tuple(steps)
+
+
+def _without(data: Any, paths: Iterable[Path], gone: set[Path]) -> Any:
+    """Return the data without what is at the paths, or None if that is all of it; the paths are added to ``gone``.
+
+    A list goes with one of its items. Nothing that is given changes.
+    """
+    tree: dict[Any, Any] = {}
+    for path in paths:
+        steps = _existing(data, path)
+        if not steps:
+            return None
+        gone.add(steps)
+        node = tree
+        for step in steps[:-1]:
+            node = node.setdefault(step, {})
+            if node is _ALL:
+                break
+        else:
+            node[steps[-1]] = _ALL
+    return _pruned(data, tree) if tree else data
+
+
+#: Marks what goes as a whole.
+_ALL: Any = {None: None}
+
+
+def _existing(data: Any, path: Path) -> Path:
+    """Return the path as far as it leads to something of its own: short forms and items of lists have no keys."""
+    end = 0
+    for count, step in enumerate(path, 1):
+        if isinstance(data, dict) and step in data:
+            end = count
+        elif not (isinstance(data, list) and isinstance(step, int)):
+            break
+        data = data[step]
+    return path[:end]
+
+
+def _pruned(data: Any, tree: dict[Any, Any]) -> Any:
+    if isinstance(data, list):
+        return [
+            _pruned(item, tree[index]) if index in tree else item
+            for index, item in enumerate(data)
+        ]
+    return {
+        name: _pruned(item, tree[name]) if name in tree else item
+        for name, item in data.items()
+        if tree.get(name) is not _ALL
+    }
+
+
+def _refusals(
+    model: type[Spec], errors: list[tuple[Path, ErrorDetails]], data: Any
+) -> list[Refusal]:
+    """Return what pydantic refused in one turn, in this project's words."""
+    unknown = [path for path, one in errors if one["type"] in UNKNOWN_KEYS]
+    meant = Counter((path[:-1], _slip(model, path)) for path in unknown)
+    return [
+        (
+            _unknown_key(model, path, data, meant)
+            if one["type"] in UNKNOWN_KEYS
+            else _refusal(model, path, one)
+        )
+        for path, one in errors
+    ]
+
+
+#: The kinds of errors for a key that a model, or a dataclass, does not have.
+UNKNOWN_KEYS = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
+
+
+def _slip(model: type[Spec], path: Path) -> str | None:
+    known = mapping_at(model, path[:-1])
+    return slip_of(str(path[-1]), fields_of(known))
+
+
+def _unknown_key(
+    model: type[Spec], path: Path, data: Any, meant: Counter[tuple[Path, str | None]]
+) -> Refusal:
+    """Return the refusal of a key; one that is there already, or is meant by two, is not proposed."""
+    name, known = str(path[-1]), list(fields_of(mapping_at(model, path[:-1])))
+    slip = _slip(model, path)
+    around = data
+    for step in path[:-1]:
+        around = around[step]
+    usual = habit(name, known, around.get(path[-1]))
+    if not slip and not usual and _is_a_section(model, path):
+        message = f"{path[1]} is a section of its own, not one of {path[0]}"
+        return Refusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
+    is_safe = slip not in around and meant[path[:-1], slip] == 1 and not usual
+    advice = (
+        usual
+        or (f"did you mean {slip}?" if slip else "")
+        or _indented_too_little(path, around, known)
+    )
+    if not advice:
+        listing = f"known here: {', '.join(known)}"
+        option = (
+            f"an option of its preset goes under options: {{{name}: …}}; "
+            if "options" in known
+            else ""
+        )
+        advice = did_you_mean(name, known, option + listing)
+    return Refusal(
+        "TF101",
+        path,
+        f"unknown key {name}",
+        advice,
+        on_key=True,
+        instead=slip if is_safe else None,
+    )
+
+
+def _is_a_section(model: type[Spec], path: Path) -> bool:
+    """Return whether an entry of a section has the name of a section: it is indented too far."""
+    return len(path) == 3 and path[1] in fields_of(model) and path[0] != "profiles"  # noqa: PLR2004 (section, entry, key)
+
+
+def _indented_too_little(path: Path, around: dict[str, Any], known: list[str]) -> str:
+    """Return the help for a key that follows a known one without a value: it probably belongs to that."""
+    before = list(around)[: [*around].index(str(path[-1]))]
+    owner = next((name for name in reversed(before) if name in known), "")
+    return f"indent it, if it belongs to {owner}" if owner and around[owner] is None else ""
+
+
+def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
+    kind, value = error["type"], error["input"]
+    context, on_key = error.get("ctx", {}), "[key]" in error["loc"]
+    if kind.startswith("TF"):
+        other = (*path[:-1], context["other"]) if "other" in context else None
+        is_on_key = on_key or context.get("on_key", False)
+        return Refusal(
+            kind,
+            path,
+            context["message"],
+            context["help"],
+            is_on_key,
+            other,
+            context.get("instead"),
+        )
+    if kind == "missing":
+        field = fields_of(mapping_at(model, path[:-1]))[str(path[-1])]
+        advice = f"for example {path[-1]}: {field.examples[0]}" if field.examples else ""
+        return Refusal("TF102", path[:-1], f"{path[-1]} is missing", advice, on_key=True)
+    if kind == "literal_error":
+        allowed = [str(word) for word in _words_allowed(model, path)]
+        advice = f"one of: {', '.join(allowed)}"
+        advice = (
+            did_you_mean(usual_value(value, allowed), allowed, advice)
+            if isinstance(value, str)
+            else advice
+        )
+        return Refusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
+    code, message, advice = WORDS.get(kind, UNFORESEEN)
+    if kind == "string_type":
+        advice = _as_string(value)
+    elif kind == "bool_type" and str(value).lower() in _SWITCHES:
+        advice = f"write {_SWITCHES[str(value).lower()]}"
+    elif kind in {"model_type", "dataclass_type"}:
+        keys = fields_of(mapping_at(model, path))
+        advice = _example(model, path, value)
+        if path and path[-1] in keys:
+            advice = f"{path[-1]} belongs to the entry above: indent it more than the name of that"
+    elif kind == "dict_type":
+        advice = _as_mapping(model, path, value)
+    return Refusal(code, path, message.format(value=shown(value), **context), advice, on_key)
+
+
+def _example(model: type[Spec], path: Path, value: Any) -> str:
+    """Return the help for what stands where a mapping with known keys belongs: an example, with the value in it."""
+    keys = fields_of(mapping_at(model, path))
+    required = [name for name, field in keys.items() if field.is_required()]
+    of_word = [name for name in keys if value in _words_allowed(model, (*path, name))]
+    chosen = of_word or [name for name in keys if name == value] or required
+    if isinstance(value, str) and value not in keys and len(chosen) == 1:
+        return f"for example {{{chosen[0]}: {value}}}"
+    examples = [(name, keys[name].examples) for name in chosen]
+    pairs = [f"{name}: {_in_yaml(those[0])}" for name, those in examples if those]
+    if not chosen or len(pairs) < len(chosen):
+        return f"its keys can be: {', '.join(keys)}"
+    return f"for example {{{', '.join(pairs)}}}"
+
+
+def _words_allowed(model: type[Spec], path: Path) -> list[Any]:
+    """Return the words that may stand at a path, where these are listed."""
+    return [
+        word
+        for one in kinds_of(at(model, path))
+        if get_origin(one) is Literal
+        for word in get_args(one)
+    ]
+
+
+#: Words that YAML 1.1 reads as true and false, and YAML 1.2 as strings.
+_SWITCHES = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+
+
+def _as_string(value: Any) -> str:
+    """Return the help for what stands where a string belongs."""
+    if isinstance(value, (int, float)):
+        return "put it in quotes"
+    inside = list(value.values()) if isinstance(value, dict) else value
+    strings = [one for one in inside if isinstance(one, str)] if isinstance(inside, list) else []
+    if not strings or len(strings) != len(inside):
+        return ""
+    return (
+        f"write {_in_yaml(strings[0])}"
+        if len(strings) == 1
+        else f"write one of {', '.join(strings)}"
+    )
+
+
+def _as_mapping(model: type[Spec], path: Path, value: Any) -> str:
+    """Return the help for what stands where a mapping with the user's own keys belongs: its items, or an example."""
+    around = mapping_at(model, path[:-1])
+    field = fields_of(around).get(str(path[-1])) if around else None
+    example = (
+        next((one for one in field.examples or [] if isinstance(one, dict)), None)
+        if field
+        else None
+    )
+    usual = next(iter(example.values())) if example else {}
+    items = [_pair(item, usual) for item in (value if isinstance(value, list) else [value])]
+    if items and None not in items:
+        inside = ", ".join(f"{key}: {_in_yaml(one)}" for key, one in filter(None, items))
+        return f"write {path[-1]}: {{{inside}}}" if path else f"write {inside}"
+    inside = (
+        ", ".join(f"{key}: {_in_yaml(one)}" for key, one in example.items())
+        if example
+        else "NAME: {…}"
+    )
+    return f"for example {path[-1]}: {{{inside}}}" if path else f"for example {inside}"
+
+
+#: A variable or a parameter, and a name in ROS's own notation, with its value.
+_ASSIGNED = re.compile(r"([^\s=:]+)(?::=|=)(.*)")
+
+
+def _pair(item: Any, usual: Any) -> tuple[str, Any] | None:
+    """Return key and value of an item of a list that should be a mapping, whose values are such as ``usual``."""
+    if isinstance(item, str) and (assigned := _ASSIGNED.fullmatch(item)):
+        return assigned[1], assigned[2]
+    if isinstance(item, str) and item.endswith((".yaml", ".yml")):
+        return "file", item
+    if isinstance(item, str) and item.isidentifier() and isinstance(usual, (str, dict)):
+        return item, usual
+    if isinstance(item, list) and len(item) == 2 and all(isinstance(one, str) for one in item):  # noqa: PLR2004 (a pair)
+        return item[0], item[1]
+    if isinstance(item, dict) and isinstance(item.get("name"), str):
+        return item["name"], {}
+    if isinstance(item, dict) and len(item) == 1:
+        name, value = next(iter(item.items()))
+        return name, value
+    return None
+
+
+def _in_yaml(value: Any) -> str:
+    """Return a value as it is written in YAML, a plain word without quotes; what is in a mapping is left out."""
+    if isinstance(value, dict):
+        return "{…}"
+    return (
+        value
+        if isinstance(value, str) and re.fullmatch(r"[A-Za-z_/][\w/.]*", value)
+        else shown(value)
+    )
+
+
+#: pydantic's kinds of errors that the models can raise: code, message and help.
+WORDS = {
+    "bool_type": ("TF103", "expected true or false, got {value}", ""),
+    "dataclass_type": ("TF103", "expected a mapping, got {value}", ""),
+    "dict_type": ("TF103", "expected a mapping, got {value}", ""),
+    "greater_than_equal": ("TF106", "{value} is less than {ge}", ""),
+    "int_type": ("TF103", "expected a whole number, got {value}", ""),
+    "less_than_equal": ("TF106", "{value} is greater than {le}", ""),
+    "model_type": ("TF103", "expected a mapping, got {value}", ""),
+    "string_type": ("TF103", "expected a string, got {value}", ""),
+    "tuple_type": ("TF103", "expected a list, got {value}", ""),
+}
+#: For a kind that a later pydantic may bring.
+UNFORESEEN = ("TF103", "{value} cannot stand here", "")

@@ -1,0 +1,592 @@
+"""The language of ``robot.yaml``, version 1: what a user writes, typed.
+
+The descriptions and examples here are what an editor shows and what ``tfcompose schema
+--reference`` prints.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic_core import PydanticCustomError
+
+from tfcompose.foundation.units import (
+    NUMBER,
+    JointPosition,
+    Measure,
+    Number,
+    Quantity,
+    Truth,
+    UnitError,
+    example,
+    quantity,
+    refused,
+    shown,
+    with_article,
+)
+from tfcompose.model.plan import (
+    GuardPolicy,
+    Isolation,
+    JointType,
+    RosSettings,
+    SensorPublisher,
+    StatePublisher,
+)
+from tfcompose.model.plan.codec import documented
+from tfcompose.model.plan.middleware import ENDPOINT
+from tfcompose.model.robot import Dynamics, Limit, ReferencePositions, SafetyController
+from tfcompose.spec.language.args import Args
+from tfcompose.spec.language.bodies import LinkSpec
+from tfcompose.spec.language.fleet import Member
+from tfcompose.spec.language.hosts import HostName, HostSpec
+from tfcompose.spec.language.optics import OpticsSpec
+from tfcompose.spec.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
+from tfcompose.spec.language.process import ContainerSpec, Driver, ProcessSpec
+from tfcompose.spec.language.rules import RuleSetting, ZoneSpec
+from tfcompose.spec.language.spec import Entry, Spec, below, inherited, key, measure_of, several
+from tfcompose.spec.language.values import (
+    Axis,
+    Boolean,
+    Integral,
+    Matches,
+    Namespace,
+    NoMapping,
+    OneOrMore,
+    Parameters,
+    Text,
+    Texts,
+    Xyz,
+)
+from tfcompose.spec.load import Path
+
+
+class FrameSpec(MountKeys):
+    """A bare frame. Without a parent it is a root."""
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield what is wrong with the data together, with paths below them."""
+        yield from super().check(data)
+        if "owner" in data and "parent" not in data:
+            advice = (
+                f"write owner: {data['owner']} on the child of the edge that it publishes, or add"
+                " parent"
+            )
+            yield (
+                ("owner",),
+                refused(
+                    "TF102", "owner without a parent: a root has no edge", advice, on_key=True
+                ),
+            )
+
+
+# Joints and their hardware
+
+
+class Mimic(Spec):
+    """The joint follows another one: its position is multiplier · position of the other + offset."""
+
+    joint: Text = key(..., "the joint that it follows", "finger_left_joint")
+    multiplier: Number = key(1.0, "the factor")
+    offset: JointPosition = key(0.0, "the offset")
+
+
+def _only_one(value: Any) -> Any:
+    if isinstance(value, list):
+        raise refused("TF103", f"expected a string, got {shown(value)}", "a joint has one parent")
+    return [value]
+
+
+#: Whether joints of a type slide; bare numbers are metres then, else radians.
+_SLIDES = {"revolute": False, "continuous": False, "prismatic": True}
+
+
+class JointSpec(EdgeKeys):
+    """An edge between bodies, in URDF's words.
+
+    Planar and floating joints need an owner: joint states say nothing about them.
+    """
+
+    type: Literal["fixed", JointType] = key(..., "how the joint moves", "revolute")
+    parent: Annotated[Texts, BeforeValidator(_only_one, Text)] = key(
+        ..., "the parent link", "base_link"
+    )
+    child: Text = key(..., "the child link, which moves", "wheel_left_link")
+    axis: Axis = key(
+        (1.0, 0.0, 0.0),
+        "in the child's frame; as in URDF the default is x; of a planar joint the normal",
+        [0, 0, 1],
+    )
+    limit: Limit | None = key(
+        None,
+        "how far, how fast and how hard it can move",
+        {"lower": "-90 deg", "upper": "90 deg", "velocity": 2},
+    )
+    mimic: Mimic | None = key(
+        None, "the joint that it follows", {"joint": "finger_left_joint", "multiplier": -1}
+    )
+    dynamics: Dynamics | None = key(None, "damping and friction", {"damping": 0.1})
+    safety_controller: SafetyController | None = key(
+        None,
+        "where a controller begins to hold the joint back",
+        {"soft_upper_limit": "80 deg", "k_velocity": 10},
+    )
+    calibration: ReferencePositions | None = key(
+        None,
+        "the reference switch, as in URDF; the pose of a joint is not measured here",
+        {"rising": "10 deg"},
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also lengths of joints that turn, and angles of joints that slide."""
+        yield from super().check(data)
+        kind = data.get("type")
+        for section, field in (
+            cls.model_fields.items() if isinstance(kind, str) and kind in _SLIDES else ()
+        ):
+            inside = data.get(section)
+            for name, value in inside.items() if isinstance(inside, dict) else ():
+                measure = measure_of(below(field.annotation, name))
+                if measure and measure.sliding and isinstance(value, (str, Quantity)):
+                    yield from _wrong_unit(str(kind), (section, name), value, measure)
+
+
+def _wrong_unit(
+    kind: str, path: Path, value: str | Quantity, measure: Measure
+) -> Iterator[tuple[Path, PydanticCustomError]]:
+    try:
+        dimension = (quantity(value) if isinstance(value, str) else value).dimension
+    except UnitError:
+        return  # it is refused for that
+    turning, sliding = measure.dimensions
+    wanted, other = (sliding, turning) if _SLIDES[kind] else (turning, sliding)
+    if dimension == other:
+        moves = "slides" if _SLIDES[kind] else "turns"
+        what = value if isinstance(value, str) else with_article(other)
+        message = f"a {kind} joint {moves}: {path[-1]} cannot be {what}"
+        yield path, refused("TF104", message, f"for example {example(wanted)}", keeps=True)
+
+
+def _scalar(value: Any) -> str:
+    """Return the string that stands in XML: a parameter has no type there."""
+    if isinstance(value, Quantity):
+        if value.dimension != NUMBER:
+            raise refused("TF104", f"{shown(value)} has a unit, and a parameter has none")
+        value = value.value
+    value = value.value if isinstance(value, Truth) else value
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (str, int)):
+        return str(value)
+    if isinstance(value, float):
+        return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)  # noqa: PLR2004 (exact)
+    raise refused("TF103", f"expected a string, a number, true or false, got {shown(value)}")
+
+
+#: A parameter in XML, as the string that stands there.
+XmlParameters = dict[str, Annotated[str, BeforeValidator(_scalar, str | float | bool)]]
+
+
+def _by_name(value: Any) -> Any:
+    """Return interfaces by name, of names alone or with parameters."""
+    if not isinstance(value, list):
+        return value
+    wrong = [index for index, name in enumerate(value) if not isinstance(name, str)]
+    if wrong:
+        got = {index: f"expected a string, got {shown(value[index])}" for index in wrong}
+        raise several(*(((index,), refused("TF103", message)) for index, message in got.items()))
+    return {name: {} for name in value}
+
+
+Interfaces = Annotated[
+    dict[str, XmlParameters], BeforeValidator(_by_name, Texts | dict[str, XmlParameters])
+]
+
+
+class ComponentSpec(Spec):
+    """A joint, sensor or gpio of a hardware component."""
+
+    command: Interfaces = key(
+        {}, "its command interfaces", ["velocity"], {"position": {"min": -1, "max": 1}}
+    )
+    state: Interfaces = key({}, "its state interfaces", ["position", "velocity"])
+    params: XmlParameters = key({}, "its parameters", {"gear_ratio": 30})
+
+
+class HardwareSpec(Entry):
+    """A hardware component of ros2_control: a plugin and what it drives."""
+
+    plugin: Text = key(..., "the class that drives it", "mock_components/GenericSystem")
+    type: Literal["system", "actuator", "sensor"] = key("system", "which kind of component it is")
+    params: XmlParameters = key({}, "the plugin's parameters", {"device": "/dev/ttyUSB0"})
+    rw_rate: Annotated[int, Strict(), Field(ge=0, le=100_000), Integral] | None = key(
+        None, "how many times a second it is read and written; default, and 0: as all", 100
+    )
+    is_async: Boolean | None = key(None, "true: it is read and written in a thread of its own")
+    joints: dict[str, ComponentSpec] = key(
+        {},
+        "by the names of the robot's joints",
+        {"wheel_left_joint": {"command": ["velocity"], "state": ["position"]}},
+    )
+    sensors: dict[str, ComponentSpec] = key(
+        {}, "its sensors by name", {"force": {"state": ["force.x"]}}
+    )
+    gpios: dict[str, ComponentSpec] = key(
+        {}, "its inputs and outputs by name", {"gripper": {"command": ["open"]}}
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also what ros2_control refuses of a component of that type."""
+        yield from super().check(data)
+        joints = data.get("joints", {})
+        if data.get("type") == "actuator" and isinstance(joints, dict) and len(joints) != 1:
+            message = f"an actuator has one joint, and this one has {len(joints)}"
+            yield (
+                (),
+                refused(
+                    "TF106", message, "type: system takes any number", on_key=True, keeps=True
+                ),
+            )
+        for section in ("joints", "sensors", "gpios"):
+            components = data.get(section)
+            for name, component in components.items() if isinstance(components, dict) else ():
+                is_sensor = data.get("type") == "sensor" or section == "sensors"
+                if is_sensor and isinstance(component, dict) and component.get("command"):
+                    advice = (
+                        "type: system, or gpios"
+                        if data.get("type") == "sensor"
+                        else "gpios take commands"
+                    )
+                    yield (
+                        (section, name, "command"),
+                        refused("TF106", "a sensor takes no commands", advice, keeps=True),
+                    )
+
+
+Blocks = Annotated[
+    dict[str, Text],
+    BeforeValidator(
+        lambda value: {"": value} if isinstance(value, str) else value, Text | dict[str, Text]
+    ),
+]
+
+
+# Sensors
+
+
+class FrameOverride(Rotated):
+    """One frame of a sensor: this unit's own value, or another name. What is left out is the preset's."""
+
+    xyz: Xyz | None = key(None, "position in the parent", [0, 0.0148, 0])
+    parent: Text | None = key(
+        None, "the frame of this sensor that this unit's driver makes its parent", "camera_link"
+    )
+    name: Text | None = key(None, "another name for this frame", "front_lens")
+    joint: Text | None = key(
+        None, "the name of its joint in URDF; default: PARENT_to_CHILD", "camera_color_joint"
+    )
+
+
+class SensorSpec(MountKeys):
+    """A sensor on its mount; its frames are named after it."""
+
+    preset: Text = key(..., "the model, as vendor/model", "realsense/d435i", "generic/lidar2d")
+    parent: Parents = key(..., "the frame that the sensor is mounted on", "base_link")
+    place: Text | None = key(
+        None,
+        "the frame of the sensor whose pose is given; the mount edge follows",
+        "camera_color_optical_frame",
+    )
+    options: Parameters = key(
+        {}, "the preset's own options: streams, imu, …", {"streams": ["color", "depth"]}
+    )
+    tf: SensorPublisher | None = key(
+        None, "who publishes the frames inside the sensor; default: as the preset has it"
+    )
+    driver: Driver | None = key(
+        None,
+        "keys over the preset's driver, the name of a process, or none",
+        "none",
+        {"restart": "always"},
+    )
+    frames: dict[str, FrameOverride] = key(
+        {},
+        "this unit's own values and names of frames",
+        {"camera_imu_frame": {"xyz": [0, 0.01, 0]}},
+    )
+    optics: dict[str, OpticsSpec] = key(
+        {},
+        "what its streams see, over what the preset says",
+        {"depth": {"horizontal": "75 deg", "far": "4 m"}},
+    )
+
+
+# Parts
+
+_WHERE = "relative to the file that names it, package://NAME/PATH or $(find NAME)/PATH"
+
+
+class Origin(Posed):
+    """A pose as a parameter of a macro that takes a block."""
+
+
+#: A macro's parameter: a mapping is a pose; everything else is passed on as it is.
+MacroParameter = Annotated[
+    Annotated[Origin, Tag("[origin]")] | Annotated[NoMapping, Tag("[value]")],
+    Discriminator(lambda value: "[origin]" if isinstance(value, dict) else "[value]"),
+]
+
+#: What can be the part, and which keys go with it alone.
+PART_KINDS = {
+    "spec": ("vars", "profiles", "args"),
+    "urdf": (),
+    "xacro": ("args", "macro", "params", "include"),
+}
+_MACRO_KEYS = ("params", "include")
+#: What a file is by its ending. xacro reads plain URDF too, so that xacro: FILE.urdf is right.
+_ENDINGS = {".urdf": "urdf", ".xacro": "xacro", ".yaml": "spec", ".yml": "spec"}
+
+
+class PartSpec(MountKeys):
+    """Another robot as a part: a robot file, URDF or xacro. Everywhere else in this file its names have the prefix."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*MountKeys.EXCLUSIVE, frozenset(PART_KINDS))
+
+    spec: Text | None = key(None, "a robot file, relative to the file that names it", "rover.yaml")
+    urdf: Text | None = key(
+        None, f"a URDF file: {_WHERE}", "package://ur_description/urdf/ur5e.urdf"
+    )
+    xacro: Text | None = key(
+        None, f"a xacro file: {_WHERE}", "$(find ur_description)/urdf/ur.urdf.xacro"
+    )
+    args: Parameters = key(
+        {}, "arguments of the xacro file, or of the robot file", {"name": "ur", "ur_type": "ur5e"}
+    )
+    macro: Text | None = key(
+        None,
+        "the macro of the xacro file to call; its parent and origin may be those of the part",
+        "hokuyo_ust10",
+    )
+    params: dict[str, MacroParameter] = key(
+        {},
+        "the macro's parameters; a pose, or a string that begins with <, for one that takes a"
+        " block",
+        {"name": "front", "parent_link": "base_link", "origin": {"xyz": [0.3, 0, 0.1]}},
+    )
+    include: OneOrMore = key((), "further xacro files that the macro needs", ["common.xacro"])
+    prefix: Text | None = key(
+        None,
+        "written in front of the part's frames and joints as it is, with its slash",
+        "robot1/",
+    )
+    namespace: Namespace | None = key(
+        None,
+        "makes the part a robot of its own, with its own static and joints; below ros.namespace",
+        "robot1",
+    )
+    profiles: OneOrMore = key((), "profiles of the robot file", ["demo"])
+    vars: Parameters = key({}, "values for variables of the robot file", {"mast": "40 cm"})
+    root: Text | None = key(
+        None,
+        "the frame of the part, without the prefix, below which it is taken; default: all of it",
+        "base_link",
+    )
+    place: Text | None = key(
+        None, "the frame of the part whose pose is given; the mount edge follows", "tool0"
+    )
+    owner: Text | None = key(
+        None, "the process that publishes every edge of the part", "arm_driver"
+    )
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether it is a robot of its own beside the others, with joint states of its own."""
+        return bool((self.namespace or "").strip("/"))
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also a part that is nothing, or has keys of another kind of part."""
+        yield from super().check(data)
+        kind = next((kind for kind in PART_KINDS if kind in data), None)
+        if kind is None:
+            if data.keys() <= cls.model_fields.keys():
+                advice = "give spec, urdf or xacro"
+                yield (
+                    (),
+                    refused("TF102", "a part without a robot", advice, on_key=True, keeps=True),
+                )
+            return
+        for name in dict.fromkeys(
+            name for names in PART_KINDS.values() for name in names if name in data
+        ):
+            others = [other for other, names in PART_KINDS.items() if name in names]
+            if kind not in others:
+                message = f"{name} goes with {' and '.join(others)}, not with {kind}"
+                yield (name,), refused("TF107", message, on_key=True, keeps=True)
+        for name in _MACRO_KEYS:
+            if name in data and "macro" not in data:
+                yield (
+                    (name,),
+                    refused(
+                        "TF102", f"{name} without a macro", "macro: NAME", on_key=True, keeps=True
+                    ),
+                )
+        file = data[kind]
+        ending = next(
+            (one for one in _ENDINGS if isinstance(file, str) and file.endswith(one)), ""
+        )
+        meant = _ENDINGS.get(ending, kind)
+        if meant != kind and (kind, meant) != ("xacro", "urdf"):
+            what = "a robot file" if meant == "spec" else f"a {ending[1:]} file"
+            yield (kind,), refused("TF106", f"{file} is {what}", f"{meant}: instead of {kind}:")
+
+
+# The robot
+
+
+@dataclass(frozen=True, slots=True)
+class RosSpec(RosSettings):
+    """What all processes share."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    namespace: Namespace = inherited(RosSettings, "namespace")
+    domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Integral] | None = inherited(
+        RosSettings, "domain_id"
+    )
+    router: (
+        Annotated[Text, Matches(ENDPOINT, "an endpoint of Zenoh such as tcp/10.0.0.2:7447")] | None
+    ) = inherited(RosSettings, "router")
+    isolate: Isolation = documented(
+        "none",
+        "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless one is"
+        " given",
+    )
+    state_publisher: StatePublisher = documented(
+        "tfcompose",
+        "stock: a robot_state_publisher publishes what tfcompose would publish below base",
+    )
+
+
+class RobotSpec(Spec):
+    """One robot."""
+
+    tfcompose: Literal[1] = key(..., "the version of this language", 1)
+    robot: Annotated[
+        Text, Matches(r"[a-z][a-z0-9_]*", "a robot's name: lower case letters, digits and _")
+    ] = key(..., "the robot's name", "rover")
+    include: OneOrMore = key(
+        (), "files that this one is merged over, relative to this file", ["base.yaml"]
+    )
+    calibrations: OneOrMore = key(
+        (), "files with measured poses, of which every entry is applied", ["calibration/kit.yaml"]
+    )
+    base: Text | None = key(
+        None,
+        "the link where the URDF begins; default: base_link, or the only root",
+        "base_footprint",
+    )
+    vars: Parameters = key(
+        {}, "quantities, numbers or strings, used as ${name}", {"mast": "30 cm"}
+    )
+    args: Args = key(
+        {},
+        "values that are given when it is built, as NAME:=VALUE, used as ${args.NAME}",
+        {"cameras": {"default": 2, "max": 8}, "sim": False},
+    )
+    ros: RosSpec = key(RosSpec(), "what all processes share", {"namespace": "robot1"})
+    packages: dict[str, Text] = key(
+        {},
+        "where packages are that are not installed, relative to the file that names them",
+        {"ur_description": "../third_party/ur_description"},
+    )
+    links: dict[str, LinkSpec] = key(
+        {},
+        "bodies, in URDF's words",
+        {"base_link": {"visual": {"box": [0.5, 0.4, 0.15]}, "collision": "same"}},
+    )
+    joints: dict[str, JointSpec] = key(
+        {},
+        "edges between bodies, in URDF's words",
+        {
+            "lift_joint": {
+                "type": "prismatic",
+                "parent": "base_link",
+                "child": "lift",
+                "axis": [0, 0, 1],
+            }
+        },
+    )
+    ros2_control: dict[str, HardwareSpec] = key(
+        {},
+        "what drives the joints: ros2_control's hardware",
+        {"base": {"plugin": "mock_components/GenericSystem"}},
+    )
+    xml: Blocks = key(
+        {},
+        "raw URDF beside links and joints: <gazebo>, <transmission>, …; a string, or strings by"
+        " any name",
+        {"wheels": '<gazebo reference="wheel_left_link"><mu1>1.2</mu1></gazebo>'},
+    )
+    frames: dict[str, FrameSpec] = key(
+        {},
+        "bare frames: the skeleton, and points of interest",
+        {"odom": {"parent": "map", "owner": "slam"}},
+    )
+    sensors: dict[str, SensorSpec] = key(
+        {},
+        "sensors on their mounts",
+        {"laser": {"preset": "generic/lidar2d", "parent": "base_link"}},
+    )
+    parts: dict[str, PartSpec] = key(
+        {},
+        "other robots as subtrees, or beside each other",
+        {"arm": {"urdf": "arm.urdf", "parent": "base_link"}},
+    )
+    containers: dict[str, ContainerSpec] = key(
+        {}, "processes that load components", {"perception": {"isolation": "isolated"}}
+    )
+    processes: dict[str, ProcessSpec] = key(
+        {}, "what is started, simulated, or expected to run", {"base_drive": {"external": True}}
+    )
+    hosts: dict[HostName, HostSpec] = key(
+        {}, "the computers that processes name as their host", {"brain": {"ssh": "robot@10.0.0.2"}}
+    )
+    fleet: Member | None = key(
+        None,
+        "the fleet that it shares edges with, by a process fleet_share",
+        "fleet.yaml",
+        {"file": "fleet.yaml", "robot": "r1"},
+    )
+    profiles: Parameters = key(
+        {},
+        "named overlays, chosen with --profile",
+        {"demo": {"sensors": {"laser": {"driver": "none"}}}},
+    )
+    guard: GuardPolicy = key(GuardPolicy(), "what watches the live tree", {"mode": "strict"})
+    preset_path: OneOrMore = key(
+        (),
+        "folders with presets of your own, VENDOR/MODEL.yaml, relative to this file",
+        ["presets"],
+    )
+    coverage: dict[str, ZoneSpec] = key(
+        {},
+        "zones that sensors have to see",
+        {
+            "front": {
+                "frame": "base_link",
+                "center": [1, 0, 0.2],
+                "box": [1, 1, 0.4],
+                "by": ["lidar"],
+                "least": "90 %",
+            }
+        },
+    )
+    rules: dict[str, RuleSetting] = key(
+        {},
+        "how severe a finding is, by its code, and its limit",
+        {"TF405": "off", "TF641": {"limit": "30 %"}},
+    )

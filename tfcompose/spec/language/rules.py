@@ -1,0 +1,99 @@
+"""What a robot file sets about rules: severities and limits, and the zones that sensors have to see."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Tag
+
+from tfcompose.foundation.units import (
+    NUMBER,
+    Number,
+    Quantity,
+    UnitError,
+    quantity,
+    refused,
+    shown,
+)
+from tfcompose.spec.language.spec import Spec, key
+from tfcompose.spec.language.values import OneOrMore, Sizes, Text, Xyz
+
+Level = Literal["off", "warning", "error"]
+
+
+def _percent(value: Any) -> Any:
+    """Return the part for what is written in percent: 0.3 for ``30 %``."""
+    if isinstance(value, str) and value.rstrip().endswith("%"):
+        number = value.rstrip().removesuffix("%")
+        try:
+            return Quantity(quantity(number).value / 100, NUMBER)
+        except UnitError as error:
+            raise refused("TF103", f"{shown(value)} is not a percentage", error.advice) from None
+    return value
+
+
+def _limit(value: Any) -> Quantity:
+    """Return a limit of any kind."""
+    value = _percent(value)
+    if isinstance(value, str):
+        try:
+            value = quantity(value)
+        except UnitError as error:
+            raise refused("TF104" if error.unit else "TF103", str(error), error.advice) from None
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        value = Quantity(float(value))
+    if not isinstance(value, Quantity):
+        raise refused(
+            "TF103", f"{shown(value)} is not a limit", "for example 30 %, 45 deg or 5 cm"
+        )
+    if value.value < 0:
+        raise refused("TF106", "a limit is not less than 0")
+    return value
+
+
+def _part(value: Any) -> Any:
+    value = _percent(value)
+    number = value.value if isinstance(value, Quantity) else value
+    if isinstance(number, (int, float)) and not 0 <= number <= 1:
+        raise refused(
+            "TF106", f"{shown(value)} is not a part of the zone", "for example 90 %, or 0.9"
+        )
+    return value
+
+
+class RuleSpec(Spec):
+    """How severe the findings of a code are, and from which limit on there is one."""
+
+    severity: Level | None = key(None, "how severe a finding is; default: as the code")
+    limit: Annotated[Any, BeforeValidator(_limit, str | float)] = key(
+        None,
+        "from where on there is a finding: a percentage, an angle or a length, as the code",
+        "30 %",
+        "45 deg",
+    )
+
+
+#: A severity, or a mapping.
+RuleSetting = Annotated[
+    Annotated[RuleSpec, Tag("[rule]")] | Annotated[Level, Tag("[level]")],
+    Discriminator(lambda value: "[rule]" if isinstance(value, (dict, RuleSpec)) else "[level]"),
+]
+
+
+def level_of(setting: RuleSpec | str) -> str:
+    """Return the severity that is set; empty for that of the code."""
+    return setting if isinstance(setting, str) else setting.severity or ""
+
+
+class ZoneSpec(Spec):
+    """A box that sensors have to see."""
+
+    frame: Text = key(..., "the frame that it is in", "base_link")
+    center: Xyz = key((0.0, 0.0, 0.0), "its middle", [1, 0, 0.2])
+    box: Sizes = key(..., "its lengths along x, y and z of the frame", [1, 1, 0.4])
+    by: OneOrMore = key(
+        (),
+        "kinds of streams, or sensors, of which one has to see it; default: all",
+        ["lidar", "camera"],
+    )
+    least: Annotated[Number, BeforeValidator(_part, str | float)] = key(
+        1.0, "how much of it must be seen", "90 %"
+    )

@@ -1,0 +1,271 @@
+"""What every model of the language has in common, and a walk over what models are made of."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import types
+from functools import cache
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+from typing_extensions import TypeAliasType
+
+from tfcompose.foundation.units import Measure, refused
+from tfcompose.spec.language.values import Condition, Loops
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from pydantic import ModelWrapValidatorHandler, ValidationInfo
+    from pydantic_core import InitErrorDetails, PydanticCustomError
+    from typing_extensions import Self
+
+    from tfcompose.spec.load import Path
+
+Pattern = tuple[str, ...]
+"""Where something is in the language: keys, and ``*`` for any name. Items of a list stand where the list does."""
+
+
+class Spec(BaseModel):
+    """A mapping with known keys; others are refused. Objects do not change."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, defer_build=True, protected_namespaces=()
+    )
+
+
+#: Given to the first validation of data: later ones read what that left, which no longer shows
+#: what was meant.
+FIRST = "the data are as they were written"
+
+
+class Checked(Spec):
+    """A mapping of which more can be wrong than its single keys.
+
+    Of each set in ``EXCLUSIVE`` it holds one key at most; an overlay that sets one drops the
+    others.
+    """
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = ()
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield what is wrong with the data together, with paths below them."""
+        for keys in cls.EXCLUSIVE:
+            if len(keys & data.keys()) > 1:
+                first, *others = given = [name for name in data if name in keys]
+                for name in others:
+                    advice = f"keep one of {', '.join(given)}"
+                    message = f"{name} and {first} exclude each other"
+                    yield (
+                        (name,),
+                        refused("TF107", message, advice, on_key=True, other=first, keeps=True),
+                    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _check_first(
+        cls, value: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo
+    ) -> Self:
+        if info.context is not FIRST or not isinstance(value, dict):
+            return handler(value)
+        errors = list(cls.check(value))
+        try:
+            done = handler(value)
+        except ValidationError as error:
+            raise several(*errors, also=error) from None
+        if errors:
+            raise several(*errors)
+        return done
+
+
+class Entry(Checked):
+    """An entry of a section, which may be there or not, or several times: ``conditions`` decides it before this."""
+
+    when: Condition | None = Field(
+        None,
+        description="whether it is there: true, false or a condition",
+        examples=["${args.sim}", "${args.n > 1}"],
+    )
+    for_: Loops | None = Field(
+        None,
+        alias="for",
+        description=(
+            "there once for each value; its name, in quotes or not, says which: camera_${i}"
+        ),
+        examples=[{"i": "${range(args.cameras)}"}, {"side": ["left", "right"]}],
+    )
+
+
+def several(
+    *errors: tuple[Path, PydanticCustomError], also: ValidationError | None = None
+) -> ValidationError:
+    """Return what a validator raises for errors at paths below its value, and for those of another validation."""
+    lines: list[InitErrorDetails] = [
+        {"type": error, "loc": path, "input": None} for path, error in errors
+    ]
+    for one in also.errors(include_url=False) if also else ():
+        kind, context = one["type"], one.get("ctx", {})
+        error = refused(kind, **context) if kind.startswith("TF") else kind
+        lines.append({"type": error, "loc": one["loc"], "input": one["input"], "ctx": context})
+    return ValidationError.from_exception_data("", lines)
+
+
+def key(default: Any = ..., about: str = "", *examples: Any, **more: Any) -> Any:
+    """Describe a key of a ``Spec``; without a default it is required. ``more`` is for ``more_of``."""
+    return Field(
+        default,
+        description=about or None,
+        examples=list(examples) or None,
+        json_schema_extra=more or None,
+    )
+
+
+def more_of(field: FieldInfo, name: str, default: Any) -> Any:
+    """Return what else is known of a key under a name, or the default."""
+    more = field.json_schema_extra
+    return more.get(name, default) if isinstance(more, dict) else default
+
+
+def inherited(of: type, name: str) -> Any:
+    """Return a dataclass's field for a subclass that narrows its type: default and description stay."""
+    base = next(one for one in dataclasses.fields(of) if one.name == name)
+    return dataclasses.field(
+        default=base.default, default_factory=base.default_factory, metadata=base.metadata
+    )
+
+
+def unnamed(annotation: Any) -> Any:
+    """Return what a named type stands for: pydantic makes its schema once, whichever models share it."""
+    return annotation.__value__ if isinstance(annotation, TypeAliasType) else annotation
+
+
+def kinds_of(annotation: Any) -> Iterator[Any]:
+    """Yield the types that an annotation allows, without ``None``, ``Annotated`` and unions."""
+    annotation = unnamed(annotation)
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        yield from kinds_of(get_args(annotation)[0])
+    elif origin in {Union, types.UnionType}:
+        for one in get_args(annotation):
+            yield from kinds_of(one)
+    elif annotation is not type(None):
+        yield annotation
+
+
+def is_mapping(kind: Any) -> bool:
+    """Return whether the type is a mapping with known keys: a ``Spec``, or a dataclass that serves as one."""
+    return isinstance(kind, type) and (issubclass(kind, Spec) or dataclasses.is_dataclass(kind))
+
+
+@cache
+def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
+    """Return the keys of a mapping with known keys: its own, then those that it inherits."""
+    if issubclass(kind, Spec):
+        spec: type[Spec] = kind
+        fields = spec.model_fields
+    else:
+        hints = get_type_hints(kind, include_extras=True)
+        fields = {
+            one.name: FieldInfo.from_annotated_attribute(hints[one.name], one)
+            for one in dataclasses.fields(kind)
+        }
+    names = dict.fromkeys(name for one in kind.__mro__ for name in inspect.get_annotations(one))
+    return {fields[name].alias or name: fields[name] for name in names if name in fields}
+
+
+def below(annotation: Any, step: str | int) -> Any:
+    """Return the annotation of what is at a key or an index below one that is annotated so, or None."""
+    for kind in kinds_of(annotation):
+        if is_mapping(kind):
+            if step in fields_of(kind):
+                return fields_of(kind)[str(step)].rebuild_annotation()
+        elif get_origin(kind) is dict:
+            return get_args(kind)[1]
+        elif get_origin(kind) is tuple:  # one item may stand for a list of it
+            item = get_args(kind)[0]
+            found = item if isinstance(step, int) else below(item, step)
+            if found is not None:
+                return found
+    return None
+
+
+def measure_of(annotation: Any) -> Measure | None:
+    """Return the measure of the number, or of the numbers in a row, that an annotation allows, or None."""
+    annotation = unnamed(annotation)
+    if get_origin(annotation) is Annotated:
+        inner, *more = get_args(annotation)
+        return next((one for one in more if isinstance(one, Measure)), None) or measure_of(inner)
+    if get_origin(annotation) in {Union, types.UnionType, tuple}:
+        return next((found for one in get_args(annotation) if (found := measure_of(one))), None)
+    return None
+
+
+def at(model: Any, path: tuple[str | int, ...]) -> Any:
+    """Return the annotation of what is at a path in a file of the model, or None."""
+    for step in path:
+        model = below(model, step)
+    return model
+
+
+def mappings_at(model: Any, path: tuple[str | int, ...]) -> list[Any]:
+    """Return the mappings with known keys that may stand at a path, or in a list there."""
+    kinds = list(kinds_of(at(model, path)))
+    kinds += [
+        item for kind in kinds if get_origin(kind) is tuple for item in kinds_of(get_args(kind)[0])
+    ]
+    return [kind for kind in kinds if is_mapping(kind)]
+
+
+def mapping_at(model: Any, path: tuple[str | int, ...]) -> Any:
+    """Return the mapping with known keys, or the one in a list, that stands at a path, or None."""
+    return next(iter(mappings_at(model, path)), None)
+
+
+def walk(annotation: Any, pattern: Pattern = ()) -> Iterator[tuple[Pattern, Any]]:
+    """Yield every mapping with known keys below an annotation, and where it is; itself first."""
+    for kind in kinds_of(annotation):
+        if is_mapping(kind):
+            yield pattern, kind
+            for name, field in fields_of(kind).items():
+                yield from walk(field.annotation, (*pattern, name))
+        elif get_origin(kind) is dict:
+            yield from walk(get_args(kind)[1], (*pattern, "*"))
+        elif get_origin(kind) is tuple:
+            yield from walk(get_args(kind)[0], pattern)
+
+
+def described(field: FieldInfo) -> str:
+    """Return what a key means, with its unit."""
+    measure = measure_of(field.rebuild_annotation())
+    unit = f" ({measure.about})" if measure and measure.unit else ""
+    return f"{field.description}{unit}"
+
+
+def examples_of(field: FieldInfo) -> list[Any]:
+    """Return examples of a key: those given, else those that its type has."""
+    if field.examples:
+        return list(field.examples)
+    annotation = field.rebuild_annotation()
+    measure = measure_of(annotation)
+    if measure:
+        return [measure.example]
+    words = [
+        word
+        for kind in kinds_of(annotation)
+        if get_origin(kind) is Literal
+        for word in get_args(kind)
+    ]
+    return words or [True for kind in kinds_of(annotation) if kind is bool]

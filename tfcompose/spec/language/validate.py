@@ -1,0 +1,205 @@
+"""From a source to a typed spec, with everything that is wrong found in one pass."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tfcompose.foundation.catalogue import can_be_allowed, code_of
+from tfcompose.foundation.findings import Finding, RejectedError, without_duplicates
+from tfcompose.spec.language.args import Given
+from tfcompose.spec.language.conditions import unfolded
+from tfcompose.spec.language.fleet import FleetSpec
+from tfcompose.spec.language.node_preset import NodePresetSpec
+from tfcompose.spec.language.overlay import is_for_later
+from tfcompose.spec.language.preset import PresetSpec, wrong_names
+from tfcompose.spec.language.reading import Refusal, read
+from tfcompose.spec.language.robot import RobotSpec
+from tfcompose.spec.language.rules import RuleSpec, level_of
+from tfcompose.spec.language.spec import Spec
+from tfcompose.spec.language.values import plain
+from tfcompose.spec.language.variables import Variables, unused
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator
+
+    from tfcompose.model.plan import ParameterValue
+    from tfcompose.spec.load import Path, Source
+
+
+_NOTHING = Given()
+M = TypeVar("M", bound=Spec)
+
+
+@dataclass(frozen=True, slots=True)
+class Validated:
+    """A spec without what was refused, and the findings about that.
+
+    ``refused`` are the paths of what was; ``broken`` the entries, as (section, name), that they
+    are in: what is missing because of them is not reported a second time. ``unused`` are the paths
+    of variables and arguments that nothing uses. ``source`` has the entries that conditions and
+    loops leave, and ``conditions`` are those of the others, by (section, name). ``args`` are the
+    values of the arguments that were ``given`` or are their defaults, ``environment`` those of the
+    variables that the file names.
+    """
+
+    spec: RobotSpec
+    source: Source
+    found: tuple[Finding, ...]
+    refused: frozenset[Path] = frozenset()
+    unused: tuple[tuple[str, str], ...] = ()
+    given: Given = _NOTHING
+    args: dict[str, ParameterValue] = field(default_factory=dict)
+    environment: dict[str, str] = field(default_factory=dict)
+    conditions: dict[tuple[str, str], str] = field(default_factory=dict)
+    broken: frozenset[tuple[str, str]] = field(init=False)
+
+    @property
+    def source_data(self) -> dict[str, Any]:
+        """The plain data that the spec was made from, with what it was given."""
+        given = {"args given": self.args, "environment": self.environment}
+        return self.source.data | {name: values for name, values in given.items() if values}
+
+    def __post_init__(self) -> None:
+        entries = {(str(path[0]), str(path[1])) for path in self.refused if len(path) > 1}
+        object.__setattr__(
+            self,
+            "broken",
+            frozenset(entries | set(_children(entries, self.source.data.get("joints")))),
+        )
+
+
+def _children(broken: set[tuple[str, str]], joints: Any) -> Iterator[tuple[str, str]]:
+    """Yield the links, as entries, that have no parent only because their joints were refused."""
+    for section, name in broken:
+        joint = joints.get(name) if section == "joints" and isinstance(joints, dict) else None
+        child = joint.get("child") if isinstance(joint, dict) else None
+        if isinstance(child, str):
+            yield ("links", child)
+
+
+def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Validated:
+    """Return the typed spec of a file that is ``given`` these arguments.
+
+    ``aside`` is data that is not merged over it now, and may use its variables too.
+
+    Raises:
+        RejectedError: if so much is missing that no robot is left (its name, or the version).
+    """
+    variables = Variables(source, given)
+    idle = unused(source.data, aside)
+    done = unfolded(source, variables)
+    source = done.source
+    nulls = _nulls(source)
+    data = variables.compute(source.data, done.scopes)
+    already = [*(one.path for one in nulls), *variables.uncomputed]
+    spec, refusals = read(RobotSpec, data, already)
+    own = _findings([*nulls, *variables.refusals, *refusals], source)
+    found = (*source.found, *without_duplicates([*variables.found, *done.found]), *own)
+    if spec is None:
+        raise RejectedError(found)
+    refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
+    args = {name: plain(value) for name, value in variables.args.items() if value is not None}
+    return Validated(
+        spec, source, found, refused, idle, given, args, variables.environment, done.conditions
+    )
+
+
+def validate_preset(source: Source) -> PresetSpec:
+    """Return the typed preset.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    nulls = _nulls(source)
+    preset, refusals = read(PresetSpec, source.data, [one.path for one in nulls])
+    refusals = [*nulls, *refusals]
+    if preset is not None and not refusals:
+        refusals = list(wrong_names(preset))
+    found = (*source.found, *_findings(refusals, source))
+    if found or preset is None:
+        raise RejectedError(found)
+    return preset
+
+
+def validate_node_preset(source: Source) -> NodePresetSpec:
+    """Return the typed preset of a node.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    return _validated(NodePresetSpec, source)
+
+
+def validate_fleet(source: Source) -> FleetSpec:
+    """Return the typed fleet.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    return _validated(FleetSpec, source)
+
+
+def _validated(kind: type[M], source: Source) -> M:
+    nulls = _nulls(source)
+    spec, refusals = read(kind, source.data, [one.path for one in nulls])
+    found = (*source.found, *_findings([*nulls, *refusals], source))
+    if found or spec is None:
+        raise RejectedError(found)
+    return spec
+
+
+def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[str, str]]:
+    """Yield each entry of ``rules`` with its severity, empty for that of the code.
+
+    Off is that of a code whose entry was refused, or whose limit is not among ``limits``, by code:
+    the default would not be what is meant.
+    """
+    for section, word in sorted(validated.broken):
+        if section == "rules" and (code := code_of(word)) and can_be_allowed(code):
+            yield word, "off"
+    for word, setting in validated.spec.rules.items():
+        is_limited = isinstance(setting, RuleSpec) and setting.limit is not None
+        yield (
+            word,
+            "off" if is_limited and code_of(word) not in (*limits, None) else level_of(setting),
+        )
+
+
+def _nulls(source: Source) -> list[Refusal]:
+    """Return a refusal of each key and item without a value; null only removes what it is merged over."""
+    found: list[Refusal] = []
+
+    def visit(value: Any, path: Path) -> None:
+        for step, item in value.items() if isinstance(value, dict) else enumerate(value):
+            at = (*path, step)
+            if isinstance(item, (dict, list)):
+                visit(item, at)
+            elif item is None and isinstance(value, list):
+                message = "an item of the list has no value"
+                found.append(Refusal("TF006", at, message, "give a value, or remove the item"))
+            elif item is None and not is_for_later(path):
+                message = f"{step} has no value"
+                advice = f"write {step}: {{}}, remove it, or indent what belongs to it"
+                if _AFTER_A_COMMA.fullmatch(str(step)):
+                    advice = "decimals take a point, such as 1.5 kg; or a mapping is not closed"
+                elif glued := _WITHOUT_SPACE.fullmatch(str(step)):
+                    advice = f"a space belongs after the colon: {glued[1]}: {glued[2]}"
+                found.append(Refusal("TF006", at, message, advice, on_key=True))
+
+    if source.has_nulls:
+        visit(source.data, ())
+    return found
+
+
+#: A key and its value in one word, which the name of a frame with a colon, such as tag36h11:7, is
+#: not.
+_WITHOUT_SPACE = re.compile(r"([a-z_]+):(\S+)")
+#: What is left of a quantity such as 1,5 kg behind its comma.
+_AFTER_A_COMMA = re.compile(r"\d+(\s*[a-zA-Z°/^0-9]+)?")
+
+
+def _findings(refusals: Iterable[Refusal], source: Source) -> list[Finding]:
+    """Return the findings, each once: what stands in an anchor is refused wherever an alias names it."""
+    return list(dict.fromkeys(one.finding(source) for one in refusals))

@@ -1,0 +1,327 @@
+"""The simple values of the language: strings, lists, numbers in a row, and short forms of mappings."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, Strict
+from pydantic_core import core_schema
+from typing_extensions import TypeAliasType
+
+from tfcompose.foundation.findings import did_you_mean
+from tfcompose.foundation.geometry import Vector, norm
+from tfcompose.foundation.units import (
+    EXPRESSION,
+    NUMBER,
+    SMALLEST,
+    Length,
+    Number,
+    Quantity,
+    Size,
+    Truth,
+    refused,
+    shown,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pydantic_core import CoreSchema
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Annotates a string that has to match a pattern, in whole; ``means`` says the pattern in words."""
+
+    pattern: str
+    means: str
+
+    def check(self, value: str) -> str:
+        """Return the string.
+
+        Raises:
+            PydanticCustomError: if it does not match.
+        """
+        if re.fullmatch(self.pattern, value):
+            return value
+        raise refused("TF106", f"{shown(value)} is not {self.means}")
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: Callable[[Any], CoreSchema]
+    ) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
+        return {**handler(schema), "pattern": f"^{self.pattern}$"}
+
+
+@dataclass(frozen=True, slots=True)
+class Computable:
+    """Annotates a value that an expression may give; ``plain`` is the function that takes it out of what that gives."""
+
+    plain: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: Callable[[Any], CoreSchema]
+    ) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.plain, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), COMPUTED]}
+
+
+#: The JSON Schema of a value that is one expression.
+COMPUTED = {"type": "string", "pattern": f"^{EXPRESSION}"}
+
+
+_AXES = ("x", "y", "z")
+_ANGLES = ("roll", "pitch", "yaw")
+_ITEM = re.compile(
+    r"[^\s,]*\d[^\s,]*(?:\s+[^\s\d,.+-]+)?"
+)  # a number with its unit, which may be apart
+_OF_A_POSE = 6
+
+
+@dataclass(frozen=True, slots=True)
+class InARow:
+    """Annotates a tuple that is written as a list of ``count`` items, for example ``sample``."""
+
+    count: int
+    sample: str
+
+    def check(self, value: Any) -> Any:
+        """Return the list.
+
+        Raises:
+            PydanticCustomError: if it is none, or of another length.
+        """
+        if isinstance(value, list) and len(value) == self.count:
+            return value
+        raise refused(
+            "TF103", f"expected a list of {self.count}, got {shown(value)}", self._advice(value)
+        )
+
+    def _advice(self, value: Any) -> str:
+        """Return what to write instead: what may be meant by a string, a mapping, or numbers with decimal commas."""
+        if isinstance(value, dict) and value.keys() == {"size"}:  # as URDF's box has it
+            inner = value["size"]
+            is_complete = isinstance(inner, list) and len(inner) == self.count
+            return f"write [{', '.join(map(str, inner))}]" if is_complete else self._advice(inner)
+        text = value[0] if isinstance(value, list) and len(value) == 1 else value
+        items = _ITEM.findall(text) if isinstance(text, str) else None
+        for names in (_AXES, _ANGLES):
+            if (
+                value
+                and isinstance(value, dict)
+                and self.count == len(names)
+                and value.keys() <= set(names)
+            ):
+                items = [str(value.get(name, 0)) for name in names]
+        if items and len(items) == self.count:
+            return f"write [{', '.join(items)}]"
+        if isinstance(value, list) and self.count < len(value) <= 2 * self.count:
+            if len(value) == _OF_A_POSE and any(isinstance(one, float) for one in value):
+                first, last = (", ".join(map(str, part)) for part in (value[:3], value[3:]))
+                return f"position and rotation are two keys: xyz: [{first}] and rpy: [{last}]"
+            return f"decimals take a point: {self.sample}"
+        return f"for example {self.sample}"
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: Callable[[Any], CoreSchema]
+    ) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.check, handler(source))
+
+
+def short(name: str, of: Any) -> BeforeValidator:
+    """Return what lets a string stand for a mapping of the type ``of`` with only that key."""
+    return BeforeValidator(
+        lambda value: {name: value} if isinstance(value, str) else value, str | of
+    )
+
+
+def listed(value: Any) -> Any:
+    """Return a list, for which one item may stand."""
+    return value if isinstance(value, list) else [value]
+
+
+def plain(value: Any) -> Any:
+    """Return data as they are passed on: a computed quantity is its number."""
+    if isinstance(value, (Quantity, Truth)):
+        return value.value
+    if isinstance(value, dict):
+        return {name: plain(item) for name, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, list) else value
+
+
+def _integral(value: Any) -> Any:
+    is_integral = (
+        isinstance(value, Quantity)
+        and value.dimension == NUMBER
+        and value.value == int(value.value)
+    )
+    return int(value.value) if is_integral else value
+
+
+def _truth(value: Any) -> Any:
+    return value.value if isinstance(value, Truth) else value
+
+
+def _is_true(value: Any) -> bool:
+    if _truth(value) is True:
+        return True
+    is_meant = isinstance(value, str) and value.lower() in {"yes", "on"}
+    raise refused(
+        "TF106",
+        f"expected true, got {shown(value)}",
+        "write true" if is_meant else "write true, or remove the key",
+    )
+
+
+def _names_a_variable(name: str) -> str:
+    if not name or "=" in name:
+        raise refused("TF106", f"{name!r} cannot name a variable")
+    return name
+
+
+def _with_opacity(value: Any) -> Any:
+    """Return a colour's four parts for its name, or for its first three."""
+    if isinstance(value, str):
+        if value not in COLOURS:
+            advice = did_you_mean(
+                value, COLOURS, f"[0.2, 0.4, 0.8], or one of: {', '.join(COLOURS)}"
+            )
+            raise refused("TF106", f"{shown(value)} is not a colour", advice)
+        return [*COLOURS[value], 1.0]
+    return [*value, 1.0] if isinstance(value, list) and len(value) == len(_AXES) else value
+
+
+def _colour_part(value: float) -> float:
+    if 0 <= value <= 1:
+        return value
+    raise refused(
+        "TF106",
+        f"{shown(value)} is not a colour component: 0 to 1",
+        "divide values up to 255 by 255",
+    )
+
+
+def _has_direction(axis: Vector) -> Vector:
+    length = norm(axis)
+    if length > SMALLEST:
+        return axis
+    raise refused(
+        "TF106", f"an axis of length {length:g} has no direction", "for example [0, 0, 1]"
+    )
+
+
+def _is_visible(factors: Vector) -> Vector:
+    if all(abs(factor) > SMALLEST for factor in factors):
+        return factors
+    raise refused("TF106", "a scale of 0 leaves nothing of the mesh", "for example 0.001")
+
+
+#: Colours that have names, in red, green and blue: those of HTML 4 and three that robots often
+#: have.
+COLOURS = {
+    "black": (0.0, 0.0, 0.0),
+    "silver": (0.75, 0.75, 0.75),
+    "grey": (0.5, 0.5, 0.5),
+    "gray": (0.5, 0.5, 0.5),
+    "white": (1.0, 1.0, 1.0),
+    "maroon": (0.5, 0.0, 0.0),
+    "red": (1.0, 0.0, 0.0),
+    "purple": (0.5, 0.0, 0.5),
+    "magenta": (1.0, 0.0, 1.0),
+    "green": (0.0, 0.5, 0.0),
+    "lime": (0.0, 1.0, 0.0),
+    "olive": (0.5, 0.5, 0.0),
+    "yellow": (1.0, 1.0, 0.0),
+    "navy": (0.0, 0.0, 0.5),
+    "blue": (0.0, 0.0, 1.0),
+    "teal": (0.0, 0.5, 0.5),
+    "cyan": (0.0, 1.0, 1.0),
+    "orange": (1.0, 0.65, 0.0),
+    "brown": (0.65, 0.16, 0.16),
+}
+
+Anything = Annotated[Any, BeforeValidator(plain)]
+NoMapping = Annotated[Anything, Field(json_schema_extra={"not": {"type": "object"}})]
+Parameters = dict[str, Anything]
+#: Read before the keys are: whether an entry is there, and how often.
+Condition = Annotated[Any, BeforeValidator(lambda value: value, bool | str)]
+Loops = Annotated[
+    Any, BeforeValidator(lambda value: value, dict[str, str | tuple[str | float | bool, ...]])
+]
+Text = Annotated[str, Strict()]
+#: True or false, which may be computed.
+Boolean = Annotated[bool, Strict(), Computable(_truth)]
+OnlyTrue = Annotated[bool, BeforeValidator(_is_true), Field(json_schema_extra={"const": True})]
+#: Annotates a whole number, which may be computed.
+Integral = Computable(_integral)
+Name = Annotated[
+    Text, Matches(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")
+]
+Namespace = Annotated[
+    Text,
+    Matches(
+        r"(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?",
+        "a namespace such as robot1 or fleet/robot1",
+    ),
+]
+NodeName = Annotated[
+    Text,
+    Matches(
+        r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*",
+        "a node's name: letters, digits and _",
+    ),
+]
+TopicName = Annotated[
+    Text,
+    Matches(
+        r"~?/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*",
+        "the name of a topic or a service: letters, digits, _ and /",
+    ),
+]
+#: What stands before or after := in a remapping; it may be computed.
+RosName = Annotated[
+    Text,
+    Matches(
+        r"(\$\{[^}]*\}|[^\s:]|:(?!=))+",
+        "a name that can be remapped: without spaces, and without :=",
+    ),
+]
+#: A variable of the environment.
+VariableName = Annotated[Text, AfterValidator(_names_a_variable)]
+Texts = tuple[Text, ...]
+#: A list of strings, or one string for a list of one.
+OneOrMore = TypeAliasType("OneOrMore", Annotated[Texts, BeforeValidator(listed, Text | Texts)])
+Xyz = TypeAliasType("Xyz", Annotated[tuple[Length, Length, Length], InARow(3, "[0.2, 0, 30 cm]")])
+Sizes = Annotated[tuple[Size, Size, Size], InARow(3, "[0.5, 0.4, 0.15]")]
+Numbers = Annotated[tuple[Number, Number, Number], InARow(3, "[0, 0, 1]")]
+Axis = Annotated[Numbers, AfterValidator(_has_direction)]
+_Factors = Annotated[tuple[Number, Number, Number], InARow(3, "[0.001, 0.001, 0.001]")]
+#: Three factors, or one for all three; a negative one mirrors.
+Scale = Annotated[
+    _Factors,
+    AfterValidator(_is_visible),
+    BeforeValidator(
+        lambda value: value if isinstance(value, list) else [value] * 3, Number | _Factors
+    ),
+]
+_ColourPart = Annotated[Number, AfterValidator(_colour_part)]
+_Rgba = Annotated[
+    tuple[_ColourPart, _ColourPart, _ColourPart, _ColourPart], InARow(4, "[0.2, 0.4, 0.8, 1]")
+]
+#: Red, green, blue and opacity; without opacity, or a name, the colour is opaque.
+Colour = TypeAliasType(
+    "Colour",
+    Annotated[
+        _Rgba,
+        BeforeValidator(
+            _with_opacity,
+            Literal[tuple(COLOURS)] | tuple[_ColourPart, _ColourPart, _ColourPart] | _Rgba,
+        ),
+    ],
+)

@@ -1,0 +1,393 @@
+"""``vars``, ``args`` and ``${…}``: computed first, so that a computed value is checked like a written one."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from tfcompose.foundation.findings import Finding, Note, Span, did_you_mean, finding
+from tfcompose.foundation.units import NUMBER, Quantity, Truth, UnitError, quantity, shown
+from tfcompose.spec.language.args import ArgError, ArgSpec, Given, GivenArg, full
+from tfcompose.spec.language.expressions import (
+    A_FILE,
+    IDENTIFIER,
+    RESERVED,
+    EnvironmentText,
+    ExpressionError,
+    Value,
+    environment_in,
+    fill,
+    inserted,
+    names_in,
+)
+from tfcompose.spec.language.reading import Refusal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from tfcompose.spec.load import Path, Source
+
+
+def unused(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str, str], ...]:
+    """Return the paths of variables and arguments that no ``${…}`` names, in ``data`` or in ``aside``."""
+    declared: dict[str, tuple[str, str]] = {}
+    for section, prefix in (("vars", ""), ("args", "args.")):
+        names = data.get(section)
+        declared |= (
+            {f"{prefix}{name}": (section, name) for name in names}
+            if isinstance(names, dict)
+            else {}
+        )
+    used = set(_names(data)) | set(_names(aside)) if declared else set()
+    return tuple(path for name, path in declared.items() if name not in used)
+
+
+def alternatives_of(
+    source: Source, given: Given, aside: Source
+) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
+    """Return the values that the arguments can have which are used and not given, and of these those that they have.
+
+    Both are by name, as the command line gives them. ``aside`` is the file with its profiles,
+    which may use them too.
+    """
+    declared = source.data.get("args")
+    idle = {
+        name
+        for section, name in unused(source.data, aside.data.get("profiles"))
+        if section == "args"
+    }
+    variables = Variables(source, given)
+    alternatives: dict[str, tuple[str, ...]] = {}
+    for name, raw in declared.items() if isinstance(declared, dict) else ():
+        if raw is None or name in idle or name in given.args:
+            continue
+        try:
+            alternatives[name] = ArgSpec.model_validate(full(raw)).alternatives
+        except ValidationError:
+            continue  # it is refused where the whole is read
+    several = {name: words for name, words in alternatives.items() if words}
+    return several, {name: _first(variables.args[name], words) for name, words in several.items()}
+
+
+def _first(value: Value | None, words: tuple[str, ...]) -> str:
+    """Return the word that says the value, or the first of all."""
+    return next(
+        (word for word in words if value is not None and word == inserted(value)), words[0]
+    )
+
+
+def _names(value: Any) -> Iterator[str]:
+    if isinstance(value, str) and "${" in value:
+        yield from names_in(value)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            if "${" in key:
+                yield from names_in(key)
+            yield from _names(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _names(item)
+
+
+def _filled(value: Any, path: Path, variables: Variables) -> Any:
+    """Return the value with expressions computed; the same object where it holds none, so that aliases stay one."""
+    if isinstance(value, str):
+        return variables.fill(value, path) if "${" in value else value
+    if not isinstance(value, (dict, list)):
+        return value
+    filled: dict[Any, Any] = {}
+    for step, item in value.items() if isinstance(value, dict) else enumerate(value):
+        kind = type(item)
+        if kind is not float and (kind is dict or kind is list or (kind is str and "${" in item)):
+            new = _filled(item, (*path, step), variables)
+            if new is not item:
+                filled[step] = new
+    if not filled:
+        return value
+    return (
+        value | filled
+        if isinstance(value, dict)
+        else [filled.get(index, item) for index, item in enumerate(value)]
+    )
+
+
+def _call(functions: str) -> str:
+    return rf"\$\{{\s*({functions})\(\s*([^(){{}}]*?)\s*\)\s*\}}"
+
+
+#: What is known only when frames are named: a function, and its argument.
+CALLS = re.compile(_call("frame|file"))
+#: What a process is told, and what is known then, or when it is started.
+LATER = re.compile(rf"{CALLS.pattern}|\$\{{\s*(?:params_file|build_dir)\s*\}}")
+#: In what a xacro file is given: a file beside the robot file, which xacro would look for beside
+#: its own.
+OF_FILES = re.compile(_call("file"))
+
+
+#: A block may hold what is for another program to fill in.
+_LITERALLY = """what others fill in: ${dollar}{…}, with vars: {dollar: "$"}"""
+
+
+def _is_of_a_process(path: Path) -> bool:
+    return path[0] in {"processes", "containers"} or (
+        path[0] == "sensors" and path[2:3] == ("driver",)
+    )
+
+
+def _is_for_xacro(path: Path) -> bool:
+    return path[0] == "parts" and path[2:3] in {("args",), ("params",)}
+
+
+class NothingNewError(ExpressionError):
+    """A variable has been refused already; what needs it is broken too, and that is not said again."""
+
+
+class Variables:
+    """The variables and arguments of a robot file, and what is computed from them.
+
+    ``refusals`` are what was refused, ``found`` what is wrong with values that arguments were
+    given, and ``uncomputed`` the paths of what could not be computed. ``args`` holds the
+    arguments' values, None where one was refused, and ``environment`` what the variables that
+    ``env`` names were, or what stood for them.
+    """
+
+    def __init__(self, source: Source, given: Given) -> None:
+        variables = source.data.get("vars")
+        self.source = source
+        self.given: dict[str, Any] = variables if isinstance(variables, dict) else {}
+        self.outside = given
+        self.refusals: list[Refusal] = []
+        self.found: list[Finding] = []
+        self.uncomputed: list[Path] = []
+        self.known: dict[str, Value | None] = {}  # None: it was refused
+        self.args: dict[str, Value | None] = {}
+        self.environment: dict[str, str] = {}
+        self.open: list[str] = []
+        self.scopes: Mapping[Path, Mapping[str, Value]] = {}
+        self._read_args()
+        self._read_all()
+
+    def compute(
+        self, data: dict[str, Any], scopes: Mapping[Path, Mapping[str, Value]]
+    ) -> dict[str, Any]:
+        """Return the data with every ``${…}`` computed; ``scopes`` are values by name for what is below some paths.
+
+        What is one expression becomes a ``Quantity``, a ``Truth`` or a string. What could not be
+        computed stays as it is; there is no second refusal of what only needs a variable that was
+        refused.
+        """
+        self.scopes = scopes
+        filled = {
+            key: _filled(value, (key,), self) for key, value in data.items() if key != "vars"
+        }
+        return filled | ({"vars": data["vars"]} if "vars" in data else {})
+
+    def _read_args(self) -> None:
+        """Read the arguments in order; the default of one may name those before it, and ``env``."""
+        declared = self.source.data.get("args")
+        declared = declared if isinstance(declared, dict) else {}
+        for name, raw in declared.items():
+            self.args[name] = self._arg(name, raw) if raw is not None else None
+        for name, given in self.outside.args.items():
+            if name not in declared:
+                there = (
+                    f"its args are {', '.join(declared)}"
+                    if declared
+                    else f"{self.source.file} has no args"
+                )
+                advice = did_you_mean(name, declared, there)
+                self.found.append(
+                    finding("TF016", f"unknown argument {name}", given.at, help=advice)
+                )
+
+    def _arg(self, name: str, raw: Any) -> Value | None:
+        """Return the argument's value, or None after noting why it has none."""
+        at: Path = ("args", name)
+        declared = dict(full(raw))
+        default = declared.get("default")
+        if isinstance(default, str) and "${" in default:
+            place = (*at, "default") if isinstance(raw, dict) else at
+            if (filled := self.fill(default, place)) is default:
+                return None
+            declared["default"] = filled
+        try:
+            spec = ArgSpec.model_validate(declared)
+        except ValidationError:
+            return None  # it is refused where the whole is read
+        given = self._given(name, spec)
+        notes = [Note(f"args.{name} is declared here", self.source.at_key(at))]
+        if given is None and spec.default is None:
+            message, advice = (
+                f"the argument {name} has no value",
+                f"give {name}:=VALUE, or a default",
+            )
+            self.found.append(finding("TF102", message, self.source.at_key(at), help=advice))
+            return None
+        try:
+            return spec.value(spec.default if given is None else given.value)
+        except ArgError as error:
+            if given:  # else its default is refused where the whole is read
+                self.found.append(
+                    finding(
+                        error.code, f"{name}: {error}", given.at, help=error.advice, notes=notes
+                    )
+                )
+            return None
+
+    def _given(self, name: str, spec: ArgSpec) -> GivenArg | None:
+        if name in self.outside.args:
+            return self.outside.args[name]
+        value = self.outside.environment.get(spec.env) if spec.env else None
+        if value is None:
+            return None
+        self.environment[str(spec.env)] = value
+        return GivenArg(value, Span(f"{spec.env}={value}"))
+
+    def _read_all(self) -> None:
+        """Compute every variable, first those that it needs; without recursion, however long the chain."""
+        for first in self.given:
+            self.open = [first]
+            waiting = [self._names_in(first)]
+            while waiting:
+                needed = next(
+                    (
+                        name
+                        for name in waiting[-1]
+                        if name not in self.known and name not in self.open
+                    ),
+                    None,
+                )
+                if needed is not None:
+                    self.open.append(needed)
+                    waiting.append(self._names_in(needed))
+                    continue
+                waiting.pop()
+                self._read(self.open[-1])
+                self.open.pop()
+
+    def _names_in(self, name: str) -> Iterator[str]:
+        value = self.given[name]
+        names = names_in(value) if isinstance(value, str) else []
+        return iter([other for other in names if other in self.given])
+
+    def _read(self, name: str) -> None:
+        if name in self.known:
+            return
+        if self.given[name] is None:  # a null is refused as such
+            self.known[name] = None
+            return
+        try:
+            self.known[name] = self._value(name, self.given[name])
+        except ExpressionError as error:
+            self.known[name] = None
+            self._refuse(error, ("vars", name))
+
+    def fill(self, text: str, path: Path, lookup: Callable[[str], Value] | None = None) -> Any:
+        """Return the text with every ``${…}`` computed, or, after noting why, as it is; the path is the text's."""
+        try:
+            later = LATER if _is_of_a_process(path) else OF_FILES if _is_for_xacro(path) else None
+            value = fill(text, lookup or self._lookup_at(path), later)
+            return Truth(value) if isinstance(value, bool) else value
+        except ExpressionError as error:
+            self._refuse(error, path)
+            return text
+
+    def _refuse(self, error: ExpressionError, path: Path) -> None:
+        self.uncomputed.append(path)
+        if not isinstance(error, NothingNewError):
+            advice = f"{error.advice}; {_LITERALLY}" if path[0] == "xml" else error.advice
+            self.refusals.append(Refusal("TF105", path, str(error), advice))
+
+    def _lookup_at(self, path: Path) -> Callable[[str], Value]:
+        scope = self.scopes.get(path[:2])
+        return self.within(scope) if scope else self.lookup
+
+    def value_in(self, text: str, scope: Mapping[str, Value]) -> Value:
+        """Return what a text says with every ``${…}`` computed, names looked up in the scope first.
+
+        Raises:
+            ExpressionError: if it cannot be computed.
+        """
+        return fill(text, self.within(scope))
+
+    def within(self, scope: Mapping[str, Value]) -> Callable[[str], Value]:
+        """Return what looks names up in the scope first."""
+        return lambda name: scope[name] if name in scope else self.lookup(name)
+
+    def lookup(self, name: str) -> Value:
+        """Return the value of a variable, of an argument, ``args.NAME``, or of ``env(NAME, default)``.
+
+        Raises:
+            ExpressionError: if there is none.
+        """
+        if name.startswith("args."):
+            return self._lookup_arg(name.removeprefix("args."))
+        if (named := environment_in(name)) is not None:
+            return self._lookup_environment(*named)
+        if name in self.known:
+            value = self.known[name]
+            if value is None:
+                raise NothingNewError(name)
+            return value
+        if name in self.open:
+            circle = " → ".join([*self.open[self.open.index(name) :], name])
+            raise ExpressionError(f"the variable {self.open[-1]} depends on itself: {circle}")
+        if name in RESERVED:
+            raise ExpressionError(f"{name} is {RESERVED[name]}", A_FILE)
+        if name == "math.pi":
+            raise ExpressionError(f"unknown variable {name}", "write pi")
+        there = f"vars has {', '.join(self.given)}" if self.given else "the file has no vars"
+        raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.given, there))
+
+    def _lookup_arg(self, name: str) -> Value:
+        if name in self.args:
+            value = self.args[name]
+            if value is None:
+                raise NothingNewError(name)
+            return value
+        declared = self.source.data.get("args")
+        if isinstance(declared, dict) and name in declared:
+            raise ExpressionError(
+                f"the argument {name} is declared further down", f"declare {name} first"
+            )
+        there = f"args has {', '.join(self.args)}" if self.args else "the file has no args"
+        raise ExpressionError(f"unknown argument {name}", did_you_mean(name, self.args, there))
+
+    def _lookup_environment(self, name: str, default: str | None) -> Value:
+        value = self.outside.environment.get(name, default)
+        if value is None:
+            raise ExpressionError(
+                f"{name} is not in the environment",
+                f"set it, or give a default: ${{env({name}, …)}}",
+            )
+        self.environment[name] = value
+        return EnvironmentText(value)
+
+    def _value(self, name: str, given: Any) -> Value:
+        if name in RESERVED:
+            raise ExpressionError(f"{name} is {RESERVED[name]}", "give the variable another name")
+        if not IDENTIFIER.fullmatch(name):
+            raise ExpressionError(
+                f"{name!r} cannot name a variable",
+                "letters, digits and _: for example mast_height",
+            )
+        if isinstance(given, bool) or not isinstance(given, (int, float, str)):
+            raise ExpressionError(
+                f"the variable {name} is {shown(given)}", "a number, a quantity or a string"
+            )
+        if not isinstance(given, str):
+            return Quantity(given)
+        value = fill(given, self.lookup) if "${" in given else given
+        if not isinstance(value, str):
+            return value
+        try:
+            read = quantity(value)
+        except UnitError as error:
+            if error.unit:
+                raise ExpressionError(f"{error} in the variable {name}", error.advice) from None
+            return value
+        return (
+            value if read.dimension == NUMBER else read
+        )  # a number in quotes is a text, such as a serial number

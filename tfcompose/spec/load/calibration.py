@@ -1,0 +1,168 @@
+"""Calibration files as plain data with places: YAML of one or several documents, rows of numbers, launch files.
+
+The bounds are those of robot files. xacro's tags ``!degrees`` and ``!radians`` are read here, on
+plain numbers.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_right
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.foundation.findings import Span, finding
+from tfcompose.spec.load.nodes import Place, Reader
+from tfcompose.spec.load.scalars import FLOAT, INT, implicit_tag, scalar
+from tfcompose.spec.load.source import Source, refuse_unreadable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Form = Literal["yaml", "rows", "launch"]
+
+#: What one unit of each tag is, in radians.
+ANGLE_TAGS = {"!degrees": math.pi / 180, "!radians": 1.0}
+
+PUBLISHER = "static_transform_publisher"
+
+#: A matrix has four rows; what is much larger is none, and is not looked at as one.
+MOST_ROWS, LONGEST_ROW = 64, 1000
+
+_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_WORD = re.compile(r"[^\s,]+")
+_XML = re.compile(r"<!--(?:.*?-->|.*)|<node\b[^<>]*>", re.DOTALL)
+_ARGS = re.compile(r"\bargs\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_PYTHON = re.compile(r"#[^\n]*|\"([^\"\n]*)\"|'([^'\n]*)'|[\[\]]")
+
+
+def load_calibration(text: str, file: str) -> tuple[Form, tuple[Source, ...]]:
+    """Return what the file is made of, and its documents.
+
+    Rows of numbers are one document, a list of lists; a launch file is one, a list of the words of
+    each of its ``static_transform_publisher`` nodes.
+
+    Raises:
+        RejectedError: if the text is none of these, or larger than a file here can be.
+    """
+    refuse_unreadable(text, file)
+    lines = text.splitlines()
+    filled = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if 0 < len(filled) <= MOST_ROWS and all(map(_is_row, filled)):
+        return "rows", (_rows(lines, file),)
+    if PUBLISHER in text and (text.lstrip().startswith("<") or "LaunchDescription" in text):
+        return "launch", (_launch(text, file),)
+    return "yaml", tuple(_documents(text, file))
+
+
+def _is_row(line: str) -> bool:
+    words = _WORD.findall(line) if len(line) < LONGEST_ROW else []
+    return len(words) > 1 and all(map(_NUMBER.fullmatch, words))
+
+
+def _documents(text: str, file: str) -> Iterator[Source]:
+    reader = _CalibrationReader(file)
+    reader.read(text, single=False)
+    found = tuple(reader.found)
+    for data, place in reader.documents:
+        if data is not None and (
+            not isinstance(data, str) or data.strip()
+        ):  # ros2 topic echo ends with ---
+            yield Source(file, data, place, found)
+            found = ()
+
+
+class _CalibrationReader(Reader):
+    """Reads numbers with xacro's tags for angles too, in radians."""
+
+    def tagged(self, tag: str, text: str, place: Place) -> Any:
+        """Return the value of a scalar with a tag."""
+        if tag not in ANGLE_TAGS:
+            return super().tagged(tag, text, place)
+        kind = implicit_tag(text.strip())
+        if kind not in {INT, FLOAT}:
+            message, advice = f"{tag} takes a number, not {text[:40]!r}", "write the number"
+            self.found.append(finding("TF005", message, place.span, help=advice))
+            return 0.0
+        return float(scalar(kind, text.strip()) or 0) * ANGLE_TAGS[tag]
+
+
+class _Lines:
+    """Where an offset in the text stands."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.file = file
+        self.starts = [0, *accumulate(len(line) for line in text.splitlines(keepends=True))]
+
+    def span(self, start: int, end: int) -> Span:
+        first, last = bisect_right(self.starts, start) - 1, bisect_right(self.starts, end) - 1
+        begin, stop = start - self.starts[first] + 1, end - self.starts[last] + 1
+        return Span(self.file, first + 1, begin, last + 1, stop)
+
+
+def _rows(lines: list[str], file: str) -> Source:
+    places: dict[str | int, Place] = {}
+    data: Any = []
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = [(m.group(), m.start() + 1, m.end() + 1) for m in _WORD.finditer(line)]
+        line_span = Span(file, number, row[0][1], number, row[-1][2])
+        words = {i: Place(Span(file, number, a, number, b)) for i, (_, a, b) in enumerate(row)}
+        places[len(data)] = Place(line_span, words)
+        data.append([word for word, _, _ in row])
+    first = places[0].span
+    return Source(
+        file, data, Place(Span(file, first.line, first.column, len(lines) + 1, 1), places)
+    )
+
+
+def _launch(text: str, file: str) -> Source:
+    """Return the words of each static_transform_publisher; what stands in comments is left out, nothing is run."""
+    lines = _Lines(text, file)
+    places: dict[str | int, Place] = {}
+    data: Any = []
+    found = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)
+    for words in found:
+        if not words:
+            continue
+        inside = {
+            index: Place(lines.span(start, end)) for index, (_, start, end) in enumerate(words)
+        }
+        places[len(data)] = Place(lines.span(words[0][1], words[-1][2]), inside)
+        data.append([word for word, _, _ in words])
+    return Source(file, data, Place(Span(file), places))
+
+
+def _in_xml(text: str) -> Iterator[list[tuple[str, int, int]]]:
+    for tag in _XML.finditer(text):
+        given = (
+            _ARGS.search(tag.group())
+            if PUBLISHER in tag.group() and tag.group()[1] != "!"
+            else None
+        )
+        if given:
+            which = 1 if given[1] is not None else 2
+            begin = tag.start() + given.start(which)
+            yield [
+                (m.group(), begin + m.start(), begin + m.end())
+                for m in re.finditer(r"\S+", given[which])
+            ]
+
+
+def _in_python(text: str) -> Iterator[list[tuple[str, int, int]]]:
+    """Yield the texts of the list that follows each mention of the publisher."""
+    words: list[tuple[str, int, int]] = []
+    named = inside = False
+    for token in _PYTHON.finditer(text):
+        word = token[1] if token[1] is not None else token[2]
+        if token.group() == "[":
+            inside = named
+        elif token.group() == "]" and inside:
+            yield words
+            words, named, inside = [], False, False
+        elif word is not None and inside:
+            words.append((word, token.start(), token.end()))
+        elif word == PUBLISHER:
+            named = True

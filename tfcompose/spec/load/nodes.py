@@ -1,0 +1,405 @@
+"""YAML text as plain data with the place of every key and value, in one pass over PyYAML's parser events.
+
+PyYAML's own composer recurses in C and a deeply nested text ends the interpreter; this one has a
+stack of its own and stops at a depth that no robot needs. Nothing is constructed by tags, no code
+is run. An alias *is* the value that it names, so a bomb of aliases stays small here, and what
+reads the data can see that it has read a value before.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import yaml
+from yaml.events import (
+    AliasEvent,
+    DocumentStartEvent,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
+
+from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, finding
+from tfcompose.spec.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
+from tfcompose.spec.load.syntax import no_character, no_syntax
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+
+DEEPEST = 40
+MOST_VALUES = 400_000  # with those that aliases stand for
+
+#: NUL, which no file name, argument or variable can hold, and halves of characters, which no file
+#: can.
+_FORBIDDEN = re.compile("[\0\ud800-\udfff]")
+
+#: A key that swallowed the beginning of its value: ``mast {parent``, ``mast:{parent``.
+_GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
+
+LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+
+@dataclass(slots=True)
+class _Part:
+    """A finished value that has a name: how many values and levels it holds, and what was found in it."""
+
+    value: Any
+    place: Place
+    size: int = 1
+    height: int = 0
+    found: list[Finding] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Open:
+    """A mapping or list that is being read; ``key`` waits for its value, which ``keeps`` says to keep."""
+
+    data: Any
+    start: yaml.CollectionStartEvent
+    is_mapping: bool
+    is_root: bool
+    found_before: int
+    waits_for_key: bool
+    inside: dict[str | int, Place] = field(default_factory=dict)
+    keys: dict[str, Place] = field(default_factory=dict)
+    merges: tuple[tuple[Any, Place], ...] = ()
+    size: int = 1
+    height: int = 0
+    key: str = ""
+    is_merge: bool = False
+    keeps: bool = True
+    found_before_value: int = 0
+
+    def is_aside(self, key: str) -> bool:
+        """Whether the key stands at the top and holds nothing but anchors."""
+        return self.is_root and key.startswith("x-")
+
+
+class Reader:
+    """Reads the documents of one text. ``found`` is what was wrong, ``has_nulls`` whether a value is null."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.found: list[Finding] = []
+        self.has_nulls = False
+        self.documents: list[tuple[Any, Place]] = []
+        self._anchors: dict[str, _Part | None] = {}
+        self._stack: list[_Open] = []
+        self._values = 0
+        self._size = 0
+
+    def read(self, text: str, *, single: bool = True) -> None:
+        """Read the text; with ``single`` it is one document.
+
+        Raises:
+            RejectedError: where the text stops being YAML, is too deep, or too large.
+        """
+        try:
+            events: Iterator[Any] = yaml.parse(text, Loader=LOADER)
+            for event in events:
+                kind = type(event)
+                if kind is ScalarEvent:  # most of them are
+                    self._scalar(event)
+                elif kind is MappingStartEvent or kind is SequenceStartEvent:
+                    self._open(event, is_mapping=kind is MappingStartEvent)
+                elif kind is MappingEndEvent or kind is SequenceEndEvent:
+                    self._close(event)
+                elif kind is AliasEvent:
+                    self._alias(event)
+                elif kind is DocumentStartEvent:
+                    self._begin(event, single=single)
+        except yaml.MarkedYAMLError as error:
+            raise RejectedError([no_syntax(error, text, self.file)]) from None
+        except yaml.reader.ReaderError as error:
+            raise RejectedError([no_character(error, text, self.file)]) from None
+        except UnicodeEncodeError as error:
+            message = f"the text is not Unicode: {error.reason}"
+            raise RejectedError([finding("TF001", message, Span(self.file))]) from None
+        self.found = list(dict.fromkeys(self.found))  # an alias says again what its anchor said
+
+    def _begin(self, event: yaml.Event, *, single: bool) -> None:
+        self._anchors = {}
+        if single and self.documents:
+            message = "a second document begins here; a robot is one document"
+            raise RejectedError([finding("TF002", message, self._place(event).span)])
+
+    def _place(self, event: yaml.Event) -> Place:
+        return Place(_between(self.file, event.start_mark, event.end_mark))
+
+    def _refuse(self, message: str, place: Place) -> RejectedError:
+        return RejectedError([*self.found, finding("TF008", message, place.span)])
+
+    def _scalar(self, event: yaml.ScalarEvent) -> None:
+        place = Place(_between(self.file, event.start_mark, event.end_mark))
+        before = len(self.found)
+        value = self.value_of(event, place)
+        if event.anchor:
+            self._anchors[event.anchor] = _Part(value, place, found=self.found[before:])
+        top = self._stack[-1] if self._stack else None
+        if top is not None and top.waits_for_key:
+            del self.found[before:]
+            key = value if isinstance(value, str) and event.tag in {None, "!", STR} else None
+            is_merge = key == "<<" and event.implicit[0]
+            self._key(top, key, place, "a number, true, false or null", is_merge=is_merge)
+        else:
+            self._put(value, place, 1, 0)
+
+    def value_of(self, event: yaml.ScalarEvent, place: Place) -> Any:
+        """Return a scalar's value, and note what is wrong with it."""
+        tag, text = event.tag, event.value
+        try:
+            if event.implicit[0] and (tag is None or tag == "!"):
+                value: Any = plain(text)
+                self.has_nulls = self.has_nulls or value is None
+                return value
+            if _FORBIDDEN.search(text):  # written as an escape
+                raise RejectedError(
+                    [finding("TF002", "a character that no text can hold", place.span)]
+                )
+            if tag is None or tag in {"!", STR}:
+                return text
+            return self.tagged(tag, text, place)
+        except OverflowError as error:
+            self.found.append(
+                finding("TF007", str(error), place.span, help="give a finite number")
+            )
+            return 1.0  # which sizes, masses and axes can be: one fault is one finding
+
+    def tagged(self, tag: str, text: str, place: Place) -> Any:
+        """Return the value of a scalar with a tag, and note what is wrong with it."""
+        if tag not in SCALAR_TAGS:
+            self._unknown_tag(tag, place)
+            return text
+        try:
+            value = scalar(tag, text)
+        except ValueError as error:
+            self.found.append(finding("TF005", str(error), place.span, help="leave the tag out"))
+            return text
+        self.has_nulls = self.has_nulls or value is None
+        return value
+
+    def _unknown_tag(self, tag: str, place: Place) -> None:
+        message = f"unknown tag {tag.replace(TAG, '!!')}"
+        self.found.append(
+            finding("TF005", message, place.span, help="tags are not used: leave it out")
+        )
+
+    def _open(self, event: yaml.CollectionStartEvent, *, is_mapping: bool) -> None:
+        if len(self._stack) >= DEEPEST:
+            raise self._refuse(f"nested deeper than {DEEPEST} levels", self._place(event))
+        data: Any = {} if is_mapping else []
+        self._stack.append(
+            _Open(data, event, is_mapping, not self._stack, len(self.found), is_mapping)
+        )
+        if event.anchor:
+            self._anchors[event.anchor] = None
+        if event.tag is not None and event.tag not in {"!", MAP if is_mapping else SEQ}:
+            self._unknown_tag(event.tag, self._place(event))
+
+    def _close(self, event: yaml.Event) -> None:
+        done = self._stack.pop()
+        for value, place in done.merges:
+            self._inherit(done, value, place)
+        place = Place(
+            _between(self.file, done.start.start_mark, event.end_mark), done.inside, done.keys
+        )
+        self._size += 0 if self._stack else done.size
+        if done.size > MOST_VALUES or self._size > MOST_VALUES:
+            raise self._refuse(
+                f"more than {MOST_VALUES:,} values once aliases are followed", place
+            )
+        if done.start.anchor:
+            found = self.found[done.found_before :]
+            self._anchors[done.start.anchor] = _Part(
+                done.data, place, done.size, done.height, found
+            )
+        top = self._stack[-1] if self._stack else None
+        if top and top.waits_for_key:
+            del self.found[done.found_before :]
+            self._key(top, None, place, "a list or a mapping")
+        else:
+            self._put(done.data, place, done.size, done.height)
+
+    def _inherit(self, done: _Open, value: Any, place: Place) -> None:
+        """Take what ``<<`` names for the keys that the mapping does not have; the first mapping that has a key wins."""
+        steps = enumerate(value) if isinstance(value, list) else [(None, value)]
+        for index, source in steps:
+            at = place if index is None else place.inside[index]
+            if not isinstance(source, dict):
+                message = "<< takes a mapping, or a list of mappings"
+                self.found.append(finding("TF011", message, at.span))
+                continue
+            for key, item in source.items():
+                if key not in done.data and not done.is_aside(key):
+                    done.data[key], done.inside[key], done.keys[key] = (
+                        item,
+                        at.inside[key],
+                        at.keys[key],
+                    )
+
+    def _alias(self, event: yaml.AliasEvent) -> None:
+        if event.anchor not in self._anchors:
+            message = f"no anchor &{event.anchor} is defined before this alias"
+            raise RejectedError([finding("TF002", message, self._place(event).span)])
+        part = self._anchors[event.anchor]
+        if part is None or len(self._stack) + part.height > DEEPEST:
+            why = (
+                f"nested deeper than {DEEPEST} levels"
+                if part
+                else "an alias stands inside what it names"
+            )
+            raise self._refuse(why, self._place(event))
+        top = self._stack[-1]
+        if top.waits_for_key:
+            key = part.value if isinstance(part.value, str) else None
+            self._key(top, key, self._place(event), "not a string")
+        else:
+            self.found += part.found
+            self._put(part.value, part.place, part.size, part.height)
+
+    def _key(
+        self, top: _Open, key: str | None, place: Place, what: str = "", *, is_merge: bool = False
+    ) -> None:
+        """Take a key; the value of one that is no text, or is given twice, or holds anchors only, is not kept."""
+        top.key, top.waits_for_key, top.is_merge, top.keeps = key or "", False, is_merge, True
+        if key is None:
+            message = f"a key must be a string; this one is {what}"
+            self.found.append(finding("TF004", message, place.span, help="put it in quotes"))
+            top.keeps = False
+        elif not key.isascii() and key.strip() != key:
+            message = (
+                "a key begins or ends with a space that YAML does not take for one, such as a"
+                " no-break space"
+            )
+            self.found.append(
+                finding("TF002", message, place.span, help="replace it with an ordinary space")
+            )
+            top.keeps = False
+        elif ("{" in key or "[" in key) and (glued := _GLUED.match(key)):
+            message = (
+                f"a space after the colon of {glued[1]} is missing"
+                if glued[2]
+                else f"{glued[1]} has no colon"
+            )
+            advice = f"write {glued[1]}: {glued[3] if glued[3][-1] in '}]' else glued[3][0] + '…'}"
+            self.found.append(finding("TF002", message, place.span, help=advice))
+            top.keeps = False
+        elif key in top.keys:
+            note = Note("first defined here", top.keys[key].span)
+            self.found.append(
+                finding("TF003", f"the key {key} is given twice", place.span, notes=[note])
+            )
+            top.keeps = False
+        else:
+            top.keys[key] = place
+            top.keeps = not (top.is_root and top.is_aside(key))
+        top.found_before_value = len(self.found)
+
+    def _put(self, value: Any, place: Place, size: int, height: int) -> None:
+        """Put a finished value where it belongs."""
+        if not self._stack:
+            self.documents.append((value, place))
+            return
+        top = self._stack[-1]
+        top.size += size
+        if height >= top.height:
+            top.height = height + 1
+        if not top.is_mapping:
+            top.inside[len(top.data)] = place
+            top.data.append(value)
+            return
+        top.waits_for_key = True
+        if not top.keeps:
+            del self.found[top.found_before_value :]
+        elif top.is_merge:
+            top.merges += ((value, place),)
+        else:
+            top.data[top.key], top.inside[top.key] = value, place
+
+
+def _between(file: str, start: Any, end: Any) -> tuple[str, int, int, int, int]:
+    """Return the file, and lines and columns from 0; the parser's marks would all have to be kept."""
+    return file, start.line, start.column, end.line, end.column
+
+
+Path = tuple[str | int, ...]
+
+_NOTHING: Mapping[Any, Any] = {}
+
+
+class Place:
+    """Where a value stands; of a mapping or a list also where its keys, and the values in it, stand.
+
+    Most places are never asked for, and become a ``Span`` only then. Places do not change.
+    ``inside`` holds the places of the values by key or index, ``keys`` those of the keys; an alias
+    has the place of its anchor.
+    """
+
+    __slots__ = ("_at", "inside", "keys")
+
+    def __init__(
+        self,
+        at: Span | tuple[str, int, int, int, int],
+        inside: Mapping[Any, Place] = _NOTHING,
+        keys: Mapping[Any, Place] = _NOTHING,
+    ) -> None:
+        """``at`` is the place, or the file and the lines and columns of beginning and end, which count from 0."""
+        self._at = at
+        self.inside = inside
+        self.keys = keys
+
+    @property
+    def span(self) -> Span:
+        """The place in the file."""
+        at = self._at
+        if isinstance(at, Span):
+            return at
+        file, line, column, end_line, end_column = at
+        self._at = span = Span(file, line + 1, column + 1, end_line + 1, end_column + 1)
+        return span
+
+    def with_inside(self, inside: Mapping[Any, Place], keys: Mapping[Any, Place]) -> Place:
+        """Return the same place with other places in it."""
+        return Place(self._at, inside, keys)
+
+    def get(self, path: Path) -> Place | None:
+        """Return the place of what is at ``path`` below, or None."""
+        place: Place | None = self
+        for step in path:
+            if place is None:
+                break
+            place = place.inside.get(step)
+        return place
+
+    def nearest(self, path: Path) -> Place:
+        """Return the place of what is at ``path`` below, or of the nearest thing around it that there is."""
+        place = self
+        for step in path:
+            below = place.inside.get(step)
+            if below is None:
+                break
+            place = below
+        return place
+
+    def nearest_key(self, path: Path) -> Place | None:
+        """Return the place of the last key on the way to ``path`` that there is, or None."""
+        place = self
+        key: Place | None = None
+        for step in path:
+            key = place.keys.get(step, key)
+            below = place.inside.get(step)
+            if below is None:
+                break
+            place = below
+        return key
+
+    def walk(self, path: Path = ()) -> Iterator[tuple[Path, Place]]:
+        """Yield every value's path and place, this one's first."""
+        yield path, self
+        for step, place in self.inside.items():
+            yield from place.walk((*path, step))

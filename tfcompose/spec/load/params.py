@@ -1,0 +1,168 @@
+"""Parameter files of ROS: parameters by node, each value as it was written.
+
+rcl reads these files by rules of its own (``on`` is true, 012 is ten), so values stay the words
+that they were.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
+from tfcompose.spec.load.nodes import DEEPEST, LOADER
+from tfcompose.spec.load.source import MOST_VALUES, refuse_unreadable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+PARAMETERS = "ros__parameters"
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A value as it was written, and where; ``plain`` without quotes."""
+
+    text: str
+    plain: bool
+    at: Span
+
+
+@dataclass(frozen=True, slots=True)
+class NodeParams:
+    """What a file says to the nodes that ``name`` means: a name, or a pattern with * for one part and ** for any."""
+
+    name: str
+    at: Span
+    params: dict[str, Any]
+
+
+@dataclass(slots=True)
+class ParamsFile:
+    """A parameter file: its nodes in the order of the file, and what is wrong with it."""
+
+    nodes: list[NodeParams] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
+
+
+def load_params(text: str, file: str) -> ParamsFile:
+    """Return what the file says to which nodes.
+
+    Raises:
+        RejectedError: if it is not YAML, no mapping, or too large.
+    """
+    refuse_unreadable(text, file)
+    try:
+        _refuse_deep(text, file)
+        root = yaml.compose(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        at = (
+            Span(file, mark.line + 1, mark.column + 1, mark.line + 1, mark.column + 2)
+            if mark
+            else Span(file)
+        )
+        raise RejectedError([finding("TF002", error.problem or "not YAML", at)]) from None
+    except (yaml.YAMLError, UnicodeEncodeError) as error:
+        raise RejectedError(
+            [finding("TF002", f"not YAML: {type(error).__name__}", Span(file))]
+        ) from None
+    if not isinstance(root, yaml.MappingNode):
+        advice = "/NODE: {ros__parameters: {…}}"
+        raise RejectedError(
+            [finding("TF002", "a parameter file is a mapping of nodes", Span(file), help=advice)]
+        )
+    reader = _Reader(file)
+    reader.nodes(root, "")
+    return reader.result
+
+
+def _refuse_deep(text: str, file: str) -> None:
+    """Do nothing for a text that is nested as deep as a file may be: PyYAML's composer recurses in C without bounds.
+
+    Raises:
+        RejectedError: if it is nested deeper.
+        yaml.YAMLError: if it is not YAML.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=LOADER):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > DEEPEST:
+                mark: Any = event.start_mark
+                at = Span(file, mark.line + 1, mark.column + 1, mark.line + 1, mark.column + 2)
+                raise RejectedError([finding("TF008", f"nested deeper than {DEEPEST} levels", at)])
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+
+
+class _Reader:
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.result = ParamsFile()
+        self.count = 0
+        self._open: set[int] = set()  # what is being read: an alias of one of these has no end
+
+    def nodes(self, mapping: yaml.MappingNode, above: str) -> None:
+        """Take the nodes of a mapping; a mapping that has no parameters holds the nodes of a namespace."""
+        with self._reading(mapping):
+            self._nodes(mapping, above)
+
+    def _nodes(self, mapping: yaml.MappingNode, above: str) -> None:
+        for key, value in mapping.value:
+            self._bound(key)
+            if not isinstance(key, yaml.ScalarNode) or not isinstance(value, yaml.MappingNode):
+                at, advice = _span(self.file, key), f"/NODE: {{{PARAMETERS}: {{…}}}}"
+                self.result.found.append(
+                    finding("TF018", "this is no node with parameters", at, help=advice)
+                )
+                continue
+            name = f"{above}/{key.value}" if above else key.value
+            inner = next((item for one, item in value.value if one.value == PARAMETERS), None)
+            if inner is None:
+                self.nodes(value, name)
+            elif isinstance(inner, yaml.MappingNode):
+                self.result.nodes.append(
+                    NodeParams(name, _span(self.file, key), self._mapping(inner))
+                )
+
+    def _mapping(self, node: yaml.MappingNode) -> dict[str, Any]:
+        return {str(key.value): self._value(value) for key, value in node.value}
+
+    def _value(self, node: yaml.Node) -> Any:
+        self._bound(node)
+        with self._reading(node):
+            if isinstance(node, yaml.MappingNode):
+                return self._mapping(node)
+            if isinstance(node, yaml.SequenceNode):
+                return [self._value(item) for item in node.value]
+        return Word(node.value, not getattr(node, "style", None), _span(self.file, node))
+
+    @contextmanager
+    def _reading(self, node: yaml.Node) -> Iterator[None]:
+        if id(node) in self._open:
+            at = _span(self.file, node)
+            raise RejectedError([finding("TF008", "an alias stands inside what it names", at)])
+        self._open.add(id(node))
+        yield
+        self._open.discard(id(node))
+
+    def _bound(self, node: yaml.Node) -> None:
+        self.count += 1
+        if self.count > MOST_VALUES:
+            at = _span(self.file, node)
+            raise RejectedError(
+                [
+                    finding(
+                        "TF008", f"more than {MOST_VALUES:,} values once aliases are followed", at
+                    )
+                ]
+            )
+
+
+def _span(file: str, node: yaml.Node) -> Span:
+    begin, end = node.start_mark, node.end_mark
+    return Span(file, begin.line + 1, begin.column + 1, end.line + 1, end.column + 1)

@@ -1,0 +1,109 @@
+"""YAML 1.2's core schema for scalars: ``1e-3`` is a number, ``on`` is a text, ``1:30`` is not 90.
+
+PyYAML reads YAML 1.1; only its parser is used here, with the patterns of the YAML 1.2.2
+specification, section 10.3.2.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+
+TAG = "tag:yaml.org,2002:"
+NULL, BOOL, INT, FLOAT, STR, MAP, SEQ = (
+    TAG + kind for kind in ("null", "bool", "int", "float", "str", "map", "seq")
+)
+
+#: Tag, pattern and possible first characters, in the order in which they are tried.
+IMPLICIT = (
+    (NULL, re.compile(r"(?:null|Null|NULL|~|)\Z"), "nN~"),
+    (BOOL, re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z"), "tTfF"),
+    (INT, re.compile(r"(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)\Z"), "-+0123456789"),
+    (
+        FLOAT,
+        re.compile(
+            r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+            r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z"
+        ),
+        "-+.0123456789",
+    ),
+)
+
+_PATTERNS = {tag: pattern for tag, pattern, _ in IMPLICIT}
+_FIRST = "nN~tTfF-+.0123456789"
+
+SCALAR_TAGS = frozenset((STR, *(tag for tag, _, _ in IMPLICIT)))
+
+_MOST_DIGITS = 300
+#: Of a number that is not taken so many characters are shown.
+_MOST_SHOWN = 40
+
+
+def implicit_tag(text: str) -> str:
+    """Return the tag of a plain scalar."""
+    if text[:1] not in _FIRST:
+        return STR
+    for tag, pattern, first in IMPLICIT:
+        if text[:1] in first and pattern.match(text):
+            return tag
+    return STR
+
+
+@lru_cache(maxsize=4096)
+def plain(text: str) -> str | bool | int | float | None:
+    """Return the value of a plain scalar.
+
+    Raises:
+        OverflowError: if it is no finite number.
+    """
+    return scalar(implicit_tag(text), text) if text[:1] in _FIRST else text
+
+
+def scalar(tag: str, text: str) -> str | bool | int | float | None:
+    """Return the value of a scalar with one of the core tags.
+
+    Raises:
+        ValueError: if the text is not of its tag's form (possible with a written tag), or no
+        finite number.
+    """
+    if tag == STR:
+        return text
+    if not _PATTERNS[tag].match(text):
+        raise ValueError(f"{text!r} is not of type {tag.removeprefix(TAG)}")
+    if tag == NULL:
+        return None
+    if tag == BOOL:
+        return text.lower() == "true"
+    return _number(tag, text)
+
+
+def _number(tag: str, text: str) -> int | float:
+    if tag == INT and text[:2] in {"0o", "0x"}:
+        number = int(text, 0)  # Python bounds the digits of decimal numbers only
+        return number if len(text) < _MOST_DIGITS else _finite(_rounded(number), text)
+    if tag == INT and len(text) < _MOST_DIGITS:
+        return int(text)
+    value = (
+        float("nan")
+        if "n" in text.lower().replace("inf", "")
+        else float(text.lower().replace(".inf", "inf"))
+    )
+    return _finite(value, text)
+
+
+def _rounded(number: int) -> float:
+    """Return the number as a float, infinity where no float is that large."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
+
+
+def _finite(value: float, text: str) -> float:
+    if not math.isfinite(value):
+        shown = (
+            text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}… ({len(text)} characters)"
+        )
+        raise OverflowError(f"{shown} is not a finite number")
+    return value

@@ -1,0 +1,348 @@
+"""Recorded TF: MCAP and rosbag2 SQLite, read with the library rosbags, which is loaded only here; no ROS is needed."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from struct import Struct
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.model.plan.topics import namespace_options
+from tfcompose.tf.live.edges import nearer_clock
+from tfcompose.tf.live.pose_query import NoPose
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE, TF_MESSAGE_HASH, Decoder
+from tfcompose.tf.tf2 import Buffer, TransformException
+from tfcompose.tf.tf2.pose_buffer import CACHE_NS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.tf.live.edges import TreeObserver
+    from tfcompose.tf.live.pose_query import OnPose, PoseQuery
+    from tfcompose.tf.ros.tf_codec import Row
+
+    Topics = tuple[str, str]
+
+CLOCK = "rosgraph_msgs/msg/Clock"
+#: In CDR: four bytes of header, then seconds and nanoseconds.
+_CLOCK, _CLOCK_BYTES = Struct("<iI"), 12
+_SECOND_NS = 1_000_000_000
+ENDINGS = {".mcap", ".db3"}
+#: So many topics are named where those asked for are not there.
+_NAMED_AT_MOST = 12
+
+
+class BagError(Exception):
+    """Raised when a bag cannot be read; the message is one sentence for the user, ``help`` what to do."""
+
+    def __init__(self, message: str, advice: str = "") -> None:
+        super().__init__(message)
+        self.help = advice
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedMessage:
+    """One TFMessage of a bag, on one of the ``topics`` (moving, fixed); ``rows`` is None where it cannot be decoded.
+
+    ``received_ns`` is when it was recorded, ``clock_ns`` the newest time on /clock then, None
+    where none was recorded.
+    """
+
+    topics: Topics
+    rows: Sequence[Row] | None
+    static: bool
+    received_ns: int
+    clock_ns: int | None = None
+
+
+def missing_rosbags() -> str | None:
+    """Return None when bags can be read, else one sentence that says what to install."""
+    if find_spec("rosbags") is not None:
+        return None
+    return (
+        "bags are read with the package rosbags, which is not there: install it with pip install"
+        " 'tfcompose[bag]'"
+    )
+
+
+class Recording:
+    """A bag: a folder, or a single .mcap or .db3 file; a folder without metadata.yaml is read file by file.
+
+    ``end_ns`` is when the last message of any topic was recorded, 0 before it was read.
+
+    Raises:
+        BagError: if there is none.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self.end_ns = 0
+        self._files = _files_at(Path(path))
+        self._clock_ns: int | None = None
+
+    def messages(self, *pairs: Topics) -> Iterator[RecordedMessage]:
+        """Yield the messages of the pairs of topics (moving, fixed), in the order in which they were recorded.
+
+        Raises:
+            BagError: if it has none of the topics, is no bag, is damaged, or its messages are not
+            TF's.
+        """
+        from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
+
+        decoder = Decoder()
+        pair_of = {topic: pair for pair in pairs for topic in pair}
+        others: set[tuple[str, str]] = set()
+        found = False
+        for file in self._files:
+            try:
+                with Reader(file) as reader:
+                    wanted = [each for each in reader.connections if _is_tf(each, pair_of)]
+                    others |= {(each.topic, each.msgtype) for each in reader.connections}
+                    found = found or bool(wanted)
+                    self.end_ns = (
+                        max(self.end_ns, reader.end_time) if reader.message_count else self.end_ns
+                    )
+                    for connection, received_ns, data in self._timed(reader, wanted):
+                        pair = pair_of[connection.topic]
+                        rows = _rows(decoder, bytes(data))
+                        yield RecordedMessage(
+                            pair, rows, connection.topic == pair[1], received_ns, self._clock_ns
+                        )
+            except BagError:
+                raise
+            except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
+                raise _damaged(str(file), error) from None
+        if not found:
+            raise _no_topic(self.path, pairs, others)
+
+    def _timed(self, reader: Any, wanted: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
+        """Yield the messages of these connections, and note what comes on /clock between them."""
+        clocks = [
+            each for each in reader.connections if (each.topic, each.msgtype) == ("/clock", CLOCK)
+        ]
+        if not wanted:
+            return
+        for connection, received_ns, data in reader.messages(connections=[*wanted, *clocks]):
+            if connection not in clocks:
+                yield connection, received_ns, data
+            elif len(data) >= _CLOCK_BYTES:
+                seconds, nanoseconds = _CLOCK.unpack_from(data, 4)
+                self._clock_ns = seconds * _SECOND_NS + nanoseconds
+
+
+def observe_bag(path: str, observers: Mapping[Topics, TreeObserver]) -> None:
+    """Feed the messages of a bag to the observers of these topics (moving, fixed), and note when it ends.
+
+    Raises:
+        BagError: as ``Recording`` does; topics may be missing as long as some are there.
+    """
+    recording = Recording(path)
+    for each in recording.messages(*observers):
+        observer = observers[each.topics]
+        if each.rows is None:
+            observer.take_malformed(None)
+        else:
+            clock_ns = nearer_clock(each.rows, each.received_ns, each.clock_ns, static=each.static)
+            observer.take(
+                each.rows,
+                static=each.static,
+                gid=None,
+                received_ns=each.received_ns,
+                clock_ns=clock_ns,
+            )
+    for observer in observers.values():
+        observer.end_ns = recording.end_ns
+
+
+def echo_bag(path: str, query: PoseQuery, on_pose: OnPose) -> NoPose | None:
+    """Give poses of a bag as they were recorded.
+
+    That is the first one with ``once``, the one at ``at_ns`` where that is not 0, else ``rate`` of
+    them for each second of the recording. Return None if there was one, else why there was none.
+
+    Raises:
+        BagError: if the bag cannot be read.
+    """
+    replay = _Replay(query, on_pose)
+    for each in Recording(path).messages(query.topics):
+        if each.rows is None:
+            continue
+        replay.take(each.rows, static=each.static)
+        if replay.is_done(each.received_ns):
+            return None
+        # The buffer forgets: later on it could only say that this was too long ago.
+        if 0 < query.at_ns < replay.newest_ns - CACHE_NS // 2:
+            break
+    return replay.ended()
+
+
+class _Replay:
+    """The buffer as it was at a time of the recording, and what was given until then."""
+
+    def __init__(self, query: PoseQuery, on_pose: OnPose) -> None:
+        self.newest_ns = 0
+        self._buffer = Buffer()
+        self._query = query
+        self._on_pose = on_pose
+        self._next_ns = 0
+        self._given_ns: int | None = None
+        self._gave = False
+
+    def take(self, rows: Iterable[Row], *, static: bool) -> None:
+        rows = tuple(rows)
+        self._buffer.insert(rows, static=static)
+        if not static:
+            self.newest_ns = max(
+                self.newest_ns, *(row[2] * _SECOND_NS + row[3] for row in rows), 0
+            )
+
+    def is_done(self, now_ns: int) -> bool:
+        """Give the pose where it is time, and return whether that was the last one."""
+        query = self._query
+        if query.at_ns < 0 or now_ns < self._next_ns:
+            return False
+        try:
+            pose, stamp_ns = query.pose_in(self._buffer)
+        except TransformException:
+            return False
+        if self._gave and stamp_ns == self._given_ns:
+            return False
+        self._give(pose, stamp_ns)
+        self._next_ns = now_ns + int(_SECOND_NS / query.rate)
+        return query.once or query.at_ns > 0
+
+    def ended(self) -> NoPose | None:
+        """Return None if there was a pose until the end, else why there was none."""
+        if self._gave:
+            return None
+        try:
+            self._give(*self._query.pose_in(self._buffer))
+        except TransformException as error:
+            return NoPose(str(error))
+        return None
+
+    def _give(self, pose: Pose, stamp_ns: int | None) -> None:
+        self._gave, self._given_ns = True, stamp_ns
+        self._on_pose(pose, stamp_ns)
+
+
+def _rows(decoder: Decoder, data: bytes) -> Sequence[Row] | None:
+    try:
+        return tuple(decoder.rows(data))
+    except ValueError:
+        return None
+
+
+def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
+    """Whether the connection is a wanted topic with TF.
+
+    Raises:
+        BagError: if its messages are named as TF's and hold something else.
+    """
+    if connection.topic not in wanted or connection.msgtype != TF_MESSAGE:
+        return False
+    if connection.digest.startswith("RIHS01_") and connection.digest != TF_MESSAGE_HASH:
+        message = (
+            f"{connection.topic} was recorded with another definition of {TF_MESSAGE} than ROS"
+            " 2 has"
+        )
+        raise BagError(
+            message,
+            "was it recorded with a changed tf2_msgs or geometry_msgs? Only the common one is"
+            " read",
+        )
+    return True
+
+
+def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) -> BagError:
+    """Return what to say where none of the topics is: which TF topics the bag has instead."""
+    requested = [topic for pair in pairs for topic in pair]
+    for topic, type_ in sorted(held):
+        if topic in requested:
+            return BagError(f"{topic} in {path} is {type_}, not {TF_MESSAGE}", _help_of(type_))
+    others = sorted(topic for topic, type_ in held if type_ == TF_MESSAGE)
+    if others:
+        names = ", ".join(others[:_NAMED_AT_MOST])
+        return BagError(
+            f"{path} has neither {' nor '.join(requested)}",
+            f"TF is on {names}: {namespace_options(others)}",
+        )
+    names = ", ".join(sorted({topic for topic, _ in held})[:_NAMED_AT_MOST])
+    return BagError(f"{path} holds no TF", f"it holds {names}" if names else "it is empty")
+
+
+def _help_of(type_: str) -> str:
+    return (
+        "rosbags-convert makes ROS 2's of ROS 1's"
+        if type_.endswith("/tfMessage") or "/msg/" not in type_
+        else ""
+    )
+
+
+def _files_at(path: Path) -> list[Path]:
+    """Return what is to be read, in this order: a folder with its metadata, a file, or the files of a folder.
+
+    Raises:
+        BagError: if there is nothing there, or nothing that is a bag.
+    """
+    if path.name == "metadata.yaml":
+        path = path.parent
+    if not path.exists():
+        raise BagError(f"there is no bag {path}")
+    if path.is_dir():
+        if (path / "metadata.yaml").exists():
+            return [path]
+        files = sorted((file for file in path.iterdir() if file.suffix in ENDINGS), key=_in_order)
+        if not files:
+            advice = "ros2 bag record makes a folder with metadata.yaml, which says what is in it"
+            raise BagError(f"{path} has no metadata.yaml and holds no recording", advice)
+        return files
+    if path.suffix == ".bag":
+        raise BagError(f"{path} is a bag of ROS 1", "rosbags-convert makes one of ROS 2 from it")
+    if path.suffix in {".zstd", ".zst"}:
+        raise BagError(
+            f"{path} is compressed as one file",
+            "name its folder with metadata.yaml, or unzstd it first",
+        )
+    if path.suffix not in ENDINGS:
+        raise BagError(
+            f"{path} is not a recording: those end in .mcap or .db3", "or name the folder of one"
+        )
+    return [path]
+
+
+def _in_order(file: Path) -> list[tuple[int, str]]:
+    """Order names by the numbers in them: a bag that was split is numbered."""
+    return [
+        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", file.name)
+    ]
+
+
+def _damaged(path: str, error: Exception) -> BagError:
+    """Return what to say where the library cannot read a bag."""
+    words = " ".join(str(error).split()) or type(error).__name__
+    advice = ""
+    if "end magic" in words:
+        words = "it ends in the middle, as when the recorder was killed"
+        advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"
+    elif (
+        _is_mcap(Path(path))
+        and not isinstance(error, OSError)
+        and not type(error).__module__.startswith("rosbags")
+    ):
+        words = (  # what the library did not expect, such as a size beyond all bounds
+            f"it is damaged ({words})"
+        )
+        advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"
+    elif "malformed" in words or "missing tables" in words or "not a database" in words:
+        advice = "sqlite3 FILE .recover | sqlite3 WHOLE.db3 keeps what is whole in it"
+    elif "metadata" in words or "database files are missing" in words:
+        advice = "ros2 bag reindex writes metadata.yaml anew; or name a recording in the folder"
+    return BagError(f"{path} cannot be read as a bag: {words}", advice)
+
+
+def _is_mcap(path: Path) -> bool:
+    return path.suffix == ".mcap" or any(path.glob("*.mcap"))

@@ -1,0 +1,145 @@
+"""How often something arrives, how evenly, and how late: sums over a recent stretch of time, of bounded size.
+
+Times are integer nanoseconds; what comes back is in seconds and hertz.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import sqrt
+
+#: tf2's buffers keep 10 s: a stamp that is farther off cannot be looked up together with the rest.
+KEPT_NS = 10_000_000_000
+
+
+@dataclass(slots=True)
+class _Sums:
+    """Of the gaps between arrivals, and of the delays, what means and deviations are made of."""
+
+    begun_ns: int = 0
+    gaps: int = 0
+    gaps_ns: int = 0
+    squares: float = 0.0  # of gaps in seconds
+    longest_ns: int = 0
+    delays: int = 0
+    delays_ns: int = 0
+    least_ns: int = 0
+    most_ns: int = 0
+
+    def gap(self, gap_ns: int) -> None:
+        self.gaps += 1
+        self.gaps_ns += gap_ns
+        gap_s = gap_ns * 1e-9
+        self.squares += gap_s * gap_s
+        self.longest_ns = max(self.longest_ns, gap_ns)
+
+    def delay(self, delay_ns: int) -> None:
+        if self.delays == 0:
+            self.least_ns = self.most_ns = delay_ns
+        elif delay_ns < self.least_ns:
+            self.least_ns = delay_ns
+        elif delay_ns > self.most_ns:
+            self.most_ns = delay_ns
+        self.delays += 1
+        self.delays_ns += delay_ns
+
+    def plus(self, other: _Sums) -> _Sums:
+        """Return both together."""
+        spans = [(each.least_ns, each.most_ns) for each in (self, other) if each.delays]
+        return _Sums(
+            self.begun_ns, self.gaps + other.gaps, self.gaps_ns + other.gaps_ns, self.squares + other.squares,
+            max(self.longest_ns, other.longest_ns), self.delays + other.delays, self.delays_ns + other.delays_ns,
+            min((low for low, _ in spans), default=0), max((high for _, high in spans), default=0),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """What was measured; None where too little came.
+
+    Attributes:
+        rate: arrivals a second, in hertz; it falls while nothing comes.
+        jitter_s: the standard deviation of the time between two arrivals.
+        longest_gap_s: the longest time between two arrivals.
+        delay_s: the mean of arrival minus stamp; negative: stamped ahead of the receiver's clock.
+        least_delay_s: the least of these.
+        most_delay_s: the largest of these.
+    """
+
+    rate: float | None = None
+    jitter_s: float | None = None
+    longest_gap_s: float | None = None
+    delay_s: float | None = None
+    least_delay_s: float | None = None
+    most_delay_s: float | None = None
+
+
+@dataclass(slots=True)
+class Arrivals:
+    """Counts arrivals. Its figures cover the last one to two ``window_ns``, or all where that is 0.
+
+    Of arrivals in the first ``settle_ns`` only the number counts: a new subscriber gets at once
+    what was kept for it.
+    """
+
+    window_ns: int = 0
+    settle_ns: int = 0
+    count: int = 0
+    last_ns: int = 0
+    _now: _Sums = field(default_factory=_Sums)
+    _before: _Sums = field(default_factory=_Sums)
+
+    def arrived(self, at_ns: int, delay_ns: int | None) -> None:
+        """Note an arrival, and how old its stamp was where that is known."""
+        self.count += 1
+        if self.count == 1:
+            self._now.begun_ns = at_ns
+        elif at_ns - self._now.begun_ns < self.settle_ns:
+            self.last_ns = at_ns
+            return
+        else:
+            self.settle_ns = 0
+            if self.window_ns and at_ns - self._now.begun_ns > self.window_ns:
+                self._before, self._now = self._now, _Sums(at_ns)
+            self._now.gap(max(0, at_ns - self.last_ns))
+        self.last_ns = at_ns
+        if delay_ns is not None and not self.settle_ns:
+            self._now.delay(delay_ns)
+
+    def resumed(self, at_ns: int) -> None:
+        """Note an arrival before which nothing was expected for a while, so that there is no gap."""
+        if self.count:
+            self.count += 1
+            self.last_ns = at_ns
+        else:
+            self.arrived(at_ns, None)
+
+    def timing(self, now_ns: int) -> Timing:
+        """Return what was measured until ``now_ns``, of the clock of the arrivals."""
+        sums = self._before.plus(self._now)
+        delays: tuple[float | None, float | None, float | None] = (None, None, None)
+        if sums.delays:
+            delays = (
+                sums.delays_ns / sums.delays * 1e-9,
+                sums.least_ns * 1e-9,
+                sums.most_ns * 1e-9,
+            )
+        if not sums.gaps:
+            return Timing(None, None, None, *delays)
+        mean_s = sums.gaps_ns / sums.gaps * 1e-9
+        open_gap_ns = max(0, now_ns - self.last_ns - sums.longest_ns)
+        total_s = (sums.gaps_ns + open_gap_ns) * 1e-9
+        return Timing(
+            sums.gaps / total_s if total_s > 0 else None,
+            sqrt(max(0.0, sums.squares / sums.gaps - mean_s * mean_s)) if sums.gaps > 1 else None,
+            sums.longest_ns * 1e-9,
+            *delays,
+        )
+
+    def steady_rate(self, least_ns: int) -> float | None:
+        """Return the rate without the longest gap, which may be a hiccup; None while the gaps add up to less time."""
+        sums = self._before.plus(self._now)
+        rest_ns = sums.gaps_ns - sums.longest_ns
+        if sums.gaps < 2 or sums.gaps_ns < least_ns or rest_ns <= 0:  # noqa: PLR2004 (one besides the longest)
+            return None
+        return (sums.gaps - 1) / (rest_ns * 1e-9)

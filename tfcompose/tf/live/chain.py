@@ -1,0 +1,88 @@
+"""The edges between two frames as they are published, and how old the newest pose of the one in the other is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.tf.tf2.exceptions import UnknownFrame, two_trees
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.tf.live.edges import EdgeState
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """How old the newest stamp of an edge is, in seconds: in the mean, and at most, just before the next one comes."""
+
+    edge: EdgeState
+    mean_s: float
+    most_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """The frames from A to B, and their edges: of each the one that counts, the newest, and those of other publishers.
+
+    ``newest`` and ``all_edges`` are in the order of ``frames``.
+    """
+
+    frames: tuple[str, ...]
+    newest: tuple[EdgeState, ...]
+    all_edges: tuple[EdgeState, ...]
+
+    @property
+    def delay(self) -> Delay | None:
+        """The delay of the edge that is the most behind, which is that of the pose; None where none moves."""
+        delays = [one for edge in self.newest if (one := _delay(edge))]
+        return max(delays, key=lambda one: one.mean_s, default=None)
+
+
+def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> Chain | str:
+    """Return the chain between two frames, or why there is none.
+
+    Of several publishers of a frame the one counts whose message is the newest, as in tf2; what
+    tf2 refuses does not.
+    """
+    by_child: dict[str, list[EdgeState]] = {}
+    for edge in edges:
+        if edge.stream.rejections == edge.stream.arrivals.count:
+            continue
+        by_child.setdefault(edge.child, []).append(edge)
+    for several in by_child.values():
+        several.sort(key=lambda edge: (edge.present is False, -edge.stream.arrivals.last_ns))
+    known = {*by_child, *(edge.parent for several in by_child.values() for edge in several)}
+    unknown = next((frame for frame in (a, b) if frame not in known), None)
+    if unknown is not None:
+        return str(UnknownFrame(unknown, sorted(known)))
+    above_a, above_b = _above(by_child, a), _above(by_child, b)
+    common = next((frame for frame in above_a if frame in above_b), None)
+    if common is None:
+        return two_trees((), a, b, above_a[-1], above_b[-1])
+    up, down = above_a[: above_a.index(common)], above_b[: above_b.index(common)][::-1]
+    some = [by_child[child] for child in (*up, *down)]
+    newest = tuple(several[0] for several in some)
+    return Chain((*up, common, *down), newest, tuple(edge for several in some for edge in several))
+
+
+def _above(by_child: dict[str, list[EdgeState]], frame: str) -> list[str]:
+    """Return the frame and those above it, up to the root, or all of a loop once."""
+    found = [frame]
+    while frame in by_child and (frame := by_child[frame][0].parent) not in found:
+        found.append(frame)
+    return found
+
+
+def _delay(edge: EdgeState) -> Delay | None:
+    if edge.data_age_s is None:
+        return None
+    timing = edge.timing
+    if timing.delay_s is None or timing.most_delay_s is None or not timing.rate:
+        return Delay(edge, edge.data_age_s, edge.data_age_s)
+    return Delay(
+        edge,
+        timing.delay_s + 0.5 / timing.rate,
+        timing.most_delay_s + (timing.longest_gap_s or 0.0),
+    )

@@ -1,0 +1,79 @@
+"""What one publisher that sends ever new edges may cost an observer: how many are kept, and how long reading takes."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from tfcompose.tf.ros.node import Received
+    from tfcompose.tf.ros.tf_codec import Decoder, Row
+
+#: So many edges of one publisher are kept, or as many as its first message has; no robot's
+#: publisher sends more.
+MOST_OF_ONE = 10_000
+#: So many edges are kept, counting an edge once for each publisher.
+MOST_EDGES = 20_000
+#: Reading messages with ever new edges takes so much of each second at most, in seconds, whoever
+#: sends them.
+BUSY_S = 0.1
+
+
+class ReadingTime:
+    """Bounds the time for messages that are laid out like none before, of publishers of too many edges.
+
+    Their messages are skipped while the time of this second is used up; ``skipped`` counts them.
+    """
+
+    def __init__(self, decoder: Decoder) -> None:
+        self.skipped = 0
+        self._decoder = decoder
+        self._spent_s = self._since = 0.0
+
+    def read(
+        self,
+        received: Received,
+        read: Callable[[], object],
+        floods: Callable[[bytes | None], bool],
+        now: float,
+    ) -> None:
+        """Read a message unless it must be skipped; ``floods`` says whether its publisher sends too many edges."""
+        decoder = self._decoder
+        if now - self._since >= 1.0:
+            self._spent_s, self._since = 0.0, now
+        if self._spent_s > BUSY_S and floods(received.gid) and not decoder.knows(received.data):
+            self.skipped += 1
+            return
+        before, begun = decoder.read_anew, time.thread_time()
+        read()
+        if decoder.read_anew != before and floods(received.gid):
+            self._spent_s += time.thread_time() - begun
+
+
+class EdgeBounds:
+    """The edges of each publisher that are kept; ``beyond`` counts transforms of others, by their publisher's id."""
+
+    def __init__(self) -> None:
+        self.beyond: dict[bytes | None, int] = {}
+        self._known: dict[bytes | None, set[tuple[str, str]]] = {}
+        self._all = 0
+
+    def floods(self, gid: bytes | None) -> bool:
+        """Return whether the publisher has sent more edges than are kept."""
+        return gid in self.beyond
+
+    def kept(self, rows: Iterable[Row], gid: bytes | None) -> Iterator[Row]:
+        """Yield the rows of a message whose edges are kept."""
+        known = self._known.setdefault(gid, set())
+        is_full = gid is not None and len(known) >= MOST_OF_ONE
+        for row in rows:
+            edge = row[:2]
+            if edge not in known:
+                if is_full or self._all >= MOST_EDGES:
+                    self.beyond[gid] = self.beyond.get(gid, 0) + 1
+                    continue
+                known.add(edge)
+                self._all += 1
+            yield row

@@ -1,0 +1,336 @@
+"""Observes the running system for a while, and returns its state: what the doctor judges.
+
+Besides TF that is what needs it: headers of sensor data, joint states, the robot's description.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, ClassVar
+from xml.parsers import expat
+
+from tfcompose.model.plan.topics import GLOBAL
+from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+from tfcompose.tf.live.listener import LAST_WAIT_S, TreeListener
+from tfcompose.tf.live.state import MovingJoint, RosProcess, StampedData, Topic, TreeState
+from tfcompose.tf.ros.clock import wall_ns
+from tfcompose.tf.ros.environment import RMW
+from tfcompose.tf.ros.graph import ends, nodes, topics, volatile_readers
+from tfcompose.tf.ros.joint_codec import read_names
+from tfcompose.tf.ros.node import LATCHED, TextSubscription, middleware, open_node
+from tfcompose.tf.ros.processes import ros_processes, settings_in
+from tfcompose.tf.ros.sensor_data import (
+    HEADED,
+    JOINT_STATE_TYPE,
+    HeaderSubscription,
+    JointStateSubscription,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from rclpy.node import Node
+
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.model.plan import Plan
+    from tfcompose.tf.live.topics import TFData
+
+    Topics = tuple[str, str]
+
+
+#: So many headers say what a topic's are like; then it is not listened to any more, as data may be
+#: large.
+ENOUGH = 20
+#: So many topics are listened to.
+MOST = 100
+
+
+class SensorTopics:
+    """Listens to what is below a namespace, for a while.
+
+    ``moving_joints`` are those of the newest description, ``joint_names`` those that had a state.
+    """
+
+    TYPES: ClassVar = frozenset({*HEADED, JOINT_STATE_TYPE})
+
+    def __init__(self, node: Node, prefix: str) -> None:
+        self._node = node
+        self._prefix = prefix
+        self._description = TextSubscription(node, f"{prefix}/robot_description", LATCHED)
+        self._headers: dict[str, HeaderSubscription | None] = {}
+        self._joints: dict[str, JointStateSubscription] = {}
+        self._delays: dict[tuple[str, str], list[float]] = {}
+        self._newest: dict[tuple[str, str], tuple[int, int]] = {}  # stamp and arrival
+        self._senders: dict[str, tuple[str, ...]] = {}
+        self.moving_joints: tuple[MovingJoint, ...] = ()
+        self.joint_names: set[str] = set()
+
+    def subscribe(self, graph: Iterable[Topic], robots_inside: tuple[str, ...]) -> None:
+        """Listen to topics that are new; not to those of robots inside, which have TF topics of their own."""
+        for topic in graph:
+            inside = topic.name.startswith(f"{self._prefix}/") and not topic.name.startswith(
+                tuple(f"{name}/" for name in robots_inside)
+            )
+            if not inside or not topic.publishers:
+                continue
+            if topic.type in HEADED:
+                self._senders[topic.name] = topic.publishers
+                if topic.name not in self._headers and len(self._headers) < MOST:
+                    self._headers[topic.name] = HeaderSubscription(
+                        self._node, topic.name, topic.type
+                    )
+            elif (
+                topic.type == JOINT_STATE_TYPE
+                and topic.name not in self._joints
+                and len(self._joints) < MOST
+            ):
+                self._joints[topic.name] = JointStateSubscription(self._node, topic.name)
+
+    def take(self, clock_ns: int | None) -> None:
+        """Take what has come; ``clock_ns`` is the newest simulated time, None where there is none."""
+        for topic, subscription in self._headers.items():
+            taken = subscription.take_headers() if subscription else []
+            for frame, stamp_ns, received_ns in taken:
+                times = [received_ns] if clock_ns is None else [received_ns, clock_ns]
+                delay_ns = min((time - stamp_ns for time in times), key=abs)
+                self._delays.setdefault((topic, frame), []).append(delay_ns / 1e9)
+                self._newest[topic, frame] = (stamp_ns, received_ns)
+            heard = (
+                sum(len(some) for (name, _), some in self._delays.items() if name == topic)
+                if taken
+                else 0
+            )
+            if subscription and heard >= ENOUGH:
+                self._end(subscription)
+                self._headers[topic] = None
+        for joints in self._joints.values():
+            for received in joints.take()[-1:]:
+                self.joint_names |= _names(received.data)
+        for _, text in self._description.take_texts()[-1:]:
+            self.moving_joints = joints_of(text)
+
+    def stamped(self) -> tuple[StampedData, ...]:
+        """Return what came with a header, by topic and frame."""
+        return tuple(
+            StampedData(
+                topic,
+                frame,
+                self._senders.get(topic, ()),
+                tuple(delays),
+                *self._newest[topic, frame],
+            )
+            for (topic, frame), delays in sorted(self._delays.items())
+        )
+
+    def _end(self, subscription: HeaderSubscription) -> None:
+        self._node.destroy_subscription(subscription.subscription)
+
+
+def _names(data: bytes) -> frozenset[str]:
+    try:
+        return frozenset(read_names(data).names)
+    except ValueError:
+        return frozenset()
+
+
+#: Joints that a state moves.
+MOVING = frozenset({"revolute", "continuous", "prismatic"})
+
+
+class _Reader:
+    """Reads the joints of a URDF; a document that declares a type or entities is not read on."""
+
+    def __init__(self) -> None:
+        self.joints: list[MovingJoint] = []
+        self._depth = 0
+        self._joint: dict[str, str] = {}
+        self._parser = expat.ParserCreate()
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.StartDoctypeDeclHandler = self._refuse
+
+    def read(self, text: str) -> None:
+        try:
+            self._parser.Parse(text, True)  # noqa: FBT003 (expat's: this is all)
+        except (expat.ExpatError, ValueError):
+            self.joints.clear()
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self._depth += 1
+        if self._depth == 2 and name == "joint":  # noqa: PLR2004 (below <robot>)
+            self._joint = {"name": attributes.get("name", ""), "type": attributes.get("type", "")}
+        elif name in {"parent", "child"} and self._joint:
+            self._joint[name] = attributes.get("link", "")
+        elif name == "mimic" and self._joint:
+            self._joint["mimic"] = "yes"
+
+    def _end(self, name: str) -> None:
+        if self._depth == 2 and name == "joint" and self._joint.get("type") in MOVING:  # noqa: PLR2004
+            joint = self._joint
+            self.joints.append(
+                MovingJoint(
+                    joint["name"],
+                    joint.get("parent", ""),
+                    joint.get("child", ""),
+                    "mimic" in joint,
+                )
+            )
+        if self._depth == 2:  # noqa: PLR2004
+            self._joint = {}
+        self._depth -= 1
+
+    def _refuse(self, *_: object) -> None:
+        raise ValueError
+
+
+def joints_of(description: str) -> tuple[MovingJoint, ...]:
+    """Return the moving joints of a URDF; none where it is none."""
+    reader = _Reader()
+    reader.read(description)
+    return tuple(reader.joints)
+
+
+WAIT_S = 0.05
+ASK_EVERY_S = 0.5
+#: A simulator or a player sends its time much more often.
+CLOCK_STANDS_S = 2.0
+#: Nodes of tools that look, as this one does, say nothing about the robot.
+TOOLS = ("/tfcompose_", "/_ros2cli_")
+#: What is looked at besides TF itself.
+INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs/msg/JointState")
+
+
+def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) -> list[TreeState]:
+    """Observe the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
+
+    Each pair of topics may have a plan that says what is expected on it; there is a state for each
+    pair.
+
+    Raises:
+        RosError: if ROS cannot start a node, or take messages.
+    """
+    with open_node("tfcompose_doctor", "") as node:
+        views = [_View(node, pair) for pair in expected]
+        graph: dict[str, Topic] = {}
+        due = begun = time.monotonic()  # a slow machine may take seconds until it listens
+        while not stop.requested and (now := time.monotonic()) < begun + seconds:
+            for view in views:
+                view.listen(min(WAIT_S, begun + seconds - now), stop)
+            if now >= due:
+                due = now + ASK_EVERY_S
+                graph |= topics_in(node)
+                for view in views:
+                    view.sensors.subscribe(graph.values(), _robots_inside(view, graph))
+        for view in views:
+            view.listen(LAST_WAIT_S, stop)  # what came while this process was kept from looking
+        graph |= topics_in(node)  # the last word counts, but what was seen before is not forgotten
+        common = TreeState(
+            time.monotonic() - begun,
+            nodes=tuple(name for name in nodes(node) if not name.startswith(TOOLS)),
+            graph=tuple(graph.values()),
+            settings=own_settings(),
+            processes=tuple(RosProcess(*one) for one in ros_processes()),
+        )
+        return [
+            replace(view.state(common), plan=plan)
+            for view, plan in zip(views, expected.values(), strict=True)
+        ]
+
+
+@dataclass(slots=True)
+class _View:
+    """What is observed on one pair of topics, and below its namespace."""
+
+    node: Node
+    topics: Topics
+    observer: TreeObserver = field(default_factory=lambda: TreeObserver(0.0, SETTLE_S))
+    skews_s: dict[bytes, float] = field(default_factory=dict)
+    clock: tuple[int | None, float] = (
+        None,
+        0.0,
+    )  # the newest, and when it moved, of the monotonic clock; 0: not yet
+    observed: float = 0.0  # when what had come was taken last, of the monotonic clock
+    listener: TreeListener = field(init=False)
+    sensors: SensorTopics = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.listener = TreeListener(self.node, self.observer, self.topics)
+        self.sensors = SensorTopics(self.node, self.namespace)
+
+    @property
+    def namespace(self) -> str:
+        return self.topics[0].removesuffix("/tf")
+
+    def listen(self, timeout_s: float, stop: Stop) -> None:
+        for data in self.listener.listen(timeout_s, stop):
+            self._compare_clocks(data)
+        clock_ns, self.observed = self.listener.clock_ns, time.monotonic()
+        if clock_ns != self.clock[0]:
+            self.clock = (clock_ns, 0.0 if self.clock[0] is None else self.observed)
+        self.sensors.take(clock_ns)
+
+    def _compare_clocks(self, data: TFData) -> None:
+        """Note by how much the sender's clock is ahead at least: a latched message may be old."""
+        received = data.received
+        if received.gid is None or data.static or not received.source_ns:
+            return
+        ahead_s = (received.source_ns - (received.received_ns or wall_ns())) / 1e9
+        self.skews_s[received.gid] = max(ahead_s, self.skews_s.get(received.gid, ahead_s))
+
+    def state(self, common: TreeState) -> TreeState:
+        return replace(
+            common,
+            topics=self.topics,
+            edges=tuple(self.observer.edges(self.observer.until_ns)),
+            publishers=tuple(self.listener.graph.publishers()),
+            volatile_readers=tuple(
+                name
+                for name in volatile_readers(self.node, self.topics[1])
+                if not name.startswith(TOOLS)
+            ),
+            malformed=dict(self.observer.malformed),
+            beyond=dict(self.observer.beyond),
+            clock_ns=self.listener.clock_ns,
+            clock_moves=self.clock[1] > self.observed - CLOCK_STANDS_S,
+            skews_s=self.skews_s,
+            stamped=self.sensors.stamped(),
+            moving_joints=self.sensors.moving_joints,
+            joint_names=frozenset(self.sensors.joint_names),
+        )
+
+
+def topics_in(node: Node) -> dict[str, Topic]:
+    """Return the topics that matter to TF, with their publishers and subscribers, by name and type."""
+    found = {}
+    for name, types in topics(node):
+        if name not in GLOBAL and not set(types) & {*INTERESTING, *SensorTopics.TYPES}:
+            continue
+        both = [end for end in ends(node, name) if not end[0].startswith(TOOLS)]
+        for kind in types:
+            senders = tuple(
+                dict.fromkeys(who for who, type_, sends in both if sends and type_ == kind)
+            )
+            readers = tuple(
+                dict.fromkeys(who for who, type_, sends in both if not sends and type_ == kind)
+            )
+            if senders or readers:
+                found[f"{name} {kind}"] = Topic(name, kind, senders, readers)
+    return found
+
+
+def _robots_inside(view: _View, graph: dict[str, Topic]) -> tuple[str, ...]:
+    """Return the namespaces, below this one, of robots that have TF topics of their own."""
+    names = {
+        topic.name.removesuffix("/tf")
+        for topic in graph.values()
+        if topic.name.endswith("/tf") and topic.publishers
+    }
+    return tuple(name for name in names if name and name != view.namespace)
+
+
+def own_settings() -> dict[str, str]:
+    """Return ROS's variables in this process's environment, and the middleware that it uses, set or not."""
+    own = settings_in(b"\0".join(f"{name}={value}".encode() for name, value in os.environ.items()))
+    return {**own, RMW: middleware()}

@@ -1,0 +1,365 @@
+"""The TF topics of the running system: what comes on them, and who publishes there, with the process of each."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from hashlib import blake2b
+from typing import TYPE_CHECKING
+
+from tfcompose.model.plan.middleware import IMPLEMENTATIONS
+from tfcompose.model.plan.topics import GLOBAL, is_fence
+from tfcompose.tf.live.publishers import PARTICIPANT, OtherRun, Publisher, forget_oldest
+from tfcompose.tf.live.state import NO_NODE
+from tfcompose.tf.ros.graph import (
+    BARE_DDS,
+    UNKNOWN_NODE,
+    ids_say_who,
+    own_gid,
+    own_name,
+    writers,
+    writers_unmapped,
+)
+from tfcompose.tf.ros.node import PublicTFReader, TFSubscription, middleware
+from tfcompose.tf.ros.processes import began_at, environments, origin
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from typing import Literal
+
+    from rclpy.node import Node
+
+    from tfcompose.tf.ros.graph import Writer
+    from tfcompose.tf.ros.node import Reader, Received
+
+    Topics = tuple[str, str]
+    #: How processes are fenced off: by a partition, or by topics of each one's own; empty: they
+    #: are not.
+    Fence = Literal["", "partition"] | Mapping[str, Topics]
+
+_ID_BYTES = 16
+
+
+def id_of_topic(topic: str) -> bytes:
+    """Return what stands for the id of whoever sends on a process's own topic, where the rmw does not say who sent."""
+    return blake2b(topic.encode(), digest_size=_ID_BYTES).digest()
+
+
+@dataclass(frozen=True, slots=True)
+class TFData:
+    """A message as bytes, the kind of its topic, and whether it was sent behind a fence.
+
+    ``process`` is whose own topic it came on; empty: that is everybody's.
+    """
+
+    received: Received
+    static: bool
+    fenced: bool = False
+    process: str = ""
+
+
+class TFTopics:
+    """What comes on a pair of TF topics (moving, fixed), and behind the fence of a strict guard, by ``fence``.
+
+    With ``deep`` more messages are kept than a listener keeps. ``own`` are ids whose messages are
+    not taken. Call ``close`` before the node ends.
+    """
+
+    def __init__(
+        self, node: Node, topics: Topics, fence: Fence = "", *, deep: bool = False
+    ) -> None:
+        self.own: set[bytes | None] = set()
+        private = ({"": topics} if fence else {}) if isinstance(fence, str) else fence
+        self._fenced = [
+            _Readable(
+                TFSubscription(node, static=static, topic=pair[static], deep=deep),
+                static,
+                fenced=True,
+                process=process,
+            )
+            for process, pair in private.items()
+            for static in (True, False)
+        ]
+        # What everybody sends has a port of its own, so that a flood there throws out nothing of
+        # what is fenced off.
+        apart = bool(fence) and middleware().startswith("rmw_fastrtps")
+        self._public = [
+            _Readable(
+                (
+                    PublicTFReader(node, topics[static], static=static)
+                    if apart
+                    else TFSubscription(node, static=static, topic=topics[static], deep=deep)
+                ),
+                static,
+            )
+            for static in (True, False)
+        ]
+
+    @property
+    def readers(self) -> list[Reader]:
+        """What is waited for."""
+        return [one.reader for one in (*self._fenced, *self._public)]
+
+    def take(self) -> Iterator[TFData]:
+        """Yield what has come, but from oneself."""
+        yield from self.take_fenced()
+        yield from self.take_public()
+
+    def take_fenced(self) -> Iterator[TFData]:
+        """Yield what has come behind the fence, but from oneself."""
+        return self._take(self._fenced)
+
+    def take_public(self) -> Iterator[TFData]:
+        """Yield what has come on everybody's topics, but from oneself."""
+        return self._take(self._public)
+
+    def close(self) -> None:
+        """End the readers that the node does not end."""
+        for one in self._public:
+            if isinstance(one.reader, PublicTFReader):
+                one.reader.close()
+
+    def _take(self, readable: Sequence[_Readable]) -> Iterator[TFData]:
+        """Yield what has come there.
+
+        What comes on a process's own topic is of that process, also where the rmw does not say
+        whose it is.
+        """
+        for one in readable:
+            for received in one.reader.take():
+                if received.raw_gid in self.own and received.raw_gid is not None:
+                    continue
+                if one.process and received.gid is None:
+                    received = replace(received, gid=id_of_topic(one.reader.topic))  # noqa: PLW2901 (the same message)
+                yield TFData(received, one.static, one.fenced, one.process)
+
+
+@dataclass(frozen=True, slots=True)
+class _Readable:
+    """A reader, and what holds for all that comes there, as in ``TFData``."""
+
+    reader: Reader
+    static: bool
+    fenced: bool = False
+    process: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Whose process a publisher is of; what is not known, or not proven, is None or empty.
+
+    Attributes:
+        ours: whether it is of one's own run. process: the plan's process that it is of. fenced:
+        whether it was started with its profile of the fence; None too where it is of another run.
+        run: the run of another robot that it is of. profile: the profile file that it was started
+        with, where that is not the fence's.
+    """
+
+    ours: bool | None = None
+    process: str = ""
+    fenced: bool | None = None
+    run: OtherRun | None = None
+    profile: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RunMarks:
+    """What the environments of runs say: ``variable`` holds one's own ``run``, ``process`` the plan's process.
+
+    ``launcher`` holds a run's launcher: its process number, and when it began, in clock ticks
+    since the start of the machine. ``profile`` names the profile file that fences the process off;
+    empty: there is no such fence. ``components`` are the plan's processes that run inside of
+    another one, by its name and their nodes'.
+    """
+
+    variable: str
+    run: str
+    process: str
+    profile: str = ""
+    launcher: str = ""
+    components: Mapping[tuple[str, str], str] = field(default_factory=dict)
+
+    def process_of(self, known: Identity, node: str) -> str:
+        """Return the plan's process that a node is of, in an operating system's process that is known."""
+        return self.components.get((known.process, node), known.process)
+
+    def identify(self, found: Sequence[Mapping[str, str]] | None) -> Identity:
+        """Return whose process it is of which one of these is the environment; None: nobody can say."""
+        if found is None:
+            return Identity()
+        own = [one for one in found if one.get(self.variable) == self.run]
+        if len(own) != 1:
+            others = [one for one in found if one.get(self.variable)]
+            return Identity(
+                ours=bool(own),
+                run=self._other(others[0]) if len(found) == len(others) == 1 else None,
+            )
+        process = own[0].get(self.process, "")
+        profile = own[0].get(self.profile, "") if self.profile and process else ""
+        fenced = is_fence(profile, process) if self.profile and process else None
+        return Identity(
+            ours=True, process=process, fenced=fenced, profile="" if fenced else profile
+        )
+
+    def _other(self, environment: Mapping[str, str]) -> OtherRun | None:
+        """Return the run that this is the environment of, unless it is one's own."""
+        run, (pid, _, ticks) = (
+            environment[self.variable],
+            environment.get(self.launcher, "").partition(":"),
+        )
+        if run == self.run or not (pid + ticks).isdecimal():
+            return None
+        since = time.strftime("%H:%M:%S", time.localtime(began_at(int(ticks))))
+        return OtherRun(run.partition(":")[0], int(pid), since)
+
+
+class TFGraph:
+    """The publishers on a pair of TF topics (moving, fixed), and on the global ones; the node's own are left out.
+
+    Args:
+        node: the node that asks.
+        topics: the pair of topics.
+        private: the pairs of topics that processes are remapped to, where they are.
+        ours: what the environments of one's own run say; None: there is none.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topics: Topics,
+        private: Sequence[Topics] | None = None,
+        ours: RunMarks | None = None,
+    ) -> None:
+        self.topics = topics
+        self.says_who = ids_say_who(node)
+        self._node = node
+        self._private = private
+        self._marks = ours
+        self._where: dict[bytes, str] = {}
+        self._ours: dict[bytes, Identity] = {}
+        self._own = b""
+        #: Those who were heard outside of the fence's partition.
+        self._public: dict[bytes, None] = {}
+
+    def hear_public(self, senders: Iterable[bytes]) -> None:
+        """Note who is heard outside of the fence, as every listener hears them."""
+        self._public |= dict.fromkeys(senders)
+
+    def publishers(self) -> list[Publisher]:
+        """Return who publishes now: on the pair of topics, and on those that processes are remapped to."""
+        found = self._publishers()
+        present = {one.gid for one in found}
+        for known in (self._where, self._ours, self._public):
+            forget_oldest(known, present)
+        return found
+
+    def _publishers(self) -> list[Publisher]:
+        if self._private is None:
+            return self._on(writers, self.topics)
+        found = self._on(writers, self.topics, fenced=False)
+        for topics in self._private:
+            there = self._on(writers, topics, fenced=True)
+            found += there if self.says_who else [*there, *self._by_topic(topics, there)]
+        return found
+
+    def may_pass(self, gid: bytes) -> bool | None:
+        """Whether what the publisher sends behind the fence is of one's own run; None: it is not known yet.
+
+        In the common partition that must be seen; on a topic of a process's own, nobody else is
+        expected.
+        """
+        if gid not in self._ours:
+            return None
+        known = self._ours[gid]
+        if self._private is None:
+            return bool(known.ours and known.fenced and gid not in self._public)
+        return known.ours is not False
+
+    def sends_clock(self) -> bool:
+        """Return whether /clock has a publisher."""
+        return bool(writers(self._node, "/clock"))
+
+    def global_publishers(self) -> list[Publisher]:
+        """Return who publishes on the global topics now, whatever the node's remappings are."""
+        return self._on(writers_unmapped, GLOBAL)
+
+    def _on(
+        self,
+        ask: Callable[[Node, str], list[Writer]],
+        topics: Topics,
+        *,
+        fenced: bool | None = None,
+    ) -> list[Publisher]:
+        moving, fixed = topics
+        return [
+            self._publisher(one, topic, static=static, fenced=fenced)
+            for static, topic in ((True, fixed), (False, moving))
+            for one in ask(self._node, topic)
+            if not self._is_own(one)
+        ]
+
+    def _is_own(self, one: Writer) -> bool:
+        """Whether a publisher is of this process: by its id, or on Zenoh, whose ids are hashes, by its node's name."""
+        if middleware() == IMPLEMENTATIONS["zenoh"]:
+            return one.node == own_name(self._node)
+        return one.gid[:PARTICIPANT] == self._own_gid()[:PARTICIPANT]
+
+    def _by_topic(self, topics: Topics, there: list[Publisher]) -> Iterator[Publisher]:
+        """Yield what stands for all that send on a topic, as a message does not say which of them did."""
+        for static, topic in zip((False, True), topics, strict=True):
+            gid = id_of_topic(topic)
+            those = [one for one in there if one.static == static]
+            nodes = sorted({one.node for one in those if one.node})
+            if nodes:
+                proven = {(one.ours, one.process) for one in those}
+                ours, process = proven.pop() if len(proven) == 1 else (None, "")
+                self._ours[gid] = Identity(ours or None, process)
+                others = tuple(nodes[1:])
+                yield Publisher(
+                    gid,
+                    nodes[0],
+                    static,
+                    topic,
+                    ours=ours,
+                    fenced=True,
+                    others=others,
+                    process=process,
+                )
+
+    def _publisher(
+        self, one: Writer, topic: str, *, static: bool, fenced: bool | None
+    ) -> Publisher:
+        if one.gid not in self._where:
+            own = self._own_gid()
+            self._where[one.gid] = origin(one.gid, own)
+            self._ours[one.gid] = (
+                self._marks.identify(environments(one.gid, own)) if self._marks else Identity()
+            )
+        known = self._ours[one.gid]
+        return Publisher(
+            one.gid,
+            (
+                None
+                if one.node.endswith(UNKNOWN_NODE)
+                else NO_NODE
+                if one.node == BARE_DDS
+                else one.node
+            ),
+            static,
+            topic,
+            one.type,
+            one.durability == "transient_local",
+            one.reliability == "reliable",
+            self._where[one.gid],
+            known.ours,
+            fenced if fenced is not None else False if one.gid in self._public else known.fenced,
+            process=self._marks.process_of(known, one.node) if self._marks else "",
+            run=known.run,
+            profile=known.profile,
+        )
+
+    def _own_gid(self) -> bytes:
+        """Return an id of this process's: that of its reader."""
+        if not self._own:
+            self._own = own_gid(self._node, self.topics[0])
+        return self._own

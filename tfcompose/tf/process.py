@@ -1,0 +1,176 @@
+"""What every process of tfcompose's own begins with: arguments, signals, the plan, the word to go on, and its output.
+
+Publishers and the guard are such processes: ``python -m MODULE PLAN_FILE PROCESS_NAME``. This
+module imports no ROS.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from select import select
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.foundation.signals import Stop
+from tfcompose.model.plan.file import read_plan
+from tfcompose.model.variables import GO, HOLD_FD
+from tfcompose.tf.ros.environment import RosError, child_environment, missing_ros
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.model.plan import Plan, PlanEdge, PlanProcess
+
+_ARGUMENTS = 2
+_CHECK_EVERY_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """One of the plan's processes, as it runs. ``given`` is what follows ``--ros-args`` on its command line."""
+
+    plan: Plan
+    process: PlanProcess
+    file: Path
+    given: tuple[str, ...]
+
+    @property
+    def node_name(self) -> str:
+        """The last part of its node's full name."""
+        return self._full_name.rpartition("/")[2]
+
+    @property
+    def namespace(self) -> str:
+        """The rest of its node's full name: empty, or with a slash in front."""
+        return self._full_name.rpartition("/")[0]
+
+    @property
+    def ros_args(self) -> list[str]:
+        """The ROS arguments of its node: what is on the command line, which comes first, and the plan's remappings."""
+        return [
+            *self.given,
+            *(word for old, new in self.process.remap.items() for word in ("-r", f"{old}:={new}")),
+        ]
+
+    @property
+    def edges(self) -> tuple[PlanEdge, ...]:
+        """The edges that it publishes."""
+        return self.plan.edges_of(self.process.name)
+
+    @property
+    def description(self) -> Path:
+        """The file that becomes ``robot_description``; it is beside the plan."""
+        return self.file.parent / (self.process.description or self.plan.description)
+
+    @property
+    def _full_name(self) -> str:
+        return self.process.nodes[0] if self.process.nodes else self.process.name
+
+
+def say(line: str) -> None:
+    """Write a line of output at once."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def start(argv: Sequence[str], kind: str, role: Callable[[Own, Stop], None]) -> int:
+    """Run the process that ``argv`` names until a signal comes, and return the exit code.
+
+    ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. ``role`` is what the
+    process does. It imports ROS, which takes a third of a second, when it is called: signals are
+    handled by then, and whoever is interrupted ends without a traceback. Before it joins ROS it
+    waits for ``wait_for_go``.
+
+    Returns:
+        0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
+    """
+    with Stop() as stop:
+        try:
+            own = read_own(argv, kind)
+        except RejectedError as error:
+            return _fail(error, 2)
+        missing = missing_ros()
+        if missing:
+            return _fail(missing, 1)
+        os.environ.update(child_environment(os.environ, own.plan.ros, own=True))
+        if stop.requested:
+            return 0
+        try:
+            role(own, stop)
+        except RosError as error:
+            return _fail(error, 1)
+    return 0
+
+
+def read_own(argv: Sequence[str], kind: str) -> Own:
+    """Return the process of that kind that ``argv`` names, with its plan.
+
+    Raises:
+        RejectedError: with a TF902 finding, if there is no such plan or process.
+    """
+    words = list(argv)
+    at = words.index("--ros-args") if "--ros-args" in words else len(words)
+    if at != _ARGUMENTS:
+        module = kind if kind == "guard" else f"launcher.publishers.{kind}"
+        raise _unfit(
+            f"usage: python -m tfcompose.{module} PLAN_FILE PROCESS_NAME [--ros-args …]", ""
+        )
+    file, name = words[:at]
+    try:
+        plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
+    except (OSError, UnicodeDecodeError) as error:
+        raise _unfit(f"cannot read the plan: {error}", file) from None
+    try:
+        process = plan.process(name)
+    except KeyError:
+        raise _unfit(f"the plan has no process {name}", file) from None
+    if process.kind != kind:
+        raise _unfit(f"process {name} is of kind {process.kind}, not {kind}", file)
+    if kind == "simulate" and process.simulate is None:
+        raise _unfit(f"process {name} does not say what to simulate", file)
+    return Own(plan, process, Path(file), tuple(words[at + 1 :]))
+
+
+def _unfit(message: str, file: str) -> RejectedError:
+    return RejectedError([finding("TF902", message, Span(file) if file else None)])
+
+
+def wait_for_go(stop: Stop) -> bool:
+    """Wait, where the launcher holds this process, until it is let go on; return whether it is, or is to end.
+
+    ``up`` checks before the start whether an edge is published already; its publishers load Python
+    and rclpy then, and join ROS only when the launcher says so.
+    """
+    if HOLD_FD in os.environ:
+        fd = int(os.environ.pop(HOLD_FD))
+        try:
+            while not stop.requested and not select([fd], [], [], _CHECK_EVERY_S)[0]:
+                pass
+            if not stop.requested and os.read(fd, len(GO)) != GO:
+                stop.request()
+        finally:
+            os.close(fd)
+    return not stop.requested
+
+
+def ready() -> None:
+    """Tell systemd that this process is ready, as sd_notify(3) does; without systemd do nothing."""
+    address = os.environ.get("NOTIFY_SOCKET", "")
+    if address[:1] not in {"/", "@"}:
+        return
+    name = f"\0{address[1:]}" if address[0] == "@" else address  # @: a name without a file
+    with (
+        contextlib.suppress(OSError),
+        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to_manager,
+    ):
+        to_manager.sendto(b"READY=1", name)
+
+
+def _fail(what: object, code: int) -> int:
+    sys.stderr.write(f"{what}\n")
+    return code

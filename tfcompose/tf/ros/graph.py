@@ -1,0 +1,318 @@
+"""Who publishes and who listens, as the graph says, and whose messages are whose.
+
+rmw says a publisher's id twice: with each message, and in the graph, where its node's name stands.
+With rmw_fastrtps the two are equal. With rmw_cyclonedds that which comes with a message is a
+number of the receiving process's own (rmw_cyclonedds#446), and tells senders apart without saying
+who they are. What a publisher of one's own has in messages is what ``rmw_get_gid_for_publisher``
+returns; by that every rmw can be asked which kind it is. Where rmw_zenoh's graph does not have the
+ids of messages, its liveliness tokens have them, which eclipse-zenoh reads.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import time
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, Literal
+
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.utilities import get_rmw_implementation_identifier
+from std_msgs.msg import String
+
+from tfcompose.model.plan.middleware import IMPLEMENTATIONS
+from tfcompose.tf.ros.environment import RosError
+from tfcompose.tf.ros.processes import has_ended
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rclpy.node import Node
+    from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+    from tfcompose.tf.ros.zenoh_graph import RobotGraph
+
+#: What rmw says instead of a name while it does not know whose node a publisher is.
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+#: What rmw_fastrtps says instead of name and namespace where a publisher is of no ROS node.
+BARE_DDS = "_CREATED_BY_BARE_DDS_APP_"
+#: Where the rmw is asked whose ids come with messages; hidden from lists of topics by its first
+#: underscore.
+ASKING = "/_tfcompose/who_am_i"
+#: How long one's own publisher may take to come into the graph, in seconds.
+SHOWN_WITHIN_S = 0.5
+
+_says_who: dict[str, bool] = {}
+#: Where rmw_zenoh's tokens are asked instead of rclpy, the one graph of them.
+_tokens: list[RobotGraph] = []
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """One publisher of a topic.
+
+    ``gid`` is its id, 16 bytes, and equals ``Received.gid`` of its messages. ``node`` is the full
+    name, such as ``/rover/static``. A publisher is discovered before its node's name is: until
+    then, and for good when it belongs to no ROS node, ``node`` is ``UNKNOWN_NODE``, or
+    ``BARE_DDS`` where rmw knows that, while id, type and QoS are right. ``type`` reads like
+    ``tf2_msgs/msg/TFMessage``.
+    """
+
+    gid: bytes
+    node: str
+    durability: Literal["volatile", "transient_local"]
+    reliability: Literal["reliable", "best_effort"]
+    type: str
+
+
+def writers(node: Node, topic: str) -> list[Writer]:
+    """Return the publishers of the topic that ``node`` has discovered until now, its own too, sorted by node and id.
+
+    A relative ``topic`` is taken in the node's namespace, and the node's remappings are applied.
+    """
+    if _tokens:
+        found = _tokens[0].publishers(node.resolve_topic_name(topic))
+        return [
+            Writer(one.gid, one.node, one.durability, one.reliability, one.type) for one in found
+        ]
+    return _sorted(node.get_publishers_info_by_topic(topic))
+
+
+def publishing_nodes(node: Node, topic: str) -> list[str]:
+    """Return the names of the nodes that publish the topic, each once, sorted."""
+    return sorted({writer.node for writer in writers(node, topic)})
+
+
+def writers_unmapped(node: Node, topic: str) -> list[Writer]:
+    """Return the same for exactly this absolute topic, whatever the node's remappings are.
+
+    It is asked for by its DDS name, ``rt/…``; an rmw without DDS shows nobody.
+    """
+    return _sorted(node.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True))
+
+
+def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[Writer]:
+    return sorted(map(_writer, infos), key=lambda writer: (writer.node, writer.gid))
+
+
+def volatile_readers(node: Node, topic: str) -> list[str]:
+    """Return the names of other nodes that listen to the topic and do not ask for what was sent before they came."""
+    own = own_name(node)
+    infos = node.get_subscriptions_info_by_topic(topic)
+    volatile = [info for info in infos if info.qos_profile.durability == DurabilityPolicy.VOLATILE]
+    return sorted(
+        {_full_name(info.node_namespace, info.node_name) for info in volatile}
+        - {own, UNKNOWN_NODE}
+    )
+
+
+def own_gid(node: Node, topic: str) -> bytes:
+    """Return the id of the node's own subscription to the topic, empty where the graph does not show it."""
+    infos = node.get_subscriptions_info_by_topic(topic)
+    own = (
+        info
+        for info in infos
+        if (info.node_name, info.node_namespace) == (node.get_name(), node.get_namespace())
+    )
+    return next((bytes(info.endpoint_gid[:16]) for info in own), b"")
+
+
+def _writer(info: TopicEndpointInfo) -> Writer:
+    latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    best_effort = info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    return Writer(
+        gid=bytes(info.endpoint_gid[:16]),
+        node=_full_name(info.node_namespace, info.node_name),
+        durability="transient_local" if latched else "volatile",
+        reliability="best_effort" if best_effort else "reliable",
+        type=info.topic_type,
+    )
+
+
+def _full_name(namespace: str, name: str) -> str:
+    if name == UNKNOWN_NODE:
+        return UNKNOWN_NODE
+    if name == BARE_DDS:
+        return BARE_DDS
+    return f"{namespace.rstrip('/')}/{name}"
+
+
+#: The services that a node has by itself.
+_OF_EACH_NODE = frozenset(
+    {
+        "describe_parameters",
+        "get_parameter_types",
+        "get_parameters",
+        "get_type_description",
+        "list_parameters",
+        "set_parameters",
+        "set_parameters_atomically",
+    }
+)
+
+
+def is_offered(node: Node, service: str) -> bool:
+    """Return whether ``node`` has discovered a server of the service, and not only clients.
+
+    One whose process was killed stays known for many seconds, and does not count.
+    """
+    if not node.count_services(service):
+        return False
+    found = node.get_subscriptions_info_by_topic(
+        f"rq{service}Request", no_mangle=True
+    )  # its name in DDS
+    own = next(
+        (one.gid for one in writers(node, "/parameter_events") if one.node == own_name(node)), b""
+    )
+    return not found or not all(has_ended(bytes(one.endpoint_gid[:16]), own) for one in found)
+
+
+def own_name(node: Node) -> str:
+    """Return the node's own full name."""
+    return _full_name(node.get_namespace(), node.get_name())
+
+
+def services(node: Node) -> list[str]:
+    """Return the full names of the services that are offered, but for those that each node has."""
+    names = [
+        name
+        for name, _ in node.get_service_names_and_types()
+        if name.rpartition("/")[2] not in _OF_EACH_NODE
+    ]
+    return [name for name in names if is_offered(node, name)]
+
+
+def topics(node: Node) -> list[tuple[str, tuple[str, ...]]]:
+    """Return the full names of the topics that ``node`` has discovered until now, each with its types, sorted."""
+    return sorted((name, tuple(types)) for name, types in node.get_topic_names_and_types())
+
+
+def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
+    """Return who publishes on a topic, and who listens: node, type, and whether it publishes; unnamed ones left out.
+
+    ``topic`` is a full name; the node's own ends are left out.
+    """
+    own = own_name(node)
+    infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
+    infos += [(info, False) for info in node.get_subscriptions_info_by_topic(topic)]
+    named = [
+        (_full_name(info.node_namespace, info.node_name), info.topic_type, sends)
+        for info, sends in infos
+    ]
+    return sorted({one for one in named if one[0] not in {own, UNKNOWN_NODE}})
+
+
+def nodes(node: Node) -> list[str]:
+    """Return the full names of the other nodes that ``node`` has discovered until now, sorted."""
+    own = own_name(node)
+    names = {
+        _full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()
+    }
+    return sorted(names - {own, UNKNOWN_NODE})
+
+
+# Ids.
+
+
+class Allocator(ctypes.Structure):
+    """rcutils_allocator_t."""
+
+    _fields_ = (("functions_and_state", ctypes.c_void_p * 5),)
+
+
+class _Gid(ctypes.Structure):
+    """rmw_gid_t, with 16 bytes of storage since Iron, and room behind it."""
+
+    _fields_ = (
+        ("implementation", ctypes.c_char_p),
+        ("data", ctypes.c_uint8 * 16),
+        ("room", ctypes.c_uint8 * 64),
+    )
+
+
+def ids_say_who(node: Node) -> bool:
+    """Return whether the id of a message is that of its publisher in the graph; asked once for each rmw."""
+    rmw: str = get_rmw_implementation_identifier()
+    if rmw.startswith("rmw_fastrtps"):
+        return True
+    if rmw not in _says_who:
+        _says_who[rmw] = _ask(node) or _by_tokens(rmw)
+    return _says_who[rmw]
+
+
+def _by_tokens(rmw: str) -> bool:
+    """Ask liveliness tokens from now on, if the rmw is Zenoh's, eclipse-zenoh is installed, and there is a router."""
+    if (
+        rmw != IMPLEMENTATIONS["zenoh"]
+        or find_spec("zenoh") is None
+        or find_spec("xxhash") is None
+    ):
+        return False
+    # What only robots on Zenoh need.
+    from tfcompose.tf.ros.zenoh_graph import RobotGraph  # noqa: PLC0415
+
+    try:
+        _tokens.append(RobotGraph())
+    except RosError:
+        return False
+    atexit.register(_tokens[0].close)
+    return True
+
+
+def gid_of(publisher: Any) -> bytes:
+    """Return the id, 16 bytes, that comes with the messages of this publisher of one's own; empty where none does."""
+    library, gid = rcl(), _Gid()
+    handle = library.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
+    return (
+        bytes(gid.data)
+        if handle and library.rmw_get_gid_for_publisher(handle, ctypes.byref(gid)) == 0
+        else b""
+    )
+
+
+def _ask(node: Node) -> bool:
+    publisher = node.create_publisher(String, ASKING, 1)
+    try:
+        end = time.monotonic() + SHOWN_WITHIN_S
+        while not (shown := writers(node, ASKING)) and time.monotonic() < end:
+            time.sleep(0.01)
+        return gid_of(publisher) in {one.gid for one in shown}
+    finally:
+        node.destroy_publisher(publisher)
+
+
+@cache
+def rcl() -> ctypes.CDLL:
+    """Return rcl, which rclpy has loaded, with what is called of it; rmw's and rcutils' functions are found with it.
+
+    Raises:
+        RosError: if the library cannot be opened.
+    """
+    try:
+        library = ctypes.CDLL("librcl.so")
+    except OSError as error:
+        raise RosError(f"rcl's library cannot be opened: {error}") from None
+    library.rcl_publisher_get_rmw_handle.restype = ctypes.c_void_p
+    library.rcl_publisher_get_rmw_handle.argtypes = (ctypes.c_void_p,)
+    library.rmw_get_gid_for_publisher.restype = ctypes.c_int32
+    library.rmw_get_gid_for_publisher.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
+    library.rcutils_get_default_allocator.restype = Allocator
+    library.rcutils_get_default_allocator.argtypes = ()
+    library.rcutils_uint8_array_fini.argtypes = (ctypes.c_void_p,)
+    library.rcutils_reset_error.argtypes = ()
+    library.rcutils_reset_error.restype = None
+    library.rcl_take_serialized_message.argtypes = (ctypes.c_void_p,) * 4
+    library.rcl_node_get_rmw_handle.restype = ctypes.c_void_p
+    library.rcl_node_get_rmw_handle.argtypes = (ctypes.c_void_p,)
+    library.rmw_create_subscription.restype = ctypes.c_void_p
+    library.rmw_create_subscription.argtypes = (
+        *(ctypes.c_void_p,) * 2,
+        ctypes.c_char_p,
+        *(ctypes.c_void_p,) * 2,
+    )
+    library.rmw_take_serialized_message_with_info.argtypes = (ctypes.c_void_p,) * 5
+    library.rmw_destroy_subscription.argtypes = (ctypes.c_void_p,) * 2
+    library.rmw_subscription_set_on_new_message_callback.argtypes = (ctypes.c_void_p,) * 3
+    return library

@@ -1,0 +1,501 @@
+"""A node of tfcompose's own, and TF as bytes: publish, take with the publisher's id, and wait without an executor.
+
+The node is cheap: it has no executor, parameters, services or signal handlers of rclpy's. rclpy on
+Jazzy does not say who published a message; rcl does (``rcl_take_serialized_message`` and rmw's
+``rmw_message_info_t``), and is called here with ctypes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import os
+import weakref
+from abc import ABC, abstractmethod
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+from rclpy.context import Context
+from rclpy.exceptions import InvalidParameterTypeException, NameValidationException
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from rclpy.utilities import get_rmw_implementation_identifier
+from std_msgs.msg import String
+
+from tfcompose.tf.ros.environment import RosError
+from tfcompose.tf.ros.graph import Allocator, gid_of, ids_say_who, rcl
+from tfcompose.tf.ros.typesupport import capsule_address, tf_message_type
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from tfcompose.foundation.signals import Stop
+
+T = TypeVar("T", bool, float)
+
+#: How long a node's leaving may take, in seconds: on a busy machine long, and less than until
+#: SIGTERM follows SIGINT.
+LEAVE_S = 3.0
+
+_OK = 0
+_TAKE_FAILED = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED: nothing is there
+_NO_GID = bytes(16)
+_OPTIONALLY = 2  # RMW_UNIQUE_NETWORK_FLOW_ENDPOINTS_OPTIONALLY_REQUIRED
+# What one take returns at most, so that a flood does not keep the caller from its signals.
+_MOST_AT_ONCE = 1000
+
+
+def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy) -> QoSProfile:
+    """Return the profile that keeps the last ``depth`` messages."""
+    profile: Any = QoSProfile  # rclpy does not say the types of its arguments
+    return cast(
+        "QoSProfile",
+        profile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=depth,
+            durability=durability,
+            reliability=reliability,
+        ),
+    )
+
+
+def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> QoSProfile:
+    """Return what is given, or the default; a depth alone leaves all else of the default, so that latched stays so."""
+    if isinstance(qos_or_depth, int):
+        given: Any = default
+        return qos(qos_or_depth, given.durability, given.reliability)
+    return qos_or_depth or default
+
+
+#: tf2_ros ``qos.hpp`` (Jazzy): what every listener and broadcaster of TF expects of the other.
+TF_PUBLISHER = TF_READER = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
+TF_STATIC_PUBLISHER = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
+TF_STATIC_READER = qos(100, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
+DEEP_TF_READER = qos(1000, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
+DEEP_TF_STATIC_READER = qos(1000, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
+#: Matches any publisher of ``joint_states``, as robot_state_publisher's subscription does; that
+#: one keeps 5 messages, and loses those of a fast source while it does not run for a moment.
+JOINT_STATES = qos(50, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+#: A value for late joiners, such as ``robot_description``.
+LATCHED = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
+
+
+@contextmanager
+def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterator[Node]:
+    """Give a node in a context of its own, and end both with the ``with`` block.
+
+    Leaving takes some milliseconds; a process that ROS does not let go is ended after ``LEAVE_S``.
+
+    It offers no parameters, no services and no /rosout, since nothing here would answer them.
+    ``args`` are what follows ``--ros-args``, for example ``["-r", "/tf:=tf"]``; the process's own
+    arguments are not looked at.
+
+    Raises:
+        RosError: if ROS refuses the name, the arguments or its environment.
+    """
+    context = Context()
+    try:
+        context.init(args=["--ros-args", *args] if args else [], initialize_logging=False)
+        node = _node(context, name, namespace)
+    except (RuntimeError, NameValidationException) as error:
+        context.try_shutdown()
+        raise RosError(f"ROS cannot start a node: {' '.join(str(error).split())}") from None
+    try:
+        yield node
+    finally:
+        with ended_unless_done(LEAVE_S):
+            node.destroy_node()
+            context.shutdown()
+            context.destroy()
+
+
+@contextmanager
+def ended_unless_done(seconds: float) -> Iterator[None]:
+    """End this process with code 1 if the block takes longer.
+
+    Fast DDS 2.14 can wait for itself when several processes leave at once (one time in a hundred,
+    seen on Jazzy): the participant that goes waits, at full load, for a listener that handles a
+    publisher's going, and that listener waits for the participant. A thread of Python's could not
+    end it, because ROS keeps the interpreter's lock while it leaves; faulthandler's can.
+    """
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+
+
+def _node(context: Context, name: str, namespace: str) -> Any:
+    parameter: Any = Parameter  # rclpy does not say the types of its arguments
+    return Node(
+        name,
+        context=context,
+        namespace=namespace,
+        enable_rosout=False,
+        start_parameter_services=False,
+        parameter_overrides=[parameter("start_type_description_service", value=False)],
+    )
+
+
+def middleware() -> str:
+    """Return the name of the middleware (rmw) that this process uses."""
+    name: str = get_rmw_implementation_identifier()
+    return name
+
+
+def latch(node: Node, topic: str, text: str) -> Any:
+    """Publish ``text`` as std_msgs/String for everybody who joins, while the returned publisher lives."""
+    publisher = node.create_publisher(String, topic, LATCHED)
+    publisher.publish(String(data=text))
+    return publisher
+
+
+def parameter(node: Node, name: str, default: T) -> T:
+    """Return the value that ``-p name:=…`` among the node's arguments gives, or the default.
+
+    Raises:
+        RosError: if the value has another type than the default.
+    """
+    try:
+        value: T = node.declare_parameter(name, default).value
+    except InvalidParameterTypeException as error:
+        raise RosError(
+            f"the parameter {name} is not right: {' '.join(str(error).split())}"
+        ) from None
+    return value
+
+
+# Messages as bytes.
+
+
+class _Bytes(ctypes.Structure):
+    """rcutils_uint8_array_t."""
+
+    _fields_ = (
+        ("buffer", ctypes.c_void_p),
+        ("length", ctypes.c_size_t),
+        ("capacity", ctypes.c_size_t),
+        ("allocator", Allocator),
+    )
+
+
+class _MessageInfo(ctypes.Structure):
+    """rmw_message_info_t with its rmw_gid_t (16 bytes of storage since Iron), and room behind it."""
+
+    _fields_ = (
+        ("source_ns", ctypes.c_int64),
+        ("received_ns", ctypes.c_int64),
+        ("publication_sequence", ctypes.c_uint64),
+        ("reception_sequence", ctypes.c_uint64),
+        ("gid_implementation", ctypes.c_char_p),
+        ("gid", ctypes.c_uint8 * 16),
+        ("from_intra_process", ctypes.c_bool),
+        ("room", ctypes.c_uint8 * 64),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message as bytes, and how it came.
+
+    ``gid`` is its publisher's id, 16 bytes, as in ``graph.writers``, or None where the rmw does
+    not say it with a message (``identity``). ``raw_gid`` is what the rmw says instead: it tells
+    one's own publishers from others, and senders apart. Times are in nanoseconds of the system
+    clock; ``sequence`` counts the publisher's messages, or is the largest uint64 where the rmw
+    does not count.
+    """
+
+    data: bytes
+    gid: bytes | None
+    source_ns: int
+    received_ns: int
+    sequence: int
+    raw_gid: bytes | None = None
+
+
+class TFPublisher:
+    """A publisher of TFMessage bytes on /tf or, latched, on /tf_static, or on another ``topic``.
+
+    ``qos`` is rclpy's profile, a depth, or None for tf2's.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        *,
+        static: bool,
+        topic: str | None = None,
+        qos: QoSProfile | int | None = None,
+    ) -> None:
+        profile = profile_of(qos, TF_STATIC_PUBLISHER if static else TF_PUBLISHER)
+        self.publisher: Any = node.create_publisher(
+            tf_message_type(), topic or _topic(static=static), profile
+        )
+
+    @property
+    def raw_gid(self) -> bytes:
+        """The id that its messages come with, as ``Received.raw_gid``."""
+        return gid_of(self.publisher)
+
+    def publish(self, data: bytes) -> None:
+        """Publish a message that ``tf_codec`` made."""
+        self.publisher.publish(data)
+
+
+class Reader(ABC):
+    """Something that messages of one topic are taken from as bytes, and that ``wait`` waits for."""
+
+    def __init__(self, topic: str, *, says_who: bool) -> None:
+        self._topic, self._says_who = topic, says_who
+        library = rcl()
+        self._bytes = _Bytes(allocator=library.rcutils_get_default_allocator())
+        self._info = _MessageInfo()
+        weakref.finalize(self, library.rcutils_uint8_array_fini, ctypes.byref(self._bytes))
+
+    @property
+    def topic(self) -> str:
+        """The topic's full name."""
+        return self._topic
+
+    def take(self) -> list[Received]:
+        """Return all that has come since the last time, oldest first, and wait for nothing.
+
+        Raises:
+            RosError: if rcl cannot take from this subscription.
+        """
+        found: list[Received] = []
+        while len(found) < _MOST_AT_ONCE and self._take_one():
+            found.append(self._received())
+        return found
+
+    @abstractmethod
+    def _take_one(self) -> bool:
+        """Take a message into the buffer, and return whether there was one."""
+
+    @abstractmethod
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+
+    def _received(self) -> Received:
+        info = self._info
+        gid = None if (raw := bytes(info.gid)) == _NO_GID else raw
+        return Received(
+            data=ctypes.string_at(self._bytes.buffer, self._bytes.length),
+            gid=gid if self._says_who else None,
+            source_ns=info.source_ns,
+            received_ns=info.received_ns,
+            sequence=info.publication_sequence,
+            raw_gid=gid,
+        )
+
+
+class Subscription(Reader):
+    """A subscription of any type, taken as bytes and never called back."""
+
+    def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
+        self.subscription: Any = node.create_subscription(
+            message_type, topic, _ignore, qos, raw=True
+        )
+        super().__init__(self.subscription.topic_name, says_who=ids_say_who(node))
+        self._take = rcl().rcl_take_serialized_message
+        self._arguments = (
+            ctypes.c_void_p(self.subscription.handle.pointer),
+            ctypes.byref(self._bytes),
+            ctypes.byref(self._info),
+            None,
+        )
+
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+        return "subscription", wait_set.add_subscription(self.subscription.handle)
+
+    def _take_one(self) -> bool:
+        result = self._take(*self._arguments)
+        if result not in (_OK, _TAKE_FAILED):
+            rcl().rcutils_reset_error()
+            raise RosError(f"rcl cannot take a message from {self.topic} (code {result})")
+        return bool(result == _OK)
+
+
+class TFSubscription(Subscription):
+    """A subscription to /tf or /tf_static, or to another ``topic`` with the same QoS, as a tf2 listener's.
+
+    With ``deep`` it keeps ten times as many messages as listeners do, for one that must miss
+    nobody: of a hundred latched publishers that it finds at once, or a flood.
+    """
+
+    def __init__(
+        self, node: Node, *, static: bool, topic: str | None = None, deep: bool = False
+    ) -> None:
+        profiles = (TF_READER, TF_STATIC_READER, DEEP_TF_READER, DEEP_TF_STATIC_READER)
+        super().__init__(
+            node, tf_message_type(), topic or _topic(static=static), profiles[static + 2 * deep]
+        )
+
+
+class _Time(ctypes.Structure):
+    """rmw_time_t."""
+
+    _fields_ = (("sec", ctypes.c_uint64), ("nsec", ctypes.c_uint64))
+
+
+class _Qos(ctypes.Structure):
+    """rmw_qos_profile_t."""
+
+    _fields_ = (
+        ("history", ctypes.c_int),
+        ("depth", ctypes.c_size_t),
+        ("reliability", ctypes.c_int),
+        ("durability", ctypes.c_int),
+        ("deadline", _Time),
+        ("lifespan", _Time),
+        ("liveliness", ctypes.c_int),
+        ("liveliness_lease", _Time),
+        ("avoid_ros_namespace_conventions", ctypes.c_bool),
+    )
+
+
+class _Options(ctypes.Structure):
+    """rmw_subscription_options_t."""
+
+    _fields_ = (
+        ("payload", ctypes.c_void_p),
+        ("ignore_local_publications", ctypes.c_bool),
+        ("unique_network_flow_endpoints", ctypes.c_int),
+        ("content_filter", ctypes.c_void_p),
+    )
+
+
+class PublicTFReader(Reader):
+    """Reads a TF topic outside of all partitions, whatever partitions this process's profiles add, by its own port.
+
+    Profiles of readers go by the topic's name in ROS. This reader is of the same DDS topic under
+    no name of ROS's, made with rmw itself: rcl takes names only that begin with a slash. What is
+    sent to it has a port of its own, where that can be had: a flood there throws nothing out of
+    what waits at the process's port for its other readers. It keeps as much as a deep
+    ``TFSubscription``. Call ``close`` before the node ends.
+
+    Raises:
+        RosError: if rmw makes no such reader, or does not say when something comes.
+    """
+
+    def __init__(self, node: Node, topic: str, *, static: bool) -> None:
+        library = rcl()
+        super().__init__(node.resolve_topic_name(topic), says_who=ids_say_who(node))
+        profile = DEEP_TF_STATIC_READER if static else DEEP_TF_READER
+        numbers = (
+            int(profile.history),
+            profile.depth,
+            int(profile.reliability),
+            int(profile.durability),
+        )
+        qos = _Qos(*numbers, avoid_ros_namespace_conventions=True)
+        self._type = tf_message_type()
+        self._node = ctypes.c_void_p(library.rcl_node_get_rmw_handle(node.handle.pointer))
+        support = ctypes.c_void_p(capsule_address(self._type._TYPE_SUPPORT))  # noqa: SLF001 (what rclpy takes of a message's class)
+        options = _Options(unique_network_flow_endpoints=_OPTIONALLY)
+        named = (f"rt{self.topic}".encode(), ctypes.byref(qos), ctypes.byref(options))
+        made = library.rmw_create_subscription(self._node, support, *named)
+        if not made:
+            library.rcutils_reset_error()
+            raise RosError(f"rmw makes no reader of {topic} outside of partitions")
+        self._reader: ctypes.c_void_p | None = ctypes.c_void_p(made)
+        self._taken = ctypes.c_bool()
+        taken, info = ctypes.byref(self._taken), ctypes.byref(self._info)
+        self._arguments = (self._reader, ctypes.byref(self._bytes), taken, info, None)
+        self._came = _rclpy.GuardCondition(node.context.handle)
+        # Whatever thread of DDS's the message came in calls rcl's function itself, without Python.
+        trigger = ctypes.cast(library.rcl_trigger_guard_condition, ctypes.c_void_p)
+        condition = ctypes.c_void_p(self._came.pointer)
+        if (
+            library.rmw_subscription_set_on_new_message_callback(self._reader, trigger, condition)
+            != _OK
+        ):
+            library.rcutils_reset_error()
+            self.close()
+            raise RosError(f"rmw does not say when something comes on {topic}")
+
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+        return "guard_condition", wait_set.add_guard_condition(self._came)
+
+    def close(self) -> None:
+        """End the reader."""
+        if self._reader:
+            rcl().rmw_subscription_set_on_new_message_callback(self._reader, None, None)
+            rcl().rmw_destroy_subscription(self._node, self._reader)
+            self._reader = None
+
+    def _take_one(self) -> bool:
+        if self._reader is None:
+            return False
+        result = rcl().rmw_take_serialized_message_with_info(*self._arguments)
+        return result == _OK and self._taken.value
+
+
+class WaitSet:
+    """Readers that are waited for again and again, until ``stop`` is requested."""
+
+    def __init__(self, node: Node, readers: Sequence[Reader], stop: Stop) -> None:
+        self._readers, self._stop = tuple(readers), stop
+        self._context = node.context.handle
+        self._wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, self._context)
+
+    def wait(self, timeout_s: float | None) -> list[Reader]:
+        """Wait until a reader has something, the time is over (None: never) or ``stop`` is requested.
+
+        Return the readers that have something. A new publisher or reader in the graph ends no
+        wait. Nothing is taken.
+        """
+        if self._stop.requested:
+            return []
+        wait_set, context = self._wait_set, self._context
+        wait_set.clear_entities()
+        wait_set.add_guard_condition(
+            self._stop.waker(context, lambda: _rclpy.GuardCondition(context))
+        )
+        awaited = [(reader, *reader.add_to(wait_set)) for reader in self._readers]
+        wait_set.wait(-1 if timeout_s is None else max(0, int(timeout_s * 1e9)))
+        return [reader for reader, kind, index in awaited if wait_set.is_ready(kind, index)]
+
+
+def wait(node: Node, readers: Sequence[Reader], timeout_s: float | None, stop: Stop) -> None:
+    """Wait once, as ``WaitSet.wait`` does."""
+    WaitSet(node, readers, stop).wait(timeout_s)
+
+
+def _topic(*, static: bool) -> str:
+    return "/tf_static" if static else "/tf"
+
+
+def _ignore(_: object) -> None:
+    """Stand in for the callback that rclpy asks for."""
+
+
+class TextSubscription(Subscription):
+    """A subscription to texts."""
+
+    def __init__(self, node: Node, topic: str, qos: QoSProfile) -> None:
+        super().__init__(node, String, topic, qos)
+
+    def take_texts(self) -> list[tuple[Received, str]]:
+        """Return what has come since the last time, oldest first; what is no text is left out."""
+        return [
+            (received, text)
+            for received in self.take()
+            if (text := _text(received.data)) is not None
+        ]
+
+
+def _text(data: bytes) -> str | None:
+    try:
+        text: str = deserialize_message(data, String).data
+    except Exception:  # noqa: BLE001 (rclpy's name for bytes that are no String is not public)
+        return None
+    return text

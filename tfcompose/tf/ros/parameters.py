@@ -1,0 +1,79 @@
+"""Parameters of a node of another process, asked for without waiting."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import GetParameters
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rclpy.node import Node
+
+#: How long an answer is waited for, in seconds; a question whose answer is not there by then is
+#: asked again.
+ANSWER_S = 10.0
+
+Value = bool | int | float | str
+
+_FIELDS = {
+    ParameterType.PARAMETER_BOOL: "bool_value",
+    ParameterType.PARAMETER_INTEGER: "integer_value",
+    ParameterType.PARAMETER_DOUBLE: "double_value",
+    ParameterType.PARAMETER_STRING: "string_value",
+}
+
+
+class ParameterReader:
+    """Some parameters of one node. Requests are sent and taken by hand: nothing spins here."""
+
+    def __init__(self, node: Node, name: str, parameters: Sequence[str]) -> None:
+        self._node = node
+        self._parameters = list(parameters)
+        self._client: Any = node.create_client(GetParameters, f"{name}/get_parameters")
+        self._sequence: int | None = None
+        self._requested_at = 0.0
+
+    def close(self) -> None:
+        """Take the client away."""
+        self._node.destroy_client(self._client)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the node answers questions about its parameters."""
+        return bool(self._client.service_is_ready())
+
+    def ask(self, now: float) -> None:
+        """Ask, unless an answer is waited for."""
+        if self._sequence is not None and now - self._requested_at < ANSWER_S:
+            return
+        request = GetParameters.Request(names=self._parameters)
+        with self._client.handle:
+            self._sequence, self._requested_at = self._client.handle.send_request(request), now
+
+    def take(self) -> dict[str, Value | None] | None:
+        """Return the values if the answer has come, else None; a parameter that the node does not have is None.
+
+        One that is neither a truth value nor a number nor a text counts as one that it does not
+        have.
+        """
+        if self._sequence is None:
+            return None
+        with self._client.handle:
+            header, response = self._client.handle.take_response(GetParameters.Response)
+        if header is None or header.request_id.sequence_number != self._sequence:
+            return None
+        self._sequence = None
+        # rclcpp answers nothing at all where it does not have one of them.
+        found = dict.fromkeys(self._parameters)
+        return found | {
+            name: _value(one) for name, one in zip(self._parameters, response.values, strict=False)
+        }
+
+
+def _value(found: Any) -> Value | None:
+    field = _FIELDS.get(found.type)
+    value: Value | None = getattr(found, field) if field else None
+    return value

@@ -1,0 +1,144 @@
+"""Processes of this machine, read from /proc: those that have ROS loaded, and whose a publisher's id is.
+
+With Fast DDS an id begins with the vendor's number (01 0f), two bytes for the host, and the lower
+half of the process id (``GuidUtils``, Fast DDS 2.14). Two machines can have the same two bytes, so
+a process is named only where one fits. Of other users' processes, and other systems than Linux,
+nothing is known. This module imports no ROS.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_PROC = Path("/proc")
+_LIBRARY = b"librcl.so"
+_PREFIXES = ("ROS_", "RMW_")
+#: Of a command line so much is shown.
+_SHOWN = 100
+_VENDOR = b"\x01\x0f"
+_WORD = 1 << 16
+
+
+def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
+    """Give pid, command line and ROS's variables of each process that has rcl loaded, but this one."""
+    for entry in sorted(_PROC.glob("[0-9]*"), key=lambda path: int(path.name)):
+        if entry.name == str(os.getpid()):
+            continue
+        try:
+            if _LIBRARY not in (entry / "maps").read_bytes():
+                continue
+            environment = (entry / "environ").read_bytes()
+            command = (entry / "cmdline").read_bytes()
+        except OSError:  # another user's, or it has just ended
+            continue
+        yield int(entry.name), _shown(command), settings_in(environment)
+
+
+def settings_in(environment: bytes) -> dict[str, str]:
+    """Return ROS's variables of an environment as /proc shows it: NAME=VALUE, each ended by a NUL."""
+    pairs = (word.decode(errors="replace").partition("=") for word in environment.split(b"\0"))
+    return {name: value for name, _, value in pairs if name.startswith(_PREFIXES)}
+
+
+def origin(gid: bytes, own_gid: bytes) -> str:
+    """Return where a publisher runs: ``on this machine as pid 7: …``, ``on another machine``; empty if unknown.
+
+    ``own_gid`` is an id of this process's own.
+    """
+    if not _is_known(gid, own_gid):
+        return ""
+    if gid[2:4] != own_gid[2:4]:
+        return "on another machine"
+    fitting = [(pid, line) for pid in _candidates(gid) if (line := _command(pid))]
+    if len(fitting) != 1:
+        return "on this machine"
+    pid, line = fitting[0]
+    return f"on this machine as pid {pid}: {line}"
+
+
+def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
+    """Return the environments of the processes of which one is the publisher's, as they were started with them.
+
+    Several have the id's half of a process id, or none has, where it runs on another machine, or
+    has ended. None: nobody can say, because the id is another vendor's, or a process's environment
+    another user's.
+    """
+    if not _is_known(gid, own_gid):
+        return None
+    if gid[2:4] != own_gid[2:4]:
+        return []
+    try:
+        return [_environment(pid) for pid in _candidates(gid) if _command(pid)]
+    except PermissionError:
+        return None
+
+
+def has_ended(gid: bytes, own_gid: bytes) -> bool:
+    """Return whether the process that an id is of ran on this machine, and has surely ended."""
+    is_here = _is_known(gid, own_gid) and gid[2:4] == own_gid[2:4]
+    return is_here and not any(_command(pid) for pid in _candidates(gid))
+
+
+def began_at(ticks: int) -> float:
+    """Return when a process began, in seconds since 1970, of clock ticks since the machine's start."""
+    return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")
+
+
+def _is_known(gid: bytes, own_gid: bytes) -> bool:
+    return gid[:2] == _VENDOR and own_gid[:2] == _VENDOR
+
+
+def _candidates(gid: bytes) -> range:
+    """Return the pids whose lower half is that of the id."""
+    try:
+        most = int((_PROC / "sys/kernel/pid_max").read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        most = _WORD
+    return range(int.from_bytes(gid[4:6], "little"), most + 1, _WORD)
+
+
+def _environment(pid: int) -> dict[str, str]:
+    """Return the environment of a process; empty where it has just ended.
+
+    Raises:
+        PermissionError: if it is another user's.
+    """
+    try:
+        data = (_PROC / str(pid) / "environ").read_bytes()
+    except PermissionError:
+        raise
+    except OSError:
+        return {}
+    words = (word.decode(errors="replace").partition("=") for word in data.split(b"\0"))
+    return {name: value for name, _, value in words if name}
+
+
+def _command(pid: int) -> str:
+    """Return the process's command line, empty where there is none; a thread of a process's own has none."""
+    try:
+        return _shown((_PROC / str(pid) / "cmdline").read_bytes())
+    except OSError:
+        return ""
+
+
+def words_of(pid: int) -> list[str]:
+    """Return the words of a process's command line, none where they cannot be had."""
+    try:
+        data = (_PROC / str(pid) / "cmdline").read_bytes()
+    except OSError:
+        return []
+    return (
+        [word.decode(errors="replace") for word in data.rstrip(b"\0").split(b"\0")] if data else []
+    )
+
+
+def _shown(command: bytes) -> str:
+    line = " ".join(command.decode(errors="replace").replace("\0", " ").split())
+    line = "".join(c if c.isprintable() else "?" for c in line)
+    return line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…"

@@ -1,0 +1,115 @@
+"""The topics of sensors: joint states below the node's namespace, and the headers of messages that carry one.
+
+Messages are bytes; ``joint_codec`` reads and writes joint states. std_msgs/Header is the first
+member of each type in ``HEADED``: int32 seconds, uint32 nanoseconds, and the frame as uint32
+length, bytes and a NUL that the length counts, after CDR's four bytes of header.
+"""
+
+from __future__ import annotations
+
+import struct
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from tfcompose.tf.ros.graph import gid_of
+from tfcompose.tf.ros.joint_codec import encode_names, fill
+from tfcompose.tf.ros.node import JOINT_STATES, Subscription, qos
+from tfcompose.tf.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rclpy.node import Node
+
+
+JOINT_STATES_TOPIC = "joint_states"
+JOINT_STATE_TYPE = "sensor_msgs/msg/JointState"
+
+
+class JointStateSubscription(Subscription):
+    """A subscription to ``joint_states``, or to another topic of its type."""
+
+    def __init__(self, node: Node, topic: str = JOINT_STATES_TOPIC) -> None:
+        super().__init__(node, JointState, topic, JOINT_STATES)
+
+
+class JointStatePublisher:
+    """Publishes the positions (rad or m) of the same joints again and again."""
+
+    def __init__(self, node: Node, names: Sequence[str], topic: str = JOINT_STATES_TOPIC) -> None:
+        self._node = node
+        self._publisher: Any = node.create_publisher(JointState, topic, 10)
+        self._message = encode_names(names)
+
+    @property
+    def topic(self) -> str:
+        """The topic's full name."""
+        name: str = self._publisher.topic_name
+        return name
+
+    @property
+    def gid(self) -> bytes:
+        """The id that comes with its messages."""
+        return gid_of(self._publisher)
+
+    def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
+        """Publish them, in the names' order, with this time in nanoseconds."""
+        fill(self._message, stamp_ns, positions)
+        self._publisher.publish(bytes(self._message))
+
+    def close(self) -> None:
+        """Leave the topic before the node does."""
+        self._node.destroy_publisher(self._publisher)
+
+
+#: Messages that have a header, and are looked up in TF. Images are left out: their CameraInfo has
+#: the same header.
+HEADED = (
+    "sensor_msgs/msg/LaserScan",
+    "sensor_msgs/msg/PointCloud2",
+    "sensor_msgs/msg/CameraInfo",
+    "sensor_msgs/msg/Imu",
+    "sensor_msgs/msg/Range",
+    "nav_msgs/msg/Odometry",
+)
+#: Matches any publisher.
+_QOS = qos(5, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+_SECOND_NS = 1_000_000_000
+_NAME_AT = 16
+_LONGEST = 1024
+
+
+class HeaderSubscription(Subscription):
+    """A subscription to a topic of one of the types ``HEADED``, or of another that begins with a header.
+
+    Raises:
+        ImportError: if the type is not installed.
+    """
+
+    def __init__(self, node: Node, topic: str, type_: str) -> None:
+        package, _, name = type_.split("/")
+        super().__init__(node, getattr(import_module(f"{package}.msg"), name), topic, _QOS)
+
+    def take_headers(self) -> list[tuple[str, int, int]]:
+        """Return frame, stamp and time of arrival in nanoseconds of what has come; what is no header is left out."""
+        found = []
+        for received in self.take():
+            header = read_header(received.data)
+            if header is not None:
+                found.append((*header, received.received_ns))
+        return found
+
+
+def read_header(data: bytes) -> tuple[str, int] | None:
+    """Return the frame and the stamp in nanoseconds with which a message begins, or None if it does not."""
+    if len(data) < _NAME_AT or data[:2] not in {LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]}:
+        return None
+    seconds, nanoseconds, length = struct.unpack_from("<iII" if data[1] else ">iII", data, 4)
+    raw = data[_NAME_AT : _NAME_AT + min(length, _LONGEST)]
+    if length > _LONGEST or len(raw) < length:
+        return None
+    frame = raw.removesuffix(b"\0").decode(errors="replace")
+    return frame, seconds * _SECOND_NS + nanoseconds

@@ -1,0 +1,254 @@
+"""Who publishes on rmw_zenoh, and what: from its liveliness tokens and attachments, without rclpy.
+
+Facts of rmw_zenoh_cpp (docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp; the same in
+Jazzy, Kilted and Rolling). Every publisher declares the liveliness token
+``@ros2_lv/DOMAIN/SESSION/NODE_ID/ID/MP/ENCLAVE/NAMESPACE/NODE/TOPIC/TYPE/TYPE_HASH/QOS``, in whose
+parts ``%`` stands for a slash; ``MP`` is a publisher. Its id (gid) is the XXH3 hash of the token,
+128 bits, least significant byte first. It sends on the key ``DOMAIN/TOPIC/TYPE/TYPE_HASH`` with an
+attachment of 33 bytes: its count of messages and the time, int64 each, and the id with its length
+before it. Older releases wrote the name of each of the three before it. ``QOS`` is
+``RELIABILITY:DURABILITY:HISTORY,DEPTH:…`` in rmw's numbers; what is empty is the default, reliable
+and volatile.
+
+Only robots on Zenoh need this module: it loads eclipse-zenoh and xxhash, of the extra ``zenoh``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import xxhash
+import zenoh
+from zenoh import ext
+
+from tfcompose.model.plan.middleware import ZENOH_FILES, ZENOH_OVERRIDE
+from tfcompose.tf.ros.environment import DOMAIN, RosError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_SPACE, _PUBLISHER = "@ros2_lv", "MP"
+#: How many parts a publisher's token has; later releases may add some.
+_PARTS = 13
+_BEST_EFFORT, _TRANSIENT_LOCAL = "2", "1"
+_TYPE = re.compile(r"(.+)::dds_::(\w+)_")
+_ATTACHMENT = struct.Struct("<qqB16s")
+#: With the names of older releases, each with its length before it.
+_NAMED = struct.Struct("<16sq17sq11sB16s")
+_NAMES = (b"\x0fsequence_number", b"\x10source_timestamp", b"\x0asource_gid")
+_GID_BYTES = 16
+_ROUTER = '["tcp/localhost:7447"]'
+_TF_TYPE = "tf2_msgs::msg::dds_::TFMessage_"
+#: So many messages wait to be taken.
+_MOST_WAITING = 20_000
+#: So many tokens that came or went wait until somebody asks for publishers.
+_MOST_TOKENS = 100_000
+#: So many latched messages of a publisher are asked for.
+_LATCHED = 100
+
+
+@dataclass(frozen=True, slots=True)
+class TokenOfPublisher:
+    """A publisher as its token says it.
+
+    ``gid`` is its id, 16 bytes; ``node`` its node's full name, ``topic`` and ``type`` as ROS
+    writes them.
+    """
+
+    gid: bytes
+    node: str
+    topic: str
+    type: str
+    durability: Literal["volatile", "transient_local"]
+    reliability: Literal["reliable", "best_effort"]
+
+
+@dataclass(frozen=True, slots=True)
+class Attachment:
+    """What comes with a message: the publisher's count, when it was sent, and the publisher's id, 16 bytes."""
+
+    sequence: int
+    source_ns: int
+    gid: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ZenohMessage:
+    """A message of a TF topic as bytes; without an attachment nobody knows who sent it."""
+
+    data: bytes
+    static: bool
+    received_ns: int
+    attachment: Attachment | None
+
+
+def gid_of_token(token: str) -> bytes:
+    """Return the id of what declared the token, as it comes with its messages."""
+    return xxhash.xxh3_128_intdigest(token.encode()).to_bytes(_GID_BYTES, "little")
+
+
+def publisher_of(token: str) -> TokenOfPublisher | None:
+    """Return the publisher that declared the token; None where it is of something else, or of no release known."""
+    parts = token.split("/")
+    if len(parts) < _PARTS or parts[0] != _SPACE or parts[5] != _PUBLISHER:
+        return None
+    namespace, node, topic, kind, qos = (parts[at].replace("%", "/") for at in (7, 8, 9, 10, 12))
+    reliability, _, rest = qos.partition(":")
+    found = _TYPE.fullmatch(kind)
+    return TokenOfPublisher(
+        gid_of_token(token),
+        f"{namespace.rstrip('/')}/{node}",
+        topic,
+        f"{found[1].replace('::', '/')}/{found[2]}" if found else kind,
+        "transient_local" if rest.partition(":")[0] == _TRANSIENT_LOCAL else "volatile",
+        "best_effort" if reliability == _BEST_EFFORT else "reliable",
+    )
+
+
+def attachment_of(data: bytes) -> Attachment | None:
+    """Return what an attachment says, or None where it is not rmw_zenoh's."""
+    if len(data) == _ATTACHMENT.size:
+        sequence, source_ns, length, gid = _ATTACHMENT.unpack(data)
+        return Attachment(sequence, source_ns, gid) if length == _GID_BYTES else None
+    if len(data) == _NAMED.size:
+        first, sequence, second, source_ns, third, length, gid = _NAMED.unpack(data)
+        is_right = ((first, second, third), length) == (_NAMES, _GID_BYTES)
+        return Attachment(sequence, source_ns, gid) if is_right else None
+    return None
+
+
+def open_session(environment: Mapping[str, str]) -> zenoh.Session:
+    """Return a session that reaches the robot's router, as a client; close it, or Python does not end.
+
+    The environment's variables count as for rmw_zenoh's own sessions, but for the mode: a router
+    passes on to clients what peers send to each other.
+
+    Raises:
+        RosError: with one sentence, if there is no router, or no such configuration.
+    """
+    try:
+        file = environment.get(ZENOH_FILES[0])
+        config = zenoh.Config.from_file(file) if file else zenoh.Config()
+        if not file:
+            config.insert_json5("connect/endpoints", _ROUTER)
+        for pair in filter(None, environment.get(ZENOH_OVERRIDE, "").split(";")):
+            key, _, value = pair.partition("=")
+            config.insert_json5(key.strip(), value)
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("scouting/multicast/enabled", "false")
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise RosError(
+            f"Zenoh's router cannot be reached: {str(error).partition(' at /')[0]}"
+        ) from None
+
+
+class ZenohGraph:
+    """The publishers of a domain, as long as its session lives.
+
+    Tokens wait in a channel until somebody asks: a callback would have a thread of its own, which
+    Python waits for before it calls what ends the session.
+    """
+
+    def __init__(self, session: zenoh.Session, domain: int) -> None:
+        self._lock = threading.Lock()
+        self._publishers: dict[str, TokenOfPublisher] = {}
+        self._subscriber: Any = session.liveliness().declare_subscriber(
+            f"{_SPACE}/{domain}/**", zenoh.handlers.FifoChannel(_MOST_TOKENS), history=True
+        )
+
+    def publishers(self, topic: str) -> list[TokenOfPublisher]:
+        """Return who publishes on the topic now, by its full name, sorted by node and id."""
+        with self._lock:
+            self._take()
+            found = [one for one in self._publishers.values() if one.topic == topic]
+        return sorted(found, key=lambda one: (one.node, one.gid))
+
+    def node_of(self, gid: bytes) -> str | None:
+        """Return the full name of the node whose publisher has this id; None while it is not known."""
+        with self._lock:
+            self._take()
+            return next((one.node for one in self._publishers.values() if one.gid == gid), None)
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._subscriber.undeclare()
+
+    def _take(self) -> None:
+        while sample := self._subscriber.try_recv():
+            token = str(sample.key_expr)
+            if sample.kind == zenoh.SampleKind.DELETE:
+                self._publishers.pop(token, None)
+            elif one := publisher_of(token):
+                self._publishers[token] = one
+
+
+class ZenohTF:
+    """Messages on a pair of TF topics (moving, fixed), each with who sent it; latched ones come at once."""
+
+    def __init__(self, session: zenoh.Session, domain: int, topics: tuple[str, str]) -> None:
+        self._waiting: deque[ZenohMessage] = deque(maxlen=_MOST_WAITING)
+        self._came = threading.Event()
+        moving, fixed = (f"{domain}/{topic.strip('/')}/{_TF_TYPE}/*" for topic in topics)
+        history = ext.HistoryConfig(detect_late_publishers=True, max_samples=_LATCHED)
+        self._subscribers: list[Any] = [
+            session.declare_subscriber(moving, lambda sample: self._take(sample, static=False)),
+            ext.declare_advanced_subscriber(
+                session, fixed, lambda sample: self._take(sample, static=True), history=history
+            ),
+        ]
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait until something has come, at most so long."""
+        self._came.wait(timeout_s)
+
+    def take(self) -> list[ZenohMessage]:
+        """Return all that has come since the last time, oldest first."""
+        self._came.clear()
+        found = []
+        with suppress(IndexError):
+            while True:
+                found.append(self._waiting.popleft())
+        return found
+
+    def close(self) -> None:
+        """End the subscriptions."""
+        for one in self._subscribers:
+            one.undeclare()
+
+    def _take(self, sample: zenoh.Sample, *, static: bool) -> None:
+        attachment = attachment_of(bytes(sample.attachment)) if sample.attachment else None
+        self._waiting.append(
+            ZenohMessage(bytes(sample.payload), static, time.time_ns(), attachment)
+        )
+        self._came.set()
+
+
+def domain_of(environment: Mapping[str, str]) -> int:
+    """Return the ROS domain that the environment names."""
+    return int(environment.get(DOMAIN) or 0)
+
+
+class RobotGraph:
+    """The graph of this process's own domain, over a session of its own, which is opened at the first question."""
+
+    def __init__(self) -> None:
+        self._session: Any = open_session(os.environ)
+        self._graph = ZenohGraph(self._session, domain_of(os.environ))
+
+    def publishers(self, topic: str) -> list[TokenOfPublisher]:
+        """Return who publishes on the topic now, sorted by node and id."""
+        return self._graph.publishers(topic)
+
+    def close(self) -> None:
+        """End the session, without which Python does not end."""
+        self._graph.close()
+        self._session.close()

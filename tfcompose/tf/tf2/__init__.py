@@ -1,0 +1,59 @@
+"""tf2's buffer and listener in Python, to be used on their own.
+
+The names are those of tf2_ros and tf2_py, called as theirs are: a program that listens to TF needs
+other imports and nothing else. The buffer needs only Python; arrays of poses and points need
+numpy, and the listener needs rclpy. ::
+
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.tf.tf2 import Buffer, TransformException, TransformListener
+
+    buffer = Buffer()
+    buffer.set("base_link", "laser", Pose((0.2, 0.0, 0.3)), 0, static=True)  # or: listener = TransformListener(buffer)
+    try:
+        pose, stamp_ns = buffer.lookup("base_link", "laser")  # the newest; or lookup_transform for a message
+    except TransformException as error:
+        print(error)  # which edge is missing, or how many milliseconds too early or too late
+
+- ``buffer``: ``Buffer``, which waits; ``core``: ``BufferCore``, which takes and gives messages and
+  does not; both are ``pose_buffer``'s ``PoseBuffer``, numbers in and out
+- ``cache``, ``poses``, ``velocity``: what is kept of an edge, the way between two frames, and the
+  arithmetic
+- ``messages``: times, TransformStamped, what tf2_geometry_msgs and tf2_sensor_msgs offer, and
+  types of your own
+- ``arrays``: trajectories, points and clouds; ``transformations``: the functions of
+  tf_transformations; need numpy
+- ``listener``, ``broadcasters``, ``buffer_client``: ``TransformListener``,
+  ``TransformBroadcaster``, ``StaticTransformBroadcaster``, ``BufferClient``; need rclpy
+- ``exceptions``: why there is no transform, and why one was not taken
+
+This package imports ``tfcompose.foundation.geometry`` and, for a listener or a node,
+``tfcompose.tf.ros``; nothing else of tfcompose.
+"""
+
+from tfcompose.tf.tf2.broadcasters import StaticTransformBroadcaster, TransformBroadcaster
+from tfcompose.tf.tf2.buffer import Buffer, BufferInterface
+from tfcompose.tf.tf2.buffer_client import BufferClient
+from tfcompose.tf.tf2.core import BufferCore
+from tfcompose.tf.tf2.exceptions import (
+    ConnectivityException,
+    ExtrapolationException,
+    InvalidArgumentException,
+    LookupException,
+    NotImplementedException,
+    TimeoutException,
+    TransformException,
+    TypeException,
+)
+from tfcompose.tf.tf2.listener import TransformListener
+from tfcompose.tf.tf2.messages import ConvertRegistration, Stamped, TransformRegistration, convert
+
+__all__ = ["Buffer", "BufferClient", "BufferCore", "BufferInterface"]
+__all__ += ["StaticTransformBroadcaster", "TransformBroadcaster", "TransformListener"]
+__all__ += [
+    "ConnectivityException",
+    "ExtrapolationException",
+    "InvalidArgumentException",
+    "LookupException",
+]
+__all__ += ["NotImplementedException", "TimeoutException", "TransformException", "TypeException"]
+__all__ += ["ConvertRegistration", "Stamped", "TransformRegistration", "convert"]

@@ -1,0 +1,328 @@
+"""Many poses and points at once: trajectories, arrays of points and PointCloud2. This module needs numpy."""
+
+from __future__ import annotations
+
+from array import array
+from copy import copy
+from math import factorial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from tfcompose.foundation.geometry import matrix_from_quat
+from tfcompose.tf.tf2.exceptions import (
+    ExtrapolationException,
+    InvalidArgumentException,
+    TransformException,
+)
+from tfcompose.tf.tf2.poses import IDENTITY, PoseTuple, inverse, inverse_product, product
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tfcompose.tf.tf2.cache import Chain, TimeCache
+    from tfcompose.tf.tf2.pose_buffer import PoseBuffer
+
+    Floats = NDArray[np.float64]
+    Stamps = NDArray[np.int64]
+
+# So many times are handled at once, with so many arrays of their length at most.
+_BLOCK = 1 << 14
+_ARRAYS = 64
+# So many points at a time stay in the processor's cache.
+_POINTS = 1 << 13
+# Angles, in radians, up to which sine and cosine are summed up, to x¹³ and x¹².
+_SMALL = 0.4
+_SINE = [(-1) ** k / factorial(2 * k + 1) for k in range(6, -1, -1)]
+_COSINE = [(-1) ** k / factorial(2 * k) for k in range(6, -1, -1)]
+# sensor_msgs/PointField: FLOAT32 and FLOAT64.
+_FIELD_TYPES = {7: "f4", 8: "f8"}
+
+
+class Trajectory(NamedTuple):
+    """N poses of a frame in another: ``xyz`` N×3 in metres, ``quat_xyzw`` N×4, unit quaternions with w ≥ 0."""
+
+    xyz: Floats
+    quat_xyzw: Floats
+
+    def matrices(self) -> Floats:
+        """Return the poses as homogeneous matrices, N×4×4: they take coordinates in the source to the target."""
+        x, y, z, w = self.quat_xyzw.T
+        made = np.zeros((len(self.xyz), 4, 4))
+        made[:, 0, 0], made[:, 0, 1], made[:, 0, 2] = (
+            1 - 2 * (y * y + z * z),
+            2 * (x * y - z * w),
+            2 * (x * z + y * w),
+        )
+        made[:, 1, 0], made[:, 1, 1], made[:, 1, 2] = (
+            2 * (x * y + z * w),
+            1 - 2 * (x * x + z * z),
+            2 * (y * z - x * w),
+        )
+        made[:, 2, 0], made[:, 2, 1], made[:, 2, 2] = (
+            2 * (x * z - y * w),
+            2 * (y * z + x * w),
+            1 - 2 * (x * x + y * y),
+        )
+        made[:, :3, 3], made[:, 3, 3] = self.xyz, 1.0
+        return made
+
+
+def stamps_of(stamps: ArrayLike) -> Stamps:
+    """Return times in nanoseconds as an array of int64.
+
+    Raises:
+        TypeError: if they are not whole numbers in one row.
+    """
+    given = np.asarray(stamps)
+    if given.ndim != 1 or (given.dtype.kind not in "iu" and given.size):
+        raise TypeError(
+            f"stamps are one row of whole nanoseconds, not {given.dtype} of shape {given.shape}"
+        )
+    return given.astype(np.int64)
+
+
+def lookup_many(
+    buffer: PoseBuffer, target: str, source: str, stamps: ArrayLike, outside: str
+) -> Trajectory:
+    """Return what ``Buffer.lookup_many`` does."""
+    times = stamps_of(stamps)
+    with buffer.locked():
+        if not times.all():
+            times = np.where(times == 0, buffer.lookup(target, source)[1], times)
+        chain = buffer.chain_for_all_times(target, source)
+        found, known = (
+            _at_once(chain, times) if chain else _one_by_one(buffer, target, source, times)
+        )
+        if outside == "raise" and not known.all():
+            first = int(times[np.argmin(known)])
+            reason = buffer.can_lookup(target, source, first)
+            raise ExtrapolationException(
+                f"{reason}; so it is for {np.count_nonzero(~known)} of {len(times)} times"
+            )
+    found.xyz[~known], found.quat_xyzw[~known] = np.nan, np.nan
+    return found
+
+
+def _one_by_one(
+    buffer: PoseBuffer, target: str, source: str, stamps: Stamps
+) -> tuple[Trajectory, NDArray[np.bool_]]:
+    """Return the poses where frames change their parents, so that each time may have a chain of its own."""
+    known = np.ones(len(stamps), bool)
+    found = Trajectory(np.zeros((len(stamps), 3)), np.zeros((len(stamps), 4)))
+    for index, stamp_ns in enumerate(stamps.tolist()):
+        try:
+            pose, _ = buffer.lookup(target, source, stamp_ns)
+        except TransformException:
+            known[index] = False
+        else:
+            found.xyz[index], found.quat_xyzw[index] = pose.xyz, pose.quat_xyzw
+    return found, known
+
+
+def _at_once(chain: Chain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
+    """Return the poses at those times, and which times all edges know; the poses at others mean nothing."""
+    known = np.ones(len(stamps), bool)
+    found = Trajectory(np.empty((len(stamps), 3)), np.empty((len(stamps), 4)))
+    order = None if (stamps[1:] >= stamps[:-1]).all() else np.argsort(stamps, kind="stable")
+    for start in range(0, len(stamps), _BLOCK):
+        block: Any = (
+            slice(start, start + _BLOCK) if order is None else order[start : start + _BLOCK]
+        )
+        times = stamps[block]
+        _keep_memory(len(times))
+        some = np.ones(len(times), bool)
+        pose = _along(chain, times, some)
+        known[block] = some
+        found.xyz[block], found.quat_xyzw[block] = _of_unit_length(pose, len(times))
+    return found, known
+
+
+def _keep_memory(count: int) -> None:
+    """Free an array as large as all that one block needs, without ever touching it.
+
+    After that the C library (glibc) keeps so much memory between the steps, which else goes back
+    to the system and is fetched again page by page; that took longer than the arithmetic.
+    """
+    np.empty((_ARRAYS, count))
+
+
+def _along(chain: Chain, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Any, ...]:
+    """Return the chain's poses at ascending times, and unset ``known`` where an edge has none."""
+    pose: Any = None
+    for cache, fixed, backwards in chain.links:
+        link: Any = fixed if cache is None else _poses(cache, stamps, known)
+        if pose is None:
+            pose = inverse(link) if backwards else link
+        else:
+            pose = inverse_product(link, pose) if backwards else product(link, pose)
+    return pose or IDENTITY
+
+
+def _of_unit_length(pose: tuple[Any, ...], count: int) -> Trajectory:
+    xyz, quat = np.empty((count, 3)), np.empty((count, 4))
+    qx, qy, qz, qw = pose[3:]
+    scale = np.copysign(1 / np.sqrt(qx * qx + qy * qy + qz * qz + qw * qw), qw)
+    for column, part in zip(xyz.T, pose[:3], strict=True):
+        column[:] = part
+    for column, part in zip(quat.T, pose[3:], strict=True):
+        np.multiply(part, scale, out=column)
+    return Trajectory(xyz, quat)
+
+
+def _poses(cache: TimeCache, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Floats, ...]:
+    """Return the edge's poses at those ascending times, seven arrays, and unset ``known`` where there is none."""
+    count = len(cache)
+    at = np.array(cache.stamps)[-count:]
+    samples = np.array(cache.poses)[-7 * count :].reshape(count, 7).T.copy()
+    known[: np.searchsorted(stamps, at[0])] = False
+    known[np.searchsorted(stamps, at[-1], "right") :] = False
+    if count == 1:
+        return tuple(samples)
+    # Each stretch goes from one sample to the next. A time that is a sample's belongs to the
+    # stretch behind it, and there to the last sample of that time; but the first time of all to
+    # the first sample, the last to the last.
+    begins = np.searchsorted(stamps, at[1:-1])
+    if at[0] == at[1]:
+        begins[: np.searchsorted(at[1:-1], at[0], "right")] = np.searchsorted(
+            stamps, at[0], "right"
+        )
+    times = np.diff(begins, prepend=0, append=len(stamps))  # so many on each stretch
+    since = (stamps - at[0]).astype(np.float64)
+    rows = np.repeat(_stretches(at, samples), times, axis=1)
+    x, y, z, dx, dy, dz, ax, ay, az, aw, bx, by, bz, bw, angle, start, per_ns = rows
+    part = (since - start) * per_ns
+    sine, cosine = _sine_cosine(part * angle)
+    return (
+        x + dx * part,
+        y + dy * part,
+        z + dz * part,
+        ax * cosine + bx * sine,
+        ay * cosine + by * sine,
+        az * cosine + bz * sine,
+        aw * cosine + bw * sine,
+    )
+
+
+def _stretches(at: Stamps, samples: Floats) -> Floats:
+    """Return 17 rows with a column for each stretch.
+
+    Position at its begin, and the way to its end; quaternion at its begin, and the one at right
+    angles to it, in whose direction it turns the short way; by what angle; nanoseconds from the
+    first sample; 1 over its length.
+    """
+    begin, end = samples[:, :-1], samples[:, 1:]
+    dot = (begin[3:] * end[3:]).sum(axis=0)
+    to = np.where(dot < 0, -end[3:], end[3:]) - begin[3:] * np.abs(dot)
+    sine = np.sqrt((to * to).sum(axis=0))
+    to /= np.where(sine == 0, 1.0, sine)
+    steps = np.diff(at)
+    per_ns = 1 / np.where(steps == 0, np.inf, steps)
+    rest = np.stack([np.arctan2(sine, np.abs(dot)), (at[:-1] - at[0]).astype(np.float64), per_ns])
+    rows = np.concatenate([begin[:3], end[:3] - begin[:3], begin[3:], to, rest])
+    if steps[-1] == 0:  # of two newest samples the last counts
+        rows[:3, -1], rows[6:10, -1] = samples[:3, -1], samples[3:, -1]
+    return rows
+
+
+def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
+    """Return sine and cosine; of small angles by their series, which numpy adds up in a third of the time.
+
+    The first term that is left out is below the rounding of a double.
+    """
+    if len(angles) == 0 or max(angles.max(), -angles.min()) > _SMALL:
+        return np.sin(angles), np.cos(angles)
+    squared = angles * angles
+    sine, cosine = _SINE[0], _COSINE[0]
+    for p, q in zip(_SINE[1:], _COSINE[1:], strict=True):
+        sine, cosine = sine * squared + p, cosine * squared + q
+    return sine * angles, cosine
+
+
+def moved_points(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
+    """Return points in the parent's frame, from points in the child's whose pose in the parent is given.
+
+    ``points`` has the shape (…, 3), in metres; the result has it too. float32 and float64 stay
+    what they are, other numbers become float64; what is computed is float64. NaN stays NaN.
+
+    Raises:
+        InvalidArgumentException: if the last dimension is not 3.
+    """
+    given = np.asarray(points)
+    if given.ndim == 0 or given.shape[-1] != 3:  # noqa: PLR2004 (x, y, z)
+        raise InvalidArgumentException(f"points have the shape (…, 3), not {given.shape}")
+    moved = np.empty(
+        given.shape, given.dtype if given.dtype in (np.float32, np.float64) else np.float64
+    )
+    turned, to = rotation_and_translation(pose)
+    rows, out = given.reshape(-1, 3), moved.reshape(-1, 3)
+    for start in range(0, len(rows), _POINTS):
+        block = slice(start, start + _POINTS)
+        out[block] = rows[block].astype(np.float64, copy=False) @ turned + to
+    return moved
+
+
+def rotation_and_translation(pose: PoseTuple) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what takes rows of points along: ``rows @ turn + shift``; 3×3 and 3."""
+    x, y, z, qx, qy, qz, qw = pose
+    return np.array(matrix_from_quat((qx, qy, qz, qw))).T.copy(), np.array((x, y, z))
+
+
+def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
+    """Return a copy of the cloud with x, y and z moved; its header is the cloud's own.
+
+    Raises:
+        InvalidArgumentException: if there is no x, y or z of type float32 or float64, or too
+        little data.
+    """
+    given = (
+        cloud.data
+        if isinstance(cloud.data, (array, bytes, bytearray, memoryview))
+        else bytes(cloud.data)
+    )
+    data = np.frombuffer(given, np.uint8).copy()
+    columns = [_column(cloud, name, data) for name in "xyz"]
+    turned, to = rotation_and_translation(pose)
+    for row in range(cloud.height):
+        for start in range(0, cloud.width, _POINTS):
+            block = slice(start, start + _POINTS)
+            points = np.stack([column[row, block] for column in columns], axis=1, dtype=np.float64)
+            points = points @ turned + to
+            for index, column in enumerate(columns):
+                column[row, block] = points[:, index]
+    moved = copy(cloud)
+    moved.data = array("B")
+    moved.data.frombytes(data.data)
+    return moved
+
+
+def _column(cloud: Any, name: str, data: NDArray[np.uint8]) -> NDArray[Any]:
+    """Return the values of a field as an array of height × width that lies in ``data``."""
+    field = next((each for each in cloud.fields if each.name == name), None)
+    if field is None:
+        there = ", ".join(each.name for each in cloud.fields) or "none"
+        raise InvalidArgumentException(f"the cloud has no field {name}; its fields are: {there}")
+    if field.datatype not in _FIELD_TYPES:
+        raise InvalidArgumentException(
+            f"the cloud's {name} is of type {field.datatype}, not float32 (7) or float64 (8)"
+        )
+    kind = np.dtype((">" if cloud.is_bigendian else "<") + _FIELD_TYPES[field.datatype])
+    rows = [cloud.row_step] * (cloud.height > 1)
+    if field.offset + kind.itemsize > cloud.point_step or any(
+        cloud.width * cloud.point_step > row for row in rows
+    ):
+        raise InvalidArgumentException(
+            f"the cloud's steps do not fit: {name} ends at byte {field.offset + kind.itemsize} of"
+            f" a point, a point has {cloud.point_step} bytes, a row has {cloud.width} points and"
+            f" {cloud.row_step} bytes"
+        )
+    size = sum(rows) * (cloud.height - 1) + cloud.width * cloud.point_step
+    if cloud.height and size > len(data):
+        wanted = f"{cloud.height} × {cloud.width} points need {size}"
+        raise InvalidArgumentException(f"the cloud has {len(data)} bytes, and {wanted}")
+    shape = (cloud.height, cloud.width) if cloud.height and cloud.width else (0, 0)
+    strides = (cloud.row_step, cloud.point_step)
+    column: NDArray[Any] = np.ndarray(
+        shape, kind, data.data, field.offset if shape[0] else 0, strides
+    )
+    return column

@@ -1,0 +1,388 @@
+"""tf2_ros's ``Buffer`` in Python, with tf2's names and calling conventions; it needs no ROS.
+
+``Buffer`` answers as tf2's does (geometry2 for ROS 2 Jazzy): a frame has one parent at a time,
+that of its newest sample; samples are kept for 10 s before the newest of their edge; between two
+samples positions go straight and rotations on the great circle; time 0 asks for the newest time
+that all moving edges have reached; fixed edges hold at any time. It differs on purpose in these:
+
+- what it raises says which edge is missing, or how many milliseconds too early or too late the
+  time is;
+- an infinite value is rejected like NaN, and a quaternion that is off unit length is rejected as
+  tf2's log says (Jazzy's ``BufferCore`` normalises before it looks, so that only a quaternion of
+  zeros is);
+- of the two quaternions for a rotation the one with w ≥ 0 comes back;
+- a chain of more than 1,000 edges is no loop.
+
+Times are integer nanoseconds throughout.
+"""
+
+from __future__ import annotations
+
+import sys
+from time import monotonic_ns
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+from tfcompose.tf.tf2.core import BufferCore
+from tfcompose.tf.tf2.exceptions import (
+    InvalidArgumentException,
+    NotImplementedException,
+    TransformException,
+)
+from tfcompose.tf.tf2.messages import (
+    TransformRegistration,
+    convert,
+    nanoseconds,
+    require_numpy,
+    transform_stamped,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from tfcompose.tf.tf2.arrays import Trajectory
+
+_Answer = TypeVar("_Answer")
+
+# How often a waiting buffer takes messages itself, in seconds.
+_POLL_S = 0.005
+
+
+class BufferInterface:
+    """tf2_ros's ``BufferInterface``: whoever can look a transform up can move objects that have a header.
+
+    A subclass defines the lookups. ``registration`` says what is done with which type. From the
+    start these messages are known: PointStamped, Vector3Stamped, PoseStamped,
+    PoseWithCovarianceStamped, PolygonStamped and PointCloud2, which needs numpy.
+    """
+
+    def __init__(self) -> None:
+        self.registration = TransformRegistration()
+
+    def transform(
+        self,
+        object_stamped: Any,
+        target_frame: str,
+        timeout: Any = 0,
+        new_type: type | None = None,
+    ) -> Any:
+        """Return an object of the same type in another frame, at the time of its own stamp; or as a ``new_type``.
+
+        Raises:
+            TypeException: if its type is not known, or nothing converts it into the new one.
+        """
+        move = self.registration.get(type(object_stamped))
+        header = object_stamped.header
+        moved = move(
+            object_stamped,
+            self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout),
+        )
+        return moved if new_type is None else convert(moved, new_type)
+
+    def transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, object_stamped: Any, target_frame: str, target_time: Any, fixed_frame: str, timeout: Any = 0,
+        new_type: type | None = None,
+    ) -> Any:  # fmt: skip
+        """Return an object in another frame at another time, between which ``fixed_frame`` stands still.
+
+        Raises:
+            TypeException: as ``transform`` does.
+        """
+        move = self.registration.get(type(object_stamped))
+        header = object_stamped.header
+        found = self.lookup_transform_full(
+            target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout
+        )
+        moved = move(object_stamped, found)
+        return moved if new_type is None else convert(moved, new_type)
+
+    def lookup_transform(
+        self,
+        target_frame: str,  # noqa: ARG002
+        source_frame: str,  # noqa: ARG002
+        time: Any,  # noqa: ARG002
+        timeout: Any = 0,  # noqa: ARG002
+    ) -> Any:
+        """Return the pose of the source frame in the target frame: for subclasses to define."""
+        raise NotImplementedException
+
+    def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,  # noqa: ARG002
+        timeout: Any = 0,  # noqa: ARG002
+    ) -> Any:  # fmt: skip
+        """Return the pose of the source frame at one time in the target frame at another: for subclasses to define."""
+        raise NotImplementedException
+
+    def can_transform(
+        self,
+        target_frame: str,  # noqa: ARG002
+        source_frame: str,  # noqa: ARG002
+        time: Any,  # noqa: ARG002
+        timeout: Any = 0,  # noqa: ARG002
+    ) -> Any:
+        """Return whether ``lookup_transform`` would answer: for subclasses to define."""
+        raise NotImplementedException
+
+    def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,  # noqa: ARG002
+        timeout: Any = 0,  # noqa: ARG002
+    ) -> Any:  # fmt: skip
+        """Return whether ``lookup_transform_full`` would answer: for subclasses to define."""
+        raise NotImplementedException
+
+
+class Buffer(BufferCore, BufferInterface):
+    """tf2_ros's ``Buffer``: takes and gives messages, and waits.
+
+    Args:
+        cache_time: how long samples are kept, a duration; default 10 s. node: an rclpy node; when
+        its clock goes back, all moving edges are forgotten. (A listener sees to that, too.)
+            Where tf2_msgs is installed it offers the service ``tf2_frames``, which view_frames
+            asks.
+
+    Lookups take and raise what ``BufferCore``'s do (module ``core``), and can wait for what is not
+    there yet.
+
+    A program that has loaded rclpy gets its ``Future``, for ``spin_until_future_complete`` and
+    coroutines that an executor runs; any other that of ``concurrent.futures``, and coroutines for
+    asyncio.
+    """
+
+    def __init__(self, cache_time: Any = None, node: Any = None) -> None:
+        BufferCore.__init__(self, cache_time)
+        BufferInterface.__init__(self)
+        #: Called while a lookup waits, to take messages that nobody else takes meanwhile.
+        self.pollers: list[Callable[[], object]] = []
+        self._jumps: dict[int, Any] = {}
+        if node is not None:
+            self.follow_clock(node)
+            # Whoever has a node has ROS.
+            from tfcompose.tf.ros.tf_listener import offer_frames  # noqa: PLC0415
+
+            self.srv = offer_frames(node, self.all_frames_as_yaml)
+
+    # Transforms in.
+
+    def follow_clock(self, node: Any) -> None:
+        """Forget all moving edges whenever the node's clock goes back, or changes between the system's and another."""
+        # Whoever has a node has ROS.
+        from tfcompose.tf.ros.tf_listener import on_clock_jump  # noqa: PLC0415
+
+        clock = node.get_clock()
+        if id(clock) not in self._jumps:
+            self._jumps[id(clock)] = (clock, on_clock_jump(node, self.time_jump_callback))
+
+    def time_jump_callback(self, time_jump: object = None) -> None:  # noqa: ARG002 (what rclpy's clock gives)
+        """Forget all samples of moving edges, since the clock went back."""
+        self.clear()
+
+    # Lookups.
+
+    def lookup_transform(
+        self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0
+    ) -> Any:
+        """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
+
+        It takes coordinates in the source frame to the target frame. The stamp is the given time,
+        or what time 0 stands for. With a ``timeout`` it waits so long for the transform to come.
+        """
+        time_ns = nanoseconds(time)
+        if timeout == 0:
+            pose, stamp_ns = self._pose(target_frame, source_frame, time_ns)
+        else:
+            pose, stamp_ns = self._wait(
+                lambda: self._pose(target_frame, source_frame, time_ns), timeout
+            )
+        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
+
+    def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
+        timeout: Any = 0,
+    ) -> Any:  # fmt: skip
+        """Return the pose of the source frame at one time in the target frame at another.
+
+        Between the times ``fixed_frame`` is taken to stand still. The stamp is that of the target.
+        """
+        times = nanoseconds(target_time), nanoseconds(source_time)
+        pose, stamp_ns = self._wait(
+            lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame),
+            timeout,
+        )
+        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
+
+    def can_transform(
+        self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0, return_debug_tuple: bool = False  # noqa: FBT001, FBT002 (tf2's)
+    ) -> Any:  # fmt: skip
+        """Return whether ``lookup_transform`` would answer; with ``return_debug_tuple`` also why not."""
+        time_ns = nanoseconds(time)
+        error = self._error(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
+        return (error is None, str(error or "")) if return_debug_tuple else error is None
+
+    def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
+        timeout: Any = 0, return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (the same)
+    ) -> Any:  # fmt: skip
+        """Return whether ``lookup_transform_full`` would answer; with ``return_debug_tuple`` also why not."""
+        times = nanoseconds(target_time), nanoseconds(source_time)
+        error = self._error(
+            lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame),
+            timeout,
+        )
+        return (error is None, str(error or "")) if return_debug_tuple else error is None
+
+    # Futures and coroutines.
+
+    def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Any:
+        """Return a future whose result is what ``lookup_transform`` returns, as soon as there is one."""
+        return self._future(lambda: self.lookup_transform(target_frame, source_frame, time))
+
+    def wait_for_transform_full_async(
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+    ) -> Any:
+        """Return a future whose result is what ``lookup_transform_full`` returns, as soon as there is one."""
+        query = target_frame, target_time, source_frame, source_time, fixed_frame
+        return self._future(lambda: self.lookup_transform_full(*query))
+
+    async def lookup_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Any:
+        """Wait until there is such a transform, and return it."""
+        return await _awaitable(self.wait_for_transform_async(target_frame, source_frame, time))
+
+    async def lookup_transform_full_async(
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+    ) -> Any:
+        """Wait until there is such a transform, and return it."""
+        query = target_frame, target_time, source_frame, source_time, fixed_frame
+        return await _awaitable(self.wait_for_transform_full_async(*query))
+
+    # Many poses and points at once.
+
+    def transform_points(
+        self, cloud: ArrayLike, target: str, source: str, stamp: Any = 0
+    ) -> NDArray[Any]:
+        """Return points given in ``source`` in ``target``, at a time (0: the newest common one). Needs numpy.
+
+        ``cloud`` is N×3, or of any shape (…, 3), in metres; so is the result. float32 stays
+        float32.
+
+        Raises:
+            InvalidArgumentException: if the last dimension is not 3.
+            ImportError: if there is no numpy.
+        """
+        require_numpy()
+        from tfcompose.tf.tf2.arrays import moved_points  # noqa: PLC0415 (numpy is optional)
+
+        pose, _ = self._pose(target, source, nanoseconds(stamp))
+        return moved_points(cloud, pose)
+
+    def lookup_many(
+        self,
+        target: str,
+        source: str,
+        stamps: ArrayLike,
+        outside: Literal["raise", "nan"] = "raise",
+    ) -> Trajectory:
+        """Return the poses of ``source`` in ``target`` at many times at once. Needs numpy.
+
+        ``stamps`` are N integers, nanoseconds; 0 is the newest common time. What comes back is
+        (``xyz`` N×3 in metres, ``quat_xyzw`` N×4), and has ``matrices()`` (N×4×4): row by row what
+        ``lookup`` returns. For a time that an edge does not know, ``outside`` decides: raise
+        ``ExtrapolationException``, or give a row of NaN.
+
+        Raises:
+            ImportError: if there is no numpy.
+        """
+        require_numpy()
+        from tfcompose.tf.tf2.arrays import lookup_many  # noqa: PLC0415 (numpy is optional)
+
+        return lookup_many(self, target, source, stamps, outside)
+
+    # Waiting.
+
+    def _error(self, attempt: Callable[[], object], timeout: Any) -> TransformException | None:
+        try:
+            self._wait(attempt, timeout)
+        except TransformException as error:
+            return error
+        return None
+
+    def _wait(self, attempt: Callable[[], _Answer], timeout: Any) -> _Answer:
+        """Return the answer as soon as there is one; raise what it raised last when the time is over.
+
+        Where a listener has no thread of its own the caller may be the one who would take its
+        messages, so they are taken here.
+        """
+        end_ns = monotonic_ns() + nanoseconds(timeout)
+        while True:
+            with self._inserted:
+                try:
+                    return attempt()
+                except InvalidArgumentException:
+                    raise
+                except TransformException:
+                    left_s = (end_ns - monotonic_ns()) / 1e9
+                    if left_s <= 0:
+                        raise
+                self._waiting += 1
+                self._inserted.wait(min(left_s, _POLL_S) if self.pollers else left_s)
+                self._waiting -= 1
+            for poll in tuple(self.pollers):
+                poll()
+
+    def _future(self, attempt: Callable[[], Any]) -> Any:
+        """Return a future that is done when the attempt succeeds: now, or after something new was taken.
+
+        A frame's name that can never be one ends it with the exception.
+        """
+        if "rclpy.task" in sys.modules:
+            future = sys.modules["rclpy.task"].Future()
+        else:
+            # A program that only looks up does without.
+            from concurrent.futures import Future  # noqa: PLC0415
+
+            future = Future()
+
+        def check() -> None:
+            with self._lock:
+                if check not in self.on_insert:
+                    return  # another thread was quicker, or it was cancelled
+                try:
+                    answer, error = attempt(), None
+                except InvalidArgumentException as wrong:
+                    answer, error = None, wrong
+                except TransformException:
+                    return
+                self.on_insert.remove(check)
+            if error:
+                future.set_exception(error)
+            else:
+                future.set_result(answer)
+
+        def forget(_: object) -> None:
+            with self._lock:
+                if check in self.on_insert:
+                    self.on_insert.remove(check)
+
+        with self._lock:
+            self.on_insert.append(check)
+        future.add_done_callback(forget)
+        check()
+        return future
+
+
+def _awaitable(future: Any) -> Any:
+    if hasattr(future, "__await__"):
+        return future
+    import asyncio  # noqa: PLC0415 (with rclpy nobody needs it)
+
+    return asyncio.wrap_future(future)

@@ -1,0 +1,403 @@
+"""What a buffer keeps of each edge, and the way through the edges from one frame to another.
+
+``TimeCache`` holds one frame's poses in its parent over time, as tf2's ``TimeCache`` and
+``StaticCache`` do. ``Chain`` is the product of the edges between two frames, with neighbouring
+fixed edges multiplied in advance; ``newest_chain`` and ``chain_at`` find it, as tf2's
+``BufferCore::walkToTopParent`` does.
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from bisect import bisect_right
+from typing import TYPE_CHECKING, Literal
+
+from tfcompose.tf.tf2 import exceptions
+from tfcompose.tf.tf2.exceptions import (
+    ConnectivityException,
+    ExtrapolationException,
+    LookupException,
+    milliseconds,
+    seconds,
+)
+from tfcompose.tf.tf2.poses import (
+    IDENTITY,
+    PoseTuple,
+    between,
+    inverse,
+    inverse_product,
+    product,
+    unit,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Container, Mapping, Sequence
+
+#: What became of a sample: it was too old; taken; taken, and it changed a fixed pose or a parent.
+Outcome = Literal["old", "taken", "changed"]
+
+#: Seven doubles as an array holds them.
+pack_pose = struct.Struct("7d").pack
+
+# Expired samples are removed so many at a time.
+_COMPACT = 256
+
+
+class TimeCache:
+    """The samples of one child frame, oldest first. A static frame has a single one, valid at any time.
+
+    ``parent`` is that of the newest sample, and empty where all samples were cleared; ``mixed``
+    says that samples have different parents. Of samples with the same stamp only the first and the
+    last that came are kept, since no answer depends on more; ``repeated`` has them all, by their
+    stamp, so that one that comes again is no other last one. Times and poses are kept as plain
+    numbers, seven for a pose, which takes a quarter of the memory of objects; those before the
+    index ``start`` have expired.
+    """
+
+    __slots__ = (
+        "authority",
+        "child",
+        "mixed",
+        "parent",
+        "parents",
+        "poses",
+        "repeated",
+        "stamps",
+        "start",
+        "static",
+    )
+
+    def __init__(self, child: str, *, static: bool) -> None:
+        self.child = child
+        self.static = static
+        self.authority = ""
+        self.clear()
+
+    def __len__(self) -> int:
+        return len(self.stamps) - self.start
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        self.parent = ""
+        self.mixed = False
+        self.start = 0
+        self.stamps = array("q")
+        self.poses = array("d")
+        self.parents: list[str] = []
+        self.repeated: dict[int, set[tuple[str, PoseTuple]]] = {}
+
+    @property
+    def oldest_ns(self) -> int:
+        """The time of the oldest sample, in nanoseconds."""
+        return self.stamps[self.start]
+
+    @property
+    def newest_ns(self) -> int:
+        """The time of the newest sample, in nanoseconds."""
+        return self.stamps[-1]
+
+    def append(self, stamp_ns: int, pose: bytes, cache_ns: int) -> bool:
+        """Take the next sample of a moving edge that has one parent, and return True; else do nothing.
+
+        ``pose`` is what ``pack_pose`` gives: an array takes it in a third of the time of seven
+        numbers.
+        """
+        stamps = self.stamps
+        if self.static or self.mixed or not stamps or stamp_ns <= stamps[-1]:
+            return False
+        if stamps[self.start] < stamps[-1] - cache_ns:
+            self._prune(stamps[-1] - cache_ns)
+        stamps.append(stamp_ns)
+        self.poses.frombytes(pose)
+        self.parents.append(self.parent)
+        return True
+
+    def insert(self, stamp_ns: int, parent: str, pose: PoseTuple, cache_ns: int) -> Outcome:
+        """Take a sample, as tf2 does: first drop what is older than ``cache_ns`` before the newest so far."""
+        if self.static:
+            return self._replace(stamp_ns, parent, pose)
+        stamps = self.stamps
+        if not stamps:
+            stamps.append(stamp_ns)
+            self.poses.extend(pose)
+            self.parents.append(parent)
+            self.parent = parent
+            return "changed"
+        newest = stamps[-1]
+        limit = newest - cache_ns
+        pruned = stamps[self.start] < limit
+        if pruned:
+            self._prune(limit)
+        if stamp_ns < limit:
+            return "old"
+        if stamp_ns > newest:
+            stamps.append(stamp_ns)
+            self.poses.extend(pose)
+            self.parents.append(parent)
+        else:
+            self._sort_in(stamp_ns, parent, pose)
+        if parent != self.parent or self.mixed:
+            return self._of_several_parents()
+        return "taken"
+
+    def pose(self, index: int) -> PoseTuple:
+        """Return the pose of one sample; −1 is the newest."""
+        x, y, z, qx, qy, qz, qw = self.poses[7 * index : 7 * index + 7 or None]
+        return x, y, z, qx, qy, qz, qw
+
+    def at(self, stamp_ns: int) -> PoseTuple | None:
+        """Return the pose at that time (0: the newest), between two samples of one parent interpolated.
+
+        Between samples of two parents the older holds. None: there is no sample before, or none
+        after.
+        """
+        stamps = self.stamps
+        if self.static or not stamp_ns:
+            return self.pose(-1) if stamps else None
+        index = bisect_right(stamps, stamp_ns, self.start)
+        if index == len(stamps):
+            return self.pose(-1) if stamps and stamps[-1] == stamp_ns else None
+        if index == self.start:
+            return None
+        before = stamps[index - 1]
+        if before == stamp_ns:
+            return self.pose(self.start if before == stamps[self.start] else index - 1)
+        if self.mixed and self.parents[index - 1] != self.parents[index]:
+            return self.pose(index - 1)
+        part = (stamp_ns - before) / (stamps[index] - before)
+        return between(self.poses[7 * index - 7 : 7 * index + 7], part)
+
+    def parent_at(self, stamp_ns: int) -> str:
+        """Return the parent of the pose that ``at`` gives, or nothing where that is None."""
+        if self.static or not stamp_ns:
+            return self.parent
+        stamps = self.stamps
+        index = bisect_right(stamps, stamp_ns, self.start)
+        if index == self.start or (index == len(stamps) and stamps[-1] != stamp_ns):
+            return ""
+        first = stamps[index - 1] == stamp_ns == stamps[self.start] and index < len(stamps)
+        return self.parents[self.start if first else index - 1]
+
+    def _replace(self, stamp_ns: int, parent: str, pose: PoseTuple) -> Outcome:
+        poses = array("d", pose)
+        same = self.poses == poses and self.parent == parent
+        self.stamps, self.poses, self.parents, self.parent = (
+            array("q", [stamp_ns]),
+            poses,
+            [parent],
+            parent,
+        )
+        return "taken" if same else "changed"
+
+    def _sort_in(self, stamp_ns: int, parent: str, pose: PoseTuple) -> None:
+        end = bisect_right(self.stamps, stamp_ns, self.start)
+        if end > self.start and self.stamps[end - 1] == stamp_ns:
+            known = self.repeated.setdefault(
+                stamp_ns, {(self.parents[end - 1], self.pose(end - 1))}
+            )
+            if (parent, pose) in known:
+                return
+            known.add((parent, pose))
+            if len(known) > 2:  # noqa: PLR2004 (the first and the last so far)
+                self.poses[7 * end - 7 : 7 * end], self.parents[end - 1] = array("d", pose), parent
+                return
+        self.stamps.insert(end, stamp_ns)
+        self.poses[7 * end : 7 * end] = array("d", pose)
+        self.parents.insert(end, parent)
+
+    def _of_several_parents(self) -> Outcome:
+        """Look again whether all samples have one parent, and which the newest has."""
+        before = self.parent, self.mixed
+        self.parent = self.parents[-1]
+        self.mixed = any(
+            self.parents[index] != self.parent for index in range(self.start, len(self.parents))
+        )
+        return "taken" if before == (self.parent, self.mixed) else "changed"
+
+    def _prune(self, limit_ns: int) -> None:
+        start = self.start
+        while self.stamps[start] < limit_ns:
+            start += 1
+        self.start = start
+        if self.repeated:
+            self.repeated = {
+                stamp_ns: known
+                for stamp_ns, known in self.repeated.items()
+                if stamp_ns >= limit_ns
+            }
+        if start > _COMPACT:
+            del self.stamps[:start], self.poses[: 7 * start], self.parents[:start]
+            self.start = 0
+
+
+#: A link: a fixed pose; or the samples of a moving edge, and whether it is passed from the parent
+#: to the child.
+Link = tuple[None, PoseTuple, bool] | tuple["TimeCache", None, bool]
+
+
+class Chain:
+    """The pose of the source in the target as a product of links, from the source on.
+
+    ``children`` are those of all edges. ``moving`` are the edges with samples over time. Where
+    there are none, ``fixed`` is the pose, else None.
+    """
+
+    __slots__ = ("children", "fixed", "links", "moving")
+
+    def __init__(self, up: Sequence[TimeCache], down: Sequence[TimeCache]) -> None:
+        self.children = [cache.child for cache in (*down, *reversed(up))]
+        self.moving = [cache for cache in (*down, *up) if not cache.static]
+        self.links = _links(
+            [*((each, False) for each in down), *((each, True) for each in reversed(up))]
+        )
+        self.fixed = (
+            None if self.moving else unit(self.links[0][1] or IDENTITY) if self.links else IDENTITY
+        )
+
+    def at(self, stamp_ns: int) -> PoseTuple | None:
+        """Return the pose of the source in the target at that time, or None if an edge has none then."""
+        if self.fixed is not None:
+            return self.fixed
+        pose = None
+        for cache, fixed, backwards in self.links:
+            link = fixed if cache is None else cache.at(stamp_ns)
+            if link is None:
+                return None
+            if pose is None:
+                pose = inverse(link) if backwards else link
+            else:
+                pose = inverse_product(link, pose) if backwards else product(link, pose)
+        return unit(pose or IDENTITY)
+
+    def common_ns(self) -> int:
+        """Return the newest time that all moving edges have reached, in nanoseconds; 0 where none moves, as in tf2."""
+        return min((cache.stamps[-1] for cache in self.moving if cache.stamps[-1]), default=0)
+
+
+def _links(passed: Sequence[tuple[TimeCache, bool]]) -> list[Link]:
+    links: list[Link] = []
+    for cache, backwards in passed:
+        if not cache.static:
+            links.append((cache, None, backwards))
+            continue
+        pose = inverse(cache.pose(-1)) if backwards else cache.pose(-1)
+        before = links[-1][1] if links else None
+        if before is not None:
+            links[-1] = (None, product(pose, before), False)
+        else:
+            links.append((None, pose, False))
+    return links
+
+
+def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> Chain:
+    """Return the chain between two frames by each frame's newest parent.
+
+    Raises:
+        LookupException: if the frames above one lead back to it.
+        ConnectivityException: if the frames are in two trees.
+    """
+    up, down, tops = _meet(caches, target, source, lambda cache: cache.parent)
+    if tops:
+        raise ConnectivityException(exceptions.two_trees(caches, target, source, *tops))
+    return Chain(up, down)
+
+
+def chain_at(caches: Mapping[str, TimeCache], target: str, source: str, stamp_ns: int) -> Chain:
+    """Return the chain between two frames by each frame's parent at that time.
+
+    Where an edge has no pose at that time and might lead on, that is what is raised, as in tf2.
+
+    Raises:
+        LookupException: if the frames above one lead back to it.
+        ConnectivityException: if the frames are in two trees.
+        ExtrapolationException: if an edge between them has no pose at that time.
+    """
+    up, down, tops = _meet(caches, target, source, lambda cache: cache.parent_at(stamp_ns))
+    for top in tops:
+        if top in caches:
+            raise ExtrapolationException(outside(caches[top], stamp_ns))
+    if tops:
+        raise ConnectivityException(exceptions.two_trees(caches, target, source, *tops))
+    return Chain(up, down)
+
+
+def _meet(
+    caches: Mapping[str, TimeCache],
+    target: str,
+    source: str,
+    parent_of: Callable[[TimeCache], str],
+) -> tuple[list[TimeCache], list[TimeCache], tuple[str, ...]]:
+    """Return the edges from the target up to where the two ways meet, those from the source, and no frames.
+
+    Where the ways do not meet, the frames are the two at which they end.
+    """
+    down, top = _climb(caches, source, {target}, parent_of)
+    if top == target:
+        return [], down, ()
+    passed = [source, *(parent_of(cache) for cache in down)]
+    up, meeting = _climb(caches, target, set(passed), parent_of)
+    if meeting not in passed:
+        return up, down, (meeting, top)
+    return up, down[: passed.index(meeting)], ()
+
+
+def _climb(
+    caches: Mapping[str, TimeCache],
+    frame: str,
+    goal: Container[str],
+    parent_of: Callable[[TimeCache], str],
+) -> tuple[list[TimeCache], str]:
+    """Return the edges from ``frame`` up to one of the goal, or else as far as there are parents; and that frame."""
+    way: list[TimeCache] = []
+    visited = {frame}
+    while frame not in goal:
+        cache = caches.get(frame)
+        parent = parent_of(cache) if cache else ""
+        if not cache or not parent:
+            break
+        way.append(cache)
+        frame = parent
+        if frame in visited and frame not in goal:
+            raise LookupException(exceptions.loop(frame, [each.child for each in way]))
+        visited.add(frame)
+    return way, frame
+
+
+# What the exceptions say of times.
+
+
+def outside(cache: TimeCache, stamp_ns: int) -> str:
+    """Return how far the time is from the edge's samples."""
+    if not len(cache):
+        return f"{cache.child} has had no parent since the buffer was cleared"
+    edge = f"{cache.parent} → {cache.child}"
+    if len(cache) == 1:
+        only = cache.newest_ns
+        away = f"{milliseconds(abs(only - stamp_ns))} {'later' if only > stamp_ns else 'earlier'}"
+        return (
+            f"{edge} at {seconds(stamp_ns)} would be extrapolation: its one sample is {away}, of"
+            f" {seconds(only)}"
+        )
+    if stamp_ns > cache.newest_ns:
+        late = milliseconds(stamp_ns - cache.newest_ns)
+        return (
+            f"{edge} at {seconds(stamp_ns)} would be extrapolation into the future: "
+            f"its newest sample is {late} earlier, of {seconds(cache.newest_ns)}"
+        )
+    early = milliseconds(cache.oldest_ns - stamp_ns)
+    return (
+        f"{edge} at {seconds(stamp_ns)} would be extrapolation into the past: "
+        f"its oldest sample is {early} later, of {seconds(cache.oldest_ns)}"
+    )
+
+
+def no_common_time(moving: Sequence[TimeCache]) -> str:
+    """Return which edge has nothing at the newest time of the edge that is behind."""
+    behind = min(moving, key=lambda cache: cache.newest_ns)
+    ahead = max(moving, key=lambda cache: cache.oldest_ns)
+    gap = milliseconds(ahead.oldest_ns - behind.newest_ns)
+    return (
+        f"{ahead.parent} → {ahead.child} begins {gap} after the last of {behind.parent} →"
+        f" {behind.child}: they have no time in common (extrapolation into the past)"
+    )

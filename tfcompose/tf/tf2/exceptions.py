@@ -1,0 +1,167 @@
+"""Why there is no transform, or why one was not taken: tf2's exceptions and rejections, and what they say.
+
+The exceptions have tf2's names and hierarchy. Their messages name the edge that is missing, or say
+by how many milliseconds a time is too early or too late.
+"""
+
+# ruff: noqa: N818 - the names are tf2's
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from enum import Enum
+from math import isfinite
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from tfcompose.tf.tf2.poses import PoseTuple
+
+#: A quaternion whose squared length is off by this much is rejected.
+DENORMALISED = 0.01
+
+
+class TransformException(Exception):
+    """Raised when there is no pose of one frame in another; the message says why."""
+
+
+class LookupException(TransformException):
+    """Raised when a frame is not known, or the frames above one lead back to it."""
+
+
+class ConnectivityException(TransformException):
+    """Raised when two frames are in two trees."""
+
+
+class ExtrapolationException(TransformException):
+    """Raised when an edge between two frames has no sample before, or none after, the requested time."""
+
+
+class InvalidArgumentException(TransformException):
+    """Raised when a frame's name is empty or starts with a slash, or a message cannot be transformed."""
+
+
+class TimeoutException(TransformException):
+    """Never raised here; it exists for programs that catch it."""
+
+
+class TypeException(Exception):
+    """Raised when a message of that type cannot be transformed; as in tf2 it is no TransformException."""
+
+
+class NotImplementedException(Exception):
+    """Raised by a ``BufferInterface`` that does not look up."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "this buffer does not look up: a subclass of BufferInterface defines lookup_transform"
+        )
+
+
+class Rejection(Enum):
+    """Why a transform was not taken; the values are the words of tf2's log."""
+
+    SELF = "TF_SELF_TRANSFORM"
+    NO_CHILD = "TF_NO_CHILD_FRAME_ID"
+    NO_PARENT = "TF_NO_FRAME_ID"
+    NOT_FINITE = "TF_NAN_INPUT"
+    DENORMALISED = "TF_DENORMALIZED_QUATERNION"
+    OLD = "TF_OLD_DATA"
+
+    @property
+    def text(self) -> str:
+        """The reason in plain words."""
+        return _REJECTIONS[self]
+
+
+_REJECTIONS = {
+    Rejection.SELF: "it is its own parent",
+    Rejection.NO_CHILD: "its child_frame_id is empty",
+    Rejection.NO_PARENT: "its frame_id is empty",
+    Rejection.NOT_FINITE: "a value is not a finite number",
+    Rejection.DENORMALISED: "its quaternion is not of length 1",
+    Rejection.OLD: "it is older than all that is kept of its frame",
+}
+
+
+def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
+    """Return why tf2 does not take a transform, whatever came before it; the first reason that holds, as in tf2."""
+    if parent == child:
+        return Rejection.SELF
+    if not child:
+        return Rejection.NO_CHILD
+    if not parent:
+        return Rejection.NO_PARENT
+    if not all(map(isfinite, pose)):
+        return Rejection.NOT_FINITE
+    x, y, z, w = pose[3:]
+    return (
+        None if abs(x * x + y * y + z * z + w * w - 1) < DENORMALISED else Rejection.DENORMALISED
+    )
+
+
+# What the exceptions say.
+
+
+class UnknownFrame:
+    """The message about an unknown frame, with the nearest known name.
+
+    It is worked out when it is read: among thousands of names that takes longer than all lookups
+    of a second, and a program that waits for a frame asks for it with every message.
+    """
+
+    __slots__ = ("_frame", "_known")
+
+    def __init__(self, frame: str, known: Collection[str]) -> None:
+        self._frame = frame
+        self._known = tuple(known)
+
+    def __str__(self) -> str:
+        lowered = {name.lower(): name for name in sorted(self._known, reverse=True)}
+        near = get_close_matches(self._frame.lower(), lowered, n=1)
+        if near:
+            return f"no frame {self._frame}; did you mean {lowered[near[0]]}?"
+        return f"no frame {self._frame} among {len(self._known)} frames"
+
+    def __repr__(self) -> str:
+        return repr(str(self))
+
+
+def unusable_name(frame: str) -> str:
+    """Return why tf2 takes no such name in a lookup."""
+    if not frame:
+        return "a frame's name is empty"
+    return f"no frame's name starts with a slash in tf2: {frame} is known as {frame[1:]}"
+
+
+def two_trees(known: Collection[str], a: str, b: str, top_a: str, top_b: str) -> str:
+    """Return which trees the two frames are in."""
+    cleared = [top for top in (top_a, top_b) if top in known]
+    if cleared:
+        return (
+            f"{a} and {b} are not connected: {cleared[0]} has had no parent since the buffer was"
+            " cleared"
+        )
+    return (
+        f"{a} and {b} are in two trees: one begins at {top_a}, the other at {top_b}; no edge joins"
+        f" them, such as {top_a} → {top_b}"
+    )
+
+
+def loop(frame: str, children: Sequence[str]) -> str:
+    """Return the loop that begins and ends at ``frame``; ``children`` are the frames on the way up."""
+    around = children[children.index(frame) :]
+    return f"the live tree has a loop: {' → '.join([frame, *reversed(around)])}"
+
+
+def seconds(stamp_ns: int) -> str:
+    """Return a time in seconds with all nine decimals."""
+    sign = "-" if stamp_ns < 0 else ""
+    seconds, rest = divmod(abs(stamp_ns), 1_000_000_000)
+    return f"{sign}{seconds}.{rest:09d} s"
+
+
+def milliseconds(nanoseconds: int) -> str:
+    """Return a duration in milliseconds."""
+    return f"{nanoseconds / 1e6:.6g} ms" if nanoseconds < 10**9 else f"{nanoseconds / 1e6:.0f} ms"

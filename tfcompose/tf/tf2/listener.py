@@ -1,0 +1,115 @@
+"""tf2_ros's ``TransformListener``: fills a buffer with what comes on /tf and /tf_static. It needs rclpy."""
+
+from __future__ import annotations
+
+import weakref
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+    from tfcompose.tf.tf2.buffer import Buffer
+
+# So many different warnings are logged at most, each once.
+_MOST_WARNINGS = 200
+
+
+class TransformListener:
+    """Subscribes to TF and puts it into a buffer, until it is closed.
+
+    Args:
+        buffer: what is filled. node: an rclpy node; whoever spins it feeds the buffer. None: a
+        node of its own with a thread of its own. spin_thread: spin the node that was handed over
+        in a thread of the listener's. qos: an rclpy QoSProfile or a depth for /tf; default tf2's:
+        reliable, volatile, the last 100. static_qos: the same for /tf_static; default tf2's:
+        reliable, transient local, the last 100. tf_topic: the topic of moving edges.
+        tf_static_topic: the topic of fixed edges. static_only: listen to fixed edges alone.
+        namespace: listen to /NAMESPACE/tf and /NAMESPACE/tf_static instead. use_sim_time: the
+        listener's own node follows /clock; a node that is handed over has its own parameter.
+
+    When a node's clock goes back, as a simulator's or a bag's does, the buffer forgets all moving
+    edges, and the node's log says so. What is rejected is logged once for each frame and reason.
+
+    Raises:
+        RosError: if rclpy is not there or cannot be used.
+    """
+
+    def __init__(  # noqa: PLR0913 (tf2's arguments, and three)
+        self,
+        buffer: Buffer,
+        node: Any = None,
+        *,
+        spin_thread: bool = False,
+        qos: Any = None,
+        static_qos: Any = None,
+        tf_topic: str = "/tf",
+        tf_static_topic: str = "/tf_static",
+        static_only: bool = False,
+        namespace: str = "",
+        use_sim_time: bool = False,
+    ) -> None:
+        # ROS is optional.
+        from tfcompose.tf.ros.environment import RosError, missing_ros  # noqa: PLC0415
+
+        missing = missing_ros()
+        if missing:
+            raise RosError(missing)
+        from tfcompose.tf.ros.tf_codec import Decoder  # noqa: PLC0415 (the same)
+
+        # The same.
+        from tfcompose.tf.ros.tf_listener import NodeListener, ThreadListener, Topic  # noqa: PLC0415
+
+        prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
+        topics = [Topic(prefix + tf_static_topic, static=True, qos=static_qos)]
+        if not static_only:
+            topics.append(Topic(prefix + tf_topic, static=False, qos=qos))
+        self.buffer = buffer
+        self.node = node
+        self._decoder = Decoder()
+        self._warnings: set[str] = set()
+        self._ros: NodeListener | ThreadListener
+        if node is None:
+            self._ros = ThreadListener(self._take, topics, use_sim_time=use_sim_time)
+            buffer.follow_clock(self._ros.node)
+            self._ros.start()
+        else:
+            self._ros = NodeListener(node, self._take, topics, spin=spin_thread)
+            buffer.follow_clock(node)
+            buffer.pollers.append(self._ros.poll)
+        self._end = weakref.finalize(self, self._ros.close)  # at the latest when the program ends
+
+    def unregister(self) -> None:
+        """End the subscriptions; tf2's name for ``close``."""
+        self.close()
+
+    def close(self) -> None:
+        """End the subscriptions, and the listener's own thread and node; the buffer keeps what it has."""
+        poll = getattr(self._ros, "poll", None)
+        if poll in self.buffer.pollers:
+            self.buffer.pollers.remove(poll)
+        self._end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _take(self, data: bytes, static: bool) -> None:  # noqa: FBT001 (called with what the subscription is)
+        try:
+            rejected = self.buffer.insert(
+                self._decoder.rows(data), static=static, authority="default_authority"
+            )
+        except ValueError as error:
+            self._warn(f"a message that is no TFMessage was dropped: {error}")
+            return
+        for child, reason in rejected:
+            self._warn(
+                f"{reason.value}: a transform of {child or 'a frame without name'} was dropped:"
+                f" {reason.text}"
+            )
+
+    def _warn(self, warning: str) -> None:
+        if warning not in self._warnings and len(self._warnings) < _MOST_WARNINGS:
+            self._warnings.add(warning)
+            self._ros.node.get_logger().warning(warning)

@@ -1,0 +1,324 @@
+"""The buffer without messages: takes transforms as plain numbers, and answers where one frame is in another.
+
+Frames are names, times are integer nanoseconds since the epoch, poses are
+``tfcompose.foundation.geometry.Pose``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, sqrt
+from threading import Condition, RLock
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.geometry import Pose
+from tfcompose.tf.tf2 import exceptions
+from tfcompose.tf.tf2.cache import (
+    Chain,
+    TimeCache,
+    chain_at,
+    newest_chain,
+    no_common_time,
+    pack_pose,
+)
+from tfcompose.tf.tf2.exceptions import (
+    ConnectivityException,
+    ExtrapolationException,
+    InvalidArgumentException,
+    LookupException,
+    Rejection,
+    TransformException,
+    rejection_of,
+)
+from tfcompose.tf.tf2.poses import IDENTITY, PoseTuple, product, unit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+#: How long samples are kept before the newest of their edge, as in tf2.
+CACHE_NS = 10_000_000_000
+# Closer to 1 than this a sum of four squares cannot be told from 1.
+_ROUNDING = 1e-15
+# So many chains are remembered at most.
+_MOST_CHAINS = 4096
+_SECOND_NS = 1_000_000_000
+
+#: One transform: parent, child, seconds, nanoseconds, x y z in metres, quaternion x y z w.
+Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameInfo:
+    """A frame's edge to its parent; ``parent`` is empty for a root, and for a moving frame after ``clear``.
+
+    Times are in nanoseconds since the epoch, and 0 for a fixed edge, which is good at any time;
+    ``samples`` counts what is kept.
+    """
+
+    name: str
+    parent: str
+    static: bool
+    authority: str
+    oldest_ns: int
+    newest_ns: int
+    samples: int
+
+
+class PoseBuffer:
+    """Takes transforms and answers where one frame is in another; safe to use from several threads.
+
+    Args:
+        cache_ns: how long samples are kept, in nanoseconds before the newest of their edge.
+
+    Raises:
+        ValueError: if the time is negative.
+    """
+
+    def __init__(self, cache_ns: int = CACHE_NS) -> None:
+        if cache_ns < 0:
+            raise ValueError(f"samples cannot be kept for {cache_ns} ns")
+        self.cache_ns = cache_ns
+        self._lock = RLock()
+        self._inserted = Condition(self._lock)
+        self._waiting = 0
+        #: Called after something was taken, by whoever gave it.
+        self.on_insert: list[Callable[[], object]] = []
+        self._caches: dict[str, TimeCache] = {}
+        self._names: dict[str, None] = {}
+        self._chains: dict[tuple[str, str], Chain] = {}
+        self._mixed: set[str] = set()
+
+    @property
+    def frames(self) -> frozenset[str]:
+        """Every frame that was heard of."""
+        with self._lock:
+            return frozenset(self._names)
+
+    def set(  # noqa: PLR0913 (a transform has that many parts)
+        self,
+        parent: str,
+        child: str,
+        pose: Pose,
+        stamp_ns: int,
+        *,
+        static: bool,
+        authority: str = "",
+    ) -> bool:
+        """Take the pose of ``child`` in ``parent``; return False if tf2 would refuse it."""
+        row = (parent, child, 0, stamp_ns, *pose.xyz, *pose.quat_xyzw)
+        return not self.insert([row], static=static, authority=authority)
+
+    def insert(
+        self, rows: Iterable[Row], *, static: bool, authority: str = ""
+    ) -> list[tuple[str, Rejection]]:
+        """Take transforms in order; return the child and the reason of each that was rejected.
+
+        A leading slash is dropped from names, and quaternions are normalised. What is rejected
+        ``Rejection`` lists, in the words of tf2's log; infinite values count as not a number.
+        """
+        rejected: list[tuple[str, Rejection]] = []
+        with self._lock:
+            caches, cache_ns = self._caches, self.cache_ns
+            for row in rows:
+                # What comes fifty thousand times a second: the next sample of an edge that stays
+                # as it is.
+                parent, child, sec, nsec, x, y, z, qx, qy, qz, qw = row
+                cache = caches.get(child)
+                if cache is not None and cache.parent == parent and cache.static is static:
+                    squared = qx * qx + qy * qy + qz * qz + qw * qw
+                    if -_ROUNDING < squared - 1.0 < _ROUNDING and isfinite(x + y + z):
+                        pose = pack_pose(x, y, z, qx, qy, qz, qw)
+                        if cache.append(sec * _SECOND_NS + nsec, pose, cache_ns):
+                            cache.authority = authority
+                            continue
+                reason = self._take(row, static=static, authority=authority)
+                if reason:
+                    rejected.append((child.removeprefix("/"), reason))
+            if self._waiting:
+                self._inserted.notify_all()
+        if self.on_insert:
+            for callback in tuple(self.on_insert):
+                callback()
+        return rejected
+
+    def _take(self, row: Row, *, static: bool, authority: str) -> Rejection | None:
+        """Take any transform; return why it was rejected."""
+        # tf2 strips one slash.
+        parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
+        x, y, z, qx, qy, qz, qw = row[4:]
+        reason = rejection_of(parent, child, (x, y, z, qx, qy, qz, qw))
+        if reason:
+            return reason
+        squared = qx * qx + qy * qy + qz * qz + qw * qw
+        scale = 1.0 if -_ROUNDING < squared - 1.0 < _ROUNDING else 1 / sqrt(squared)
+        cache = self._caches.get(child)
+        if cache is None or cache.static is not static:
+            cache = self._new_cache(child, static=static)
+        pose = (x, y, z, qx * scale, qy * scale, qz * scale, qw * scale)
+        outcome = cache.insert(row[2] * _SECOND_NS + row[3], parent, pose, self.cache_ns)
+        if outcome != "taken" or cache.mixed:
+            self._names.setdefault(child)
+            self._names.setdefault(parent)
+        if outcome == "old":
+            return Rejection.OLD
+        if outcome == "changed":
+            self._changed(cache)
+        cache.authority = authority
+        return None
+
+    def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:
+        """Return the pose of ``source`` in ``target`` at a time, and that time, both in nanoseconds since the epoch.
+
+        Time 0 is the newest that all moving edges between them have reached; where none moves it
+        stays 0. The quaternion's w is not negative. A frame in itself is the identity, whether it
+        is known or not.
+
+        Raises:
+            InvalidArgumentException: if a name is empty or starts with a slash.
+            LookupException: if a frame is not known.
+            ConnectivityException: if they are in two trees.
+            ExtrapolationException: if an edge between them has no samples around that time.
+        """
+        (x, y, z, *quat), stamp_ns = self._pose(target, source, stamp_ns)
+        return Pose((x, y, z), (quat[0], quat[1], quat[2], quat[3])), stamp_ns
+
+    def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
+        """Return what ``lookup`` does for time 0; the time is None where only fixed edges are between the two."""
+        pose, stamp_ns = self.lookup(target, source)
+        return pose, stamp_ns or None
+
+    def behind(self, target: str, source: str) -> str | None:
+        """Return the moving edge between the two whose newest sample is the oldest, as "parent → child", or None.
+
+        Raises:
+            LookupException: if a frame is not known.
+            ConnectivityException: if they are in two trees.
+        """
+        with self._lock:
+            moving = self._chain_between(target, source).moving if target != source else []
+            if not moving:
+                return None
+            last = min(moving, key=lambda cache: cache.newest_ns)
+            return f"{last.parent} → {last.child}"
+
+    def all_frames(self) -> list[FrameInfo]:
+        """Return what is known of each frame, in the order in which they were first heard of."""
+        with self._lock:
+            return [_frame_info(name, self._caches.get(name)) for name in self._names]
+
+    def clear(self) -> None:
+        """Forget all samples of moving edges; fixed ones and the names stay, as in tf2."""
+        with self._lock:
+            for cache in self._caches.values():
+                if not cache.static:
+                    cache.clear()
+            self._chains.clear()
+            self._mixed.clear()
+
+    def can_lookup(self, target: str, source: str, stamp_ns: int = 0) -> str:
+        """Return nothing if ``lookup`` would answer, else why it would not."""
+        try:
+            self._pose(target, source, stamp_ns)
+        except TransformException as error:
+            return str(error)
+        return ""
+
+    def locked(self) -> RLock:
+        """Return a context in which nothing is taken, by any thread."""
+        return self._lock
+
+    def chain_for_all_times(self, target: str, source: str) -> Chain | None:
+        """Return the chain between two frames, or None where a frame has had several parents within the cache.
+
+        Raises:
+            LookupException, ConnectivityException, InvalidArgumentException: as ``lookup`` for
+            time 0.
+        """
+        if self._mixed:
+            return None
+        return self._chain_between(target, source) if target != source else Chain((), ())
+
+    def _pose(self, target: str, source: str, stamp_ns: int) -> tuple[PoseTuple, int]:
+        """Return what ``lookup`` does, as numbers."""
+        with self._lock:
+            if target == source:
+                return IDENTITY, stamp_ns or self._newest_ns(target)
+            chain = self._chains.get((target, source)) or self._chain_between(
+                target, source, stamp_ns
+            )
+            at_ns = stamp_ns or chain.common_ns()
+            if self._mixed and at_ns:
+                return self._pose_at(target, source, at_ns), at_ns
+            if chain.fixed is not None:
+                return chain.fixed, stamp_ns
+            pose = chain.at(at_ns)
+            if pose is None:
+                try:
+                    pose = self._pose_at(target, source, at_ns)
+                except ExtrapolationException as error:
+                    if stamp_ns:
+                        raise
+                    raise ExtrapolationException(no_common_time(chain.moving)) from error
+            return pose, at_ns
+
+    def _full_pose(
+        self, target: str, target_ns: int, source: str, source_ns: int, fixed: str
+    ) -> tuple[PoseTuple, int]:
+        """Return the pose of the source at one time in the target at another, and that of the target."""
+        with self._lock:
+            for frame in (target, source, fixed):
+                self._require(frame)
+            first, _ = self._pose(fixed, source, source_ns)
+            second, stamp_ns = self._pose(target, fixed, target_ns)
+        return unit(product(second, first)), stamp_ns
+
+    def _pose_at(self, target: str, source: str, stamp_ns: int) -> PoseTuple:
+        """Return the pose by the parents of that time; in a loop of frames the other way round may be the one."""
+        pose = chain_at(self._caches, target, source, stamp_ns).at(stamp_ns)
+        if pose is None:
+            raise ExtrapolationException(
+                f"{source} has no pose in {target} at {exceptions.seconds(stamp_ns)}"
+            )
+        return pose
+
+    def _chain_between(self, target: str, source: str, stamp_ns: int = 0) -> Chain:
+        """Return the chain between the two; the one by newest parents, if there is any, is remembered."""
+        self._require(target)
+        self._require(source)
+        try:
+            chain = newest_chain(self._caches, target, source)
+        except (ConnectivityException, LookupException):
+            if not stamp_ns:
+                raise
+            return chain_at(self._caches, target, source, stamp_ns)
+        if len(self._chains) >= _MOST_CHAINS:
+            self._chains.clear()
+        self._chains[target, source] = chain
+        return chain
+
+    def _require(self, frame: str) -> None:
+        if not frame or frame[0] == "/":
+            raise InvalidArgumentException(exceptions.unusable_name(frame))
+        if frame not in self._names:
+            raise LookupException(exceptions.UnknownFrame(frame, self._names))
+
+    def _new_cache(self, child: str, *, static: bool) -> TimeCache:
+        """Return the samples of a frame that is new, or fixed from now on, or moving from now on."""
+        cache = self._caches[child] = TimeCache(child, static=static)
+        return cache
+
+    def _changed(self, cache: TimeCache) -> None:
+        """Forget the chains, since an edge is new, or has another fixed pose or parent."""
+        self._chains.clear()
+        (self._mixed.add if cache.mixed else self._mixed.discard)(cache.child)
+
+    def _newest_ns(self, frame: str) -> int:
+        cache = self._caches.get(frame)
+        return cache.newest_ns if cache and not cache.static and len(cache) else 0
+
+
+def _frame_info(name: str, cache: TimeCache | None) -> FrameInfo:
+    if cache is None or not len(cache):
+        return FrameInfo(name, "", static=False, authority="", oldest_ns=0, newest_ns=0, samples=0)
+    oldest, newest = (0, 0) if cache.static else (cache.oldest_ns, cache.newest_ns)
+    return FrameInfo(name, cache.parent, cache.static, cache.authority, oldest, newest, len(cache))

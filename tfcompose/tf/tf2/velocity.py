@@ -1,0 +1,82 @@
+"""How fast one frame moves as seen from another: the mean over some time, from the poses at its two ends."""
+
+from __future__ import annotations
+
+from math import atan2, sqrt
+from typing import TYPE_CHECKING, NamedTuple
+
+from tfcompose.tf.tf2.poses import PoseTuple, product
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    #: Returns the pose of a frame, the second, in another, the first, at a time in nanoseconds; 0
+    #: is the newest.
+    PoseOf = Callable[[str, str, int], PoseTuple]
+
+Three = tuple[float, float, float]
+
+#: No mean begins earlier, in nanoseconds since the epoch, since time 0 asks for the newest; as in
+#: tf2.
+_EARLIEST_NS = 10_000
+
+
+class Velocity(NamedTuple):
+    """``linear`` in m/s and ``angular`` in rad/s, each x y z."""
+
+    linear: Three
+    angular: Three
+
+
+class Moving(NamedTuple):
+    """Whose velocity it is, seen from where, in the axes of which frame, and of which point that moves along."""
+
+    tracking_frame: str
+    observation_frame: str
+    reference_frame: str = ""
+    reference_point: Sequence[float] = (0.0, 0.0, 0.0)
+    reference_point_frame: str = ""
+
+
+def mean_velocity(
+    pose_of: PoseOf, moving: Moving, begin_ns: int, end_ns: int, at_ns: int
+) -> Velocity:
+    """Return the mean velocity from ``begin_ns`` to ``end_ns``, with the axes and the point of ``at_ns`` (0: newest).
+
+    What would begin before 10 µs since the epoch begins there, and is the mean over the shorter
+    time.
+    """
+    tracking, observation = moving.tracking_frame, moving.observation_frame
+    begin_ns = max(begin_ns, _EARLIEST_NS)
+    first, last = pose_of(observation, tracking, begin_ns), pose_of(observation, tracking, end_ns)
+    axes = pose_of(moving.reference_frame or observation, observation, at_ns)
+    point = pose_of(observation, moving.reference_point_frame or tracking, at_ns)
+    origin = pose_of(observation, tracking, at_ns)
+    seconds = (end_ns - begin_ns or 1) / 1e9
+    x, y, z = moving.reference_point
+    angular = _angular_velocity(first, last, seconds)
+    arm = [
+        a - b for a, b in zip(product(point, (x, y, z, 0.0, 0.0, 0.0, 1.0)), origin, strict=True)
+    ]
+    carried = _cross(angular, (arm[0], arm[1], arm[2]))
+    linear = [(b - a) / seconds + c for a, b, c in zip(first[:3], last[:3], carried, strict=True)]
+    return Velocity(_rotated(axes, (linear[0], linear[1], linear[2])), _rotated(axes, angular))
+
+
+def _angular_velocity(first: PoseTuple, last: PoseTuple, seconds: float) -> Three:
+    """Return the angular velocity that rotates the first into the last the short way, in their parent's axes."""
+    ax, ay, az, aw = first[3:]
+    *_, x, y, z, w = product((0.0, 0.0, 0.0, *last[3:]), (0.0, 0.0, 0.0, -ax, -ay, -az, aw))
+    length = sqrt(x * x + y * y + z * z)
+    if not length:
+        return 0.0, 0.0, 0.0
+    rate = 2 * atan2(length, abs(w)) / (length * seconds) * (1 if w >= 0 else -1)
+    return x * rate, y * rate, z * rate
+
+
+def _rotated(pose: PoseTuple, vector: Three) -> Three:
+    return product((0.0, 0.0, 0.0, *pose[3:]), (*vector, 0.0, 0.0, 0.0, 1.0))[:3]
+
+
+def _cross(a: Three, b: Three) -> Three:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,659 @@
+"""The far end of a deployment: what is done on a host.
+
+``connection`` sends this file's text over ssh to the host's Python, which runs it: it needs the
+standard library alone, and no tfcompose. It answers requests, one line of JSON each, in their
+order, until its input ends. If that happens while a release is on trial, whoever deploys is gone,
+and it goes back to the release before by itself.
+
+On the host, ``base`` holds ``releases/NAME``, the link ``current`` to the one that systemd starts,
+the link ``previous`` to the one before, and ``lock``. A release on trial is started by a drop-in
+(or, the first time, a unit) in the runtime directory, so that a host that loses its power starts
+the release before.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import fcntl
+import hashlib
+import json
+import os
+import pwd
+import queue
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import io
+    from collections.abc import Callable, Mapping
+
+#: How long systemctl may take to start or stop, and other programs, in seconds.
+UNIT_S, PROGRAM_S = 120.0, 60.0
+#: How many releases are kept, the current one and the one before among them.
+KEPT = 5
+#: The file in a release that holds the unit that starts it as the current one.
+UNIT = "unit"
+#: Larger files are not sent back to be compared.
+MOST_TEXT = 200_000
+#: Prints what the host's Python has, with the setup files sourced.
+_PROBE = """
+import json, os, sys
+from importlib.util import find_spec
+try:
+    from tfcompose import __version__ as version
+except ImportError:
+    version = None
+names = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_DISTRO")
+env = {name: os.environ[name] for name in names if os.environ.get(name)}
+print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env,
+                  "zenoh": find_spec("zenoh") is not None}))
+"""
+
+
+class HostError(Exception):
+    """Raised where something cannot be done on this host; the message says why."""
+
+
+def digest_of(data: bytes) -> str:
+    """Return the name that a manifest has for the content."""
+    return hashlib.sha256(data).hexdigest()
+
+
+class Agent:
+    """One robot's share on this host. ``settings`` are those of ``connection.Settings``."""
+
+    def __init__(self, settings: Mapping[str, Any], gone: threading.Event) -> None:
+        self.name: str = settings["name"]
+        self.unit: str = settings["unit"]
+        self.python: str = settings["python"]
+        self.setup: list[str] = settings["setup"]
+        self.sourcing: str = settings["sourcing"]
+        self.gone = gone
+        self.lock: int | None = None
+        self.trial: dict[str, Any] | None = None
+        self.running: Path | None = None
+        self.restarts = 0
+        self.archive: io.BufferedRandom | None = None
+        runtime = Path(f"/run/user/{os.getuid()}")
+        if "XDG_RUNTIME_DIR" not in os.environ and runtime.is_dir():
+            os.environ["XDG_RUNTIME_DIR"] = str(runtime)
+        self._be_of(system=settings["system"])
+
+    def _be_of(self, *, system: bool) -> None:
+        """Take the folders of the system's units, or of the user's."""
+        self.system = system
+        home, runtime = Path.home(), Path(os.environ.get("XDG_RUNTIME_DIR", "/run"))
+        self.base = (
+            (Path("/var/lib") if system else home / ".local/share") / "tfcompose" / self.name
+        )
+        self.units = Path("/etc/systemd/system") if system else home / ".config/systemd/user"
+        self.runtime = Path("/run/systemd/system") if system else runtime / "systemd/user"
+
+    # What is asked before anything changes.
+
+    def probe(self) -> dict[str, Any]:
+        """Return what the host has: Python, tfcompose, the environment of setup files, systemd, where it is."""
+        found: dict[str, Any] = {
+            "tfcompose": None,
+            "executable": sys.executable,
+            "zenoh": False,
+            "env": {},
+        }
+        found["problems"] = []
+        missing = [file for file in self.setup if not Path(file).expanduser().is_file()]
+        if missing:
+            found["problems"].append(f"there is no {missing[0]}, which setup names")
+        else:
+            done = self._program([self._executable(), "-c", _PROBE])
+            try:
+                found |= json.loads(done.stdout.splitlines()[-1])
+            except (ValueError, IndexError):
+                found["problems"].append(_last_line(done.stderr) or "its Python prints nothing")
+        state = self._systemctl("is-system-running")
+        if state.stdout.strip() in {"", "offline", "unknown"}:
+            why = _last_line(state.stderr) or state.stdout.strip()
+            found["problems"].append(
+                f"systemd does not run{'' if self.system else ' for this user'}: {why}"
+            )
+        if self.system and os.getuid() != 0:
+            found["problems"].append("units of the system need root")
+        found |= {
+            "python": ".".join(map(str, sys.version_info[:3])),
+            "base": str(self.base),
+            "setup": [str(Path(file).expanduser()) for file in self.setup],
+            "machine": (
+                _read("/proc/sys/kernel/random/boot_id")
+                + str(Path("/proc/self/ns/net").readlink())
+            ),
+            "lingers": self.system or self._lingers(),
+        }
+        return found
+
+    def clock(self) -> float:
+        """Return the time of this host's clock, in seconds since 1970."""
+        return time.time()
+
+    def state(self) -> dict[str, Any]:
+        """Return what is there: the releases, the current one's files by their digests, the unit, and what runs.
+
+        ``unsettled`` says that somebody's trial was never ended: what runs is not the current
+        release.
+        """
+        release = self._release("current")
+        shown = self._shown()
+        self.restarts = _restarts(shown)
+        status = self._status(shown)
+        launcher = status["robot"]["launcher"] if status["robot"] else None
+        return {
+            "release": release,
+            "previous": self._release("previous"),
+            "files": self._manifest(release),
+            "unit": _text(self.units / self.unit),
+            "active": shown.get("ActiveState") in {"active", "activating", "reloading"},
+            "enabled": shown.get("UnitFileState") == "enabled",
+            "unsettled": (
+                (self.runtime / self.unit).exists() or (self.runtime / f"{self.unit}.d").exists()
+            ),
+            "stranger": launcher if launcher and str(launcher) != shown.get("MainPID") else None,
+            **status,
+        }
+
+    def texts(self, paths: list[str], *, any_size: bool = False) -> dict[str, str | None]:
+        """Return the texts of files of the current release; None for one that is absent, no text, or too large."""
+        return {
+            path: _text(self.base / "current" / path, None if any_size else MOST_TEXT)
+            for path in paths
+        }
+
+    def take_lock(self, who: str) -> dict[str, Any]:
+        """Take this host's lock until this process ends; say who holds it, if somebody does."""
+        self.base.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(self.base / "lock", os.O_CREAT | os.O_RDWR, 0o600)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = os.pread(descriptor, 1000, 0).decode(errors="replace").strip()
+            os.close(descriptor)
+            return {"holder": holder or "somebody"}
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, f"{who}, since {time.strftime('%H:%M:%S')}\n".encode(), 0)
+        self.lock = descriptor
+        return {"holder": None}
+
+    # The new release.
+
+    def chunk(self, data: str) -> None:
+        """Take a part of the archive of a release."""
+        if self.archive is None:
+            self.base.mkdir(parents=True, exist_ok=True)
+            self.archive = tempfile.TemporaryFile(dir=self.base)  # noqa: SIM115 (it lives until it is unpacked)
+        self.archive.write(base64.b64decode(data))
+
+    def unpack(self, release: str, *, wheels: bool) -> None:
+        """Make the release's folder of the archive; whoever finds it finds it complete."""
+        folder, new = self.base / "releases" / release, self.base / "releases" / f".{release}.new"
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir(parents=True)
+        archive, self.archive = self.archive, None
+        if archive is None:
+            raise HostError("no archive was sent")
+        with archive:
+            archive.seek(0)
+            with tarfile.open(fileobj=archive, mode="r:") as tar:
+                if hasattr(tarfile, "data_filter"):  # since Python 3.10.12
+                    tar.extraction_filter = tarfile.data_filter
+                tar.extractall(new)  # noqa: S202 (made by ``release.Release``)
+        for path in new.rglob("*"):
+            if path.is_file():
+                with path.open("rb") as stream:
+                    os.fsync(stream.fileno())
+        shutil.rmtree(folder, ignore_errors=True)
+        new.rename(folder)
+        if wheels:
+            try:
+                self._install(folder)
+            except HostError:
+                shutil.rmtree(folder, ignore_errors=True)
+                raise
+
+    def rehearse(self, release: str, host: str) -> list[dict[str, Any]]:
+        """Return what keeps the release from being started on this host, as findings."""
+        folder = self.base / "releases" / release
+        python = self._python_of(folder)
+        done = self._program(
+            [python, "-m", "tfcompose.tools.deploy.rehearse", str(folder / "plan.json"), host]
+        )
+        try:
+            found: list[dict[str, Any]] = json.loads(done.stdout.splitlines()[-1])
+        except (ValueError, IndexError):
+            raise HostError(
+                f"its tfcompose cannot check the plan: {_last_line(done.stderr)}"
+            ) from None
+        return found
+
+    def discard(self, release: str) -> None:
+        """Remove a release that was not started."""
+        if release not in {self._release("current"), self._release("previous")}:
+            shutil.rmtree(self.base / "releases" / release, ignore_errors=True)
+
+    # The change itself.
+
+    def stop(self) -> None:
+        """End what runs."""
+        shown = self._shown()
+        self.trial = {"active": shown.get("ActiveState") in {"active", "activating", "reloading"}}
+        if shown.get("LoadState") == "loaded":
+            self._must("stop", self.unit)
+
+    def start(self, release: str) -> None:
+        """Start a release on trial: by a drop-in beside the unit of the release before, or else by its own unit."""
+        self.running = folder = self.base / "releases" / release
+        unit = self._unit_of(release).replace(f"{self.base}/current/", f"{folder}/")
+        if (self.units / self.unit).is_file():
+            starts = [line for line in unit.splitlines() if line.startswith("ExecStart=")]
+            _write(
+                self.runtime / f"{self.unit}.d" / "trial.conf",
+                "\n".join(["[Service]", "ExecStart=", *starts, ""]),
+            )
+        else:
+            _write(self.runtime / self.unit, unit)
+        self._must("daemon-reload")
+        self._systemctl("reset-failed", self.unit)
+        self.restarts = 0
+        self._must("start", self.unit)
+
+    def follow(self, release: str, host: str) -> str:
+        """Let what runs follow a release on trial, and return what its launcher says of that.
+
+        A launcher that cannot is ended, and the release started.
+        """
+        self.trial = {"active": True, "host": host}
+        _write(
+            self.runtime / f"{self.unit}.d" / "trial.conf",
+            f"# its launcher follows release {release}\n",
+        )
+        try:
+            return self._followed(release, host)
+        except HostError as error:
+            self.stop()
+            self.start(release)
+            return f"started anew: {error}"
+
+    def _followed(self, release: str, host: str) -> str:
+        """Let the launcher follow a release; files that are not built are the same, and where they were.
+
+        Raises:
+            HostError: if it does not.
+        """
+        folder = self._launched_from()
+        if folder is None:
+            raise HostError("its launcher is not a release's")
+        self.running = self.base / "releases" / release
+        words = [
+            "up",
+            str(self.running / "plan.json"),
+            "--host",
+            host,
+            "--update",
+            "--build-dir",
+            str(folder),
+        ]
+        done = self._tfcompose(words, UNIT_S)
+        if done.returncode != 0:
+            raise HostError(_last_line(done.stderr) or "its launcher does not follow")
+        return done.stdout.strip().rpartition("; ")[2] or "nothing starts again"
+
+    def wait(self, seconds: float) -> dict[str, Any]:
+        """Return the status once the robot is ready, it has failed, or after so many seconds."""
+        end = time.monotonic() + seconds
+        while not self.gone.is_set():
+            left = end - time.monotonic()
+            shown = self._shown()
+            if left <= 0 or shown.get("ActiveState") == "inactive" or self._has_failed(shown):
+                break
+            words = ["wait", "--ready", "--timeout", f"{left:.1f}", "--robot", self.name]
+            begun = time.monotonic()
+            if self._tfcompose(words, left + PROGRAM_S).returncode == 0:
+                break
+            self.gone.wait(min(0.3, max(left, 0)) if time.monotonic() - begun < left else 0)
+        return self._status(self._shown())
+
+    def _status(self, shown: dict[str, str]) -> dict[str, Any]:
+        """Return what the launcher says, None where none answers, and, where the unit has failed, its last lines."""
+        done = self._tfcompose(["ps", "--format", "json", "--robot", self.name], PROGRAM_S)
+        try:
+            robots = json.loads(done.stdout)
+        except ValueError:
+            robots = []
+        failed = self._has_failed(shown)
+        return {
+            "robot": robots[0] if robots else None,
+            "failed": failed,
+            "lines": (
+                self._journal()
+                if failed or (not robots and shown.get("ActiveState") == "inactive")
+                else []
+            ),
+        }
+
+    def _has_failed(self, shown: dict[str, str]) -> bool:
+        """Whether the unit has ended by itself since it was examined, or started here."""
+        return shown.get("ActiveState") == "failed" or _restarts(shown) > self.restarts
+
+    def commit(self, release: str) -> None:
+        """Keep the release on trial: ``current`` leads to it from now on."""
+        before = self._release("current")
+        _write(self.units / self.unit, self._unit_of(release))
+        _link(self.base / "current", f"releases/{release}")
+        if before and before != release:
+            _link(self.base / "previous", f"releases/{before}")
+        if self.trial is not None:
+            self.trial["before"] = before
+        self._end_trial()
+        self._must("enable", self.unit)
+        self._prune()
+
+    def settle(self) -> None:
+        """Make what was kept final: the end of the input takes nothing back any more."""
+        self.trial = None
+
+    def back(self) -> dict[str, Any] | None:
+        """Return to the release before the trial, which runs again if it ran; also after ``commit``.
+
+        None where nothing is on trial.
+        """
+        trial, self.trial, self.running = self.trial, None, None
+        if trial is None:
+            return None
+        if "host" not in trial:
+            self._systemctl("stop", self.unit)
+        if "before" in trial:
+            if trial["before"]:
+                _link(self.base / "current", f"releases/{trial['before']}")
+                _write(self.units / self.unit, self._unit_of(trial["before"]))
+            else:
+                self._systemctl("disable", self.unit)
+                (self.units / self.unit).unlink(missing_ok=True)
+                (self.base / "current").unlink(missing_ok=True)
+        self._end_trial()
+        release = self._release("current")
+        if release and trial["active"]:
+            self._return(release, trial.get("host"))
+        return {"release": release, "active": bool(release and trial["active"])}
+
+    def _return(self, release: str, host: str | None) -> None:
+        """Run the current release again; a ``host`` whose launcher followed another goes on."""
+        if host is not None:
+            with contextlib.suppress(HostError):
+                self._followed(release, host)
+                self.running = None
+                return
+            self.running = None
+            self._systemctl("stop", self.unit)
+        self._must("start", self.unit)
+
+    # Everything else.
+
+    def execute(self, words: list[str]) -> None:
+        """Become tfcompose with these words, where the robot runs: under the user's systemd, or the system's."""
+        system = (
+            Path("/etc/systemd/system", self.unit).is_file()
+            and not (self.units / self.unit).is_file()
+        )
+        self._be_of(system=self.system or system)
+        command = self._command(
+            [self._python_of(self.base / "current"), "-m", "tfcompose", *words]
+        )
+        os.execvpe(command[0], command, self._environment())  # noqa: S606 (no shell: these are words)
+
+    def _unit_of(self, release: str) -> str:
+        text = _text(self.base / "releases" / release / UNIT)
+        if text is None:
+            raise HostError(f"release {release} has no unit")
+        return text
+
+    def _end_trial(self) -> None:
+        shutil.rmtree(self.runtime / f"{self.unit}.d", ignore_errors=True)
+        (self.runtime / self.unit).unlink(missing_ok=True)
+        self._must("daemon-reload")
+
+    def _install(self, folder: Path) -> None:
+        """Make the release's own Python of its wheels, over what the host's Python has."""
+        python = self._executable()
+        wheels = sorted(map(str, (folder / "wheels").glob("*.whl")))
+        for words in (
+            [python, "-m", "venv", "--system-site-packages", str(folder / "venv")],
+            [
+                str(folder / "venv/bin/python"),
+                "-m",
+                "pip",
+                "install",
+                "-q",
+                "--no-index",
+                "--no-deps",
+                *wheels,
+            ],
+        ):
+            done = self._program(words, 600)
+            if done.returncode != 0:
+                why = _last_line(done.stderr) or _last_line(done.stdout)
+                raise HostError(f"the wheels cannot be installed: {why}")
+
+    def _executable(self) -> str:
+        return str(Path(self.python).expanduser()) if "/" in self.python else self.python
+
+    def _python_of(self, folder: Path) -> str:
+        own = folder / "venv/bin/python"
+        return str(own) if own.exists() else self._executable()
+
+    def _command(self, words: list[str]) -> list[str]:
+        files = [str(Path(file).expanduser()) for file in self.setup]
+        return ["/bin/bash", "-c", self.sourcing, "bash", *files, "--", *words] if files else words
+
+    def _program(
+        self, words: list[str], seconds: float = PROGRAM_S
+    ) -> subprocess.CompletedProcess[str]:
+        return _run(self._command(words), seconds, self._environment())
+
+    def _tfcompose(self, words: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
+        python = self._python_of(self.running or self.base / "current")
+        return self._program([python, "-m", "tfcompose", *words], seconds)
+
+    def _environment(self) -> dict[str, str]:
+        """Return the environment in which the run is found: that of the unit, where it differs from a login's."""
+        if not self.system:
+            return dict(os.environ)
+        return {
+            **os.environ,
+            "XDG_RUNTIME_DIR": f"/run/tfcompose/{self.name}",
+            "ROS_LOG_DIR": str(self.base / "log"),
+        }
+
+    def _systemctl(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return _run(
+            ["systemctl", *([] if self.system else ["--user"]), *words], UNIT_S, dict(os.environ)
+        )
+
+    def _must(self, *words: str) -> None:
+        done = self._systemctl(*words)
+        if done.returncode != 0:
+            raise HostError(
+                f"systemctl {' '.join(words)}: {_last_line(done.stderr) or done.returncode}"
+            )
+
+    def _shown(self) -> dict[str, str]:
+        words = ("LoadState", "ActiveState", "UnitFileState", "MainPID", "NRestarts")
+        lines = self._systemctl(
+            "show", self.unit, f"--property={','.join(words)}"
+        ).stdout.splitlines()
+        return {name: value for name, _, value in (line.partition("=") for line in lines)}
+
+    def _journal(self) -> list[str]:
+        own = [] if self.system else ["--user"]
+        words = ["journalctl", *own, "-u", self.unit, "-n", "12", "-o", "cat", "--no-pager"]
+        return _run(words, PROGRAM_S, dict(os.environ)).stdout.splitlines()
+
+    def _lingers(self) -> bool:
+        return Path("/var/lib/systemd/linger", pwd.getpwuid(os.getuid()).pw_name).exists()
+
+    def _release(self, link: str) -> str | None:
+        try:
+            return str((self.base / link).readlink().name)
+        except OSError:
+            return None
+
+    def _manifest(self, release: str | None) -> dict[str, str]:
+        """Return the digests of the files of a release, by their paths; not those of what was installed of wheels."""
+        if release is None:
+            return {}
+        folder = self.base / "releases" / release
+        files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+        named = ((path.relative_to(folder).as_posix(), path) for path in files)
+        return {
+            name: digest_of(path.read_bytes())
+            for name, path in named
+            if not name.startswith("venv/")
+        }
+
+    def _launched_from(self) -> Path | None:
+        """Return the folder of the plan that the running launcher was started with: it is given files below it."""
+        pid = self._shown().get("MainPID") or "0"
+        try:
+            words = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            return None
+        plans = [Path(os.fsdecode(word)) for word in words if word.endswith(b"/plan.json")]
+        return plans[0].parent if plans and plans[0].is_relative_to(self.base) else None
+
+    def _prune(self) -> None:
+        launched = self._launched_from()
+        kept = {
+            self._release("current"),
+            self._release("previous"),
+            launched.name if launched else None,
+        } - {None}
+        folders = sorted(
+            (self.base / "releases").iterdir(), key=lambda path: path.stat().st_mtime, reverse=True
+        )
+        for folder in [one for one in folders if one.name not in kept][max(KEPT - len(kept), 0) :]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _run(
+    words: list[str], seconds: float, env: dict[str, str]
+) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(
+            words,
+            capture_output=True,
+            check=False,
+            env=env,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            timeout=seconds,
+        )
+    except OSError as error:
+        return subprocess.CompletedProcess(words, 127, "", f"{words[0]}: {error.strerror}")
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(
+            words, 124, "", f"{words[0]} does not end within {seconds:g} s"
+        )
+
+
+def _restarts(shown: Mapping[str, str]) -> int:
+    return int(shown.get("NRestarts") or 0)
+
+
+def _last_line(text: str) -> str:
+    return next((line.strip() for line in reversed(text.splitlines()) if line.strip()), "")
+
+
+def _read(file: str) -> str:
+    with contextlib.suppress(OSError):
+        return Path(file).read_text("utf-8").strip()
+    return ""
+
+
+def _text(file: Path, most: int | None = MOST_TEXT) -> str | None:
+    try:
+        data = file.read_bytes()
+        return data.decode() if most is None or len(data) <= most else None
+    except (OSError, ValueError):
+        return None
+
+
+def _write(file: Path, text: str) -> None:
+    """Write the file; who reads it meanwhile sees the one before."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    new = file.with_name(f".{file.name}.new")
+    new.write_text(text, encoding="utf-8")
+    new.replace(file)
+
+
+def _link(link: Path, target: str) -> None:
+    """Let the link lead there; who follows it meanwhile comes to where it led before."""
+    new = link.with_name(f".{link.name}.new")
+    new.unlink(missing_ok=True)
+    new.symlink_to(target)
+    new.replace(link)
+
+
+#: What may be asked.
+_REQUESTS = (
+    "probe", "clock", "state", "texts", "take_lock", "chunk", "unpack", "rehearse", "discard", "stop", "start",
+    "follow", "wait", "commit", "settle", "back", "execute",
+)  # fmt: skip
+
+
+def serve() -> None:
+    """Answer the requests on standard input until it ends; then take back what is on trial."""
+    gone = threading.Event()
+    requests: queue.Queue[bytes] = queue.Queue()
+
+    def read() -> None:
+        while line := sys.stdin.buffer.readline():
+            requests.put(line)
+            if b'"execute"' in line[:20]:
+                return  # what follows is for tfcompose
+        gone.set()
+        requests.put(b"")
+
+    threading.Thread(target=read, daemon=True).start()
+    agent = Agent(json.loads(requests.get()), gone)
+    try:
+        while line := requests.get():
+            name, arguments = json.loads(line)
+            _send(_answer(getattr(agent, name) if name in _REQUESTS else None, arguments))
+    except BrokenPipeError:
+        pass
+    finally:
+        with contextlib.suppress(HostError):
+            agent.back()
+
+
+def _answer(do: Callable[..., Any] | None, arguments: dict[str, Any]) -> dict[str, Any]:
+    if do is None:
+        return {"error": "an unknown request"}
+    try:
+        return {"answer": do(**arguments)}
+    except HostError as error:
+        return {"error": str(error)}
+    except OSError as error:
+        return {"error": f"{error.strerror}: {error.filename}" if error.filename else str(error)}
+
+
+def _send(answer: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    serve()

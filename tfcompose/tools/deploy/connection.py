@@ -1,0 +1,218 @@
+"""Connections to the hosts, by asyncssh: each runs the agent there, which answers requests."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import shlex
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import asyncssh
+
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.tools.exporters.supervisors import SOURCING
+
+if TYPE_CHECKING:
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.plan import PlanHost
+
+#: How long a host may take to be reached, and to answer what is no long work, in seconds.
+CONNECT_S, ANSWER_S = 10.0, 180.0
+#: A connection is lost when a host has not answered so many times, so many seconds apart.
+ALIVE_EVERY_S, ALIVE_MISSES = 2.0, 3
+#: The clock is read so often; the answer that came quickest is taken.
+CLOCK_READINGS = 5
+#: What Python is started with: it runs as much of its input as the first line says.
+START = (
+    "import sys; sys.exit('Python %d.%d is older than 3.10' % sys.version_info[:2]) if"
+    " sys.version_info < (3, 10) else"
+    " exec(compile(sys.stdin.buffer.read(int(sys.stdin.buffer.readline())), 'tfcompose agent',"
+    " 'exec'), {'__name__': '__main__'})"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What the agent is given first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name.
+
+    ``sourcing`` is the line of bash that sources the files before ``--``, and becomes the command
+    behind it.
+    """
+
+    name: str
+    unit: str
+    python: str = "python3"
+    setup: tuple[str, ...] = ()
+    system: bool = False
+    sourcing: str = SOURCING
+
+
+def settings_of(robot: str, name: str, host: PlanHost, *, system: bool = False) -> Settings:
+    """Return what the agent of a robot's host is given first."""
+    share = f"{robot}.{name}"
+    return Settings(
+        share, f"tfcompose-{share}.service", host.python or "python3", host.setup, system
+    )
+
+
+class LostError(Exception):
+    """Raised where a host does not answer any more; the message says how that shows."""
+
+
+class RefusedError(Exception):
+    """Raised where a host cannot do what it is asked; the message is its reason."""
+
+
+class Host:
+    """A host that is connected. ``at`` is its place in the robot file."""
+
+    def __init__(
+        self,
+        name: str,
+        connection: asyncssh.SSHClientConnection,
+        process: asyncssh.SSHClientProcess[bytes],
+        at: Span | None,
+    ) -> None:
+        self.name = name
+        self.at = at
+        self._connection = connection
+        self._process = process
+        self._order = asyncio.Lock()
+
+    async def ask(self, request: str, timeout_s: float = ANSWER_S, **arguments: Any) -> Any:
+        """Return the agent's answer.
+
+        Raises:
+            LostError: if the host does not answer any more.
+            RefusedError: if it cannot do it.
+        """
+        async with self._order:
+            try:
+                self._process.stdin.write(f"{json.dumps([request, arguments])}\n".encode())
+                answer = await asyncio.wait_for(self._answer(), timeout_s)
+            except asyncio.TimeoutError:
+                raise LostError(f"does not answer within {timeout_s:g} s") from None
+            except (OSError, asyncssh.Error, ValueError) as error:
+                raise LostError(f"is lost: {error}") from None
+        if answer is None:
+            raise LostError("is lost: the connection has ended")
+        if "error" in answer:
+            raise RefusedError(answer["error"])
+        return answer["answer"]
+
+    async def _answer(self) -> dict[str, Any] | None:
+        """Return the next answer, None at the end; what the login prints before is none."""
+        line = b""
+        while (
+            part := await self._process.stdout.readline()
+        ):  # a part of a line that is longer than the window
+            line += part
+            if line.endswith(b"\n"):
+                with contextlib.suppress(ValueError):
+                    answer = json.loads(line)
+                    if isinstance(answer, dict) and not {"answer", "error"}.isdisjoint(answer):
+                        return answer
+                line = b""
+        return None
+
+    async def clock_offset_s(self) -> float:
+        """Return by how much the host's clock is ahead of this one, in seconds: that of the quickest answer."""
+        readings: list[tuple[float, float]] = []
+        for _ in range(CLOCK_READINGS):
+            before = time.time()
+            there: float = await self.ask("clock")
+            after = time.time()
+            readings.append((after - before, there - (before + after) / 2))
+        return min(readings)[1]
+
+    async def execute(self, words: list[str]) -> asyncssh.SSHClientProcess[bytes]:
+        """Let the agent become tfcompose with these words, and return its process."""
+        self._process.stdin.write(f'["execute", {json.dumps({"words": words})}]\n'.encode())
+        return self._process
+
+    async def close(self) -> None:
+        """End the agent, which takes back what was not settled, and the connection."""
+        try:
+            self._process.stdin.write_eof()
+            await asyncio.wait_for(self._process.wait_closed(), ANSWER_S)
+        except (OSError, asyncssh.Error, asyncio.TimeoutError):
+            pass
+        self._connection.close()
+        await self._connection.wait_closed()
+
+
+async def connected(
+    name: str, host: PlanHost, settings: Settings, at: Span | None
+) -> Host | Finding:
+    """Return the host, with its agent, or why it cannot be reached."""
+    user, _, address = host.ssh.rpartition("@")
+    options: dict[str, Any] = {"username": user} if user else {}
+    options |= {"port": host.port} if host.port is not None else {}
+    try:
+        connection = await asyncio.wait_for(
+            asyncssh.connect(
+                address.strip("[]"),
+                connect_timeout=CONNECT_S,
+                login_timeout=CONNECT_S,
+                keepalive_interval=ALIVE_EVERY_S,
+                keepalive_count_max=ALIVE_MISSES,
+                **options,
+            ),
+            2 * CONNECT_S,
+        )
+    except asyncssh.HostKeyNotVerifiable as error:
+        advice = f"log in once, and compare its key: ssh {_in_words(host)}"
+        return _unreachable(name, f"its key is not trusted ({error})", at, advice)
+    except asyncssh.PermissionDenied:
+        advice = f"allow your key there: ssh-copy-id {_in_words(host)}"
+        return _unreachable(name, f"{host.ssh} does not let you in without a password", at, advice)
+    except asyncio.TimeoutError:
+        return _unreachable(name, f"{host.ssh} does not answer within {CONNECT_S:g} s", at)
+    except (OSError, asyncssh.Error) as error:
+        return _unreachable(
+            name,
+            f"{host.ssh}:"
+            f" {error.strerror if isinstance(error, OSError) and error.strerror else error}",
+            at,
+        )
+    agent = Path(__file__).with_name("agent.py").read_bytes()
+    python = settings.python
+    word = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
+    try:
+        process = await connection.create_process(
+            f"exec {word} -c {shlex.quote(START)}", encoding=None, window=2**21, max_pktsize=2**15
+        )
+        process.stdin.write(
+            f"{len(agent)}\n".encode() + agent + f"{json.dumps(asdict(settings))}\n".encode()
+        )
+        there = Host(name, connection, process, at)
+        await there.ask("clock", 2 * CONNECT_S)
+    except (OSError, asyncssh.Error, LostError, RefusedError) as error:
+        why = await _stderr_of(process) or str(error)
+        connection.close()
+        message = f"{name} cannot run {python}: {why}"
+        return finding(
+            "TF914", message, at, help=f"hosts: {{{name}: {{python: FILE}}}}, Python 3.10 or newer"
+        )
+    return there
+
+
+async def _stderr_of(process: asyncssh.SSHClientProcess[bytes]) -> str:
+    try:
+        text = await asyncio.wait_for(process.stderr.read(), 1.0)
+    except (OSError, asyncssh.Error, asyncio.TimeoutError):
+        return ""
+    lines = [line.strip() for line in text.decode(errors="replace").splitlines() if line.strip()]
+    return lines[-1] if lines else ""
+
+
+def _in_words(host: PlanHost) -> str:
+    return f"-p {host.port} {host.ssh}" if host.port is not None else host.ssh
+
+
+def _unreachable(name: str, why: str, at: Span | None, advice: str = "") -> Finding:
+    return finding("TF913", f"{name} cannot be reached: {why}", at, help=advice)

@@ -1,0 +1,210 @@
+"""A release: the built files of a robot and the files that they name, as they stand in its folder on each host."""
+
+from __future__ import annotations
+
+import io
+import os
+import posixpath
+import re
+import tarfile
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.emit import emit
+from tfcompose.compiler.emit.plan import plan_of
+from tfcompose.foundation.findings import RejectedError, finding
+from tfcompose.model.files import Target, assets
+from tfcompose.model.plan.file import write_plan
+from tfcompose.tools.deploy.agent import digest_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.model.plan import Plan
+    from tfcompose.model.robot import Asset, Robot
+
+#: The folder of the files that were not built, but are named; that of wheels.
+NAMED, WHEELS = "files", "wheels"
+#: No more is taken from a folder that a process names, files and bytes.
+MOST_FILES, MOST_BYTES = 20_000, 2_000_000_000
+#: A name of the content needs no more characters than this.
+NAME_LENGTH = 16
+#: Files of these kinds name others by paths that begin in their own folder, if they are no larger.
+_NAMING = frozenset(
+    {".dae", ".gltf", ".json", ".mtl", ".obj", ".sdf", ".urdf", ".xacro", ".xml", ".yaml", ".yml"}
+)
+_MOST_NAMING_BYTES = 20_000_000
+_WORD = re.compile(rb"[A-Za-z0-9_./ -]+\.[A-Za-z0-9]+")
+
+
+@dataclass(frozen=True, slots=True)
+class _Packing(Target):
+    """Addresses files by where they are in the release; ``places`` says where that is, by their absolute paths.
+
+    What is not among ``places`` yet is noted there without one.
+    """
+
+    places: dict[str, str] = field(default_factory=dict)
+
+    def address(self, asset: Asset) -> str:
+        """Return the address of a mesh or an image; packages are installed on the hosts by other means."""
+        is_file = bool(asset.path) and ("://" not in asset.uri or asset.uri.startswith("file://"))
+        return self.from_folder(asset.path) if is_file else asset.uri
+
+    def from_folder(self, path: str) -> str:
+        """Return the path of the file in the release, seen from the folder of the description that names it."""
+        file = posixpath.normpath(posixpath.join(self.top, path))
+        return posixpath.relpath(self.places.setdefault(file, NAMED), self.folder)
+
+
+@dataclass(frozen=True)
+class Release:
+    """The files of a release, by their paths in its folder; ``texts`` are built, ``copies`` are where they lie here.
+
+    Its name is made of their content, so that the same content has the same name wherever it was
+    built.
+    """
+
+    plan: Plan
+    texts: Mapping[str, str]
+    copies: Mapping[str, Path]
+
+    @cached_property
+    def manifest(self) -> dict[str, str]:
+        """The digests of the files' content, by their paths."""
+        built = {path: digest_of(text.encode()) for path, text in self.texts.items()}
+        return built | {path: digest_of(file.read_bytes()) for path, file in self.copies.items()}
+
+    @property
+    def name(self) -> str:
+        """The release's name."""
+        return name_of(self.manifest)
+
+    @property
+    def has_wheels(self) -> bool:
+        """Whether it brings a Python of its own."""
+        return any(path.startswith(f"{WHEELS}/") for path in self.copies)
+
+    def with_text(self, path: str, text: str) -> Release:
+        """Return the release with one more file; the others' digests are kept."""
+        made = Release(self.plan, {**self.texts, path: text}, self.copies)
+        made.__dict__["manifest"] = self.manifest | {path: digest_of(text.encode())}
+        return made
+
+    def archive(self) -> Iterator[bytes]:
+        """Yield the files as a tar archive, in parts."""
+        buffer = io.BytesIO()
+        with tarfile.open(fileobj=buffer, mode="w", format=tarfile.PAX_FORMAT) as tar:
+            for path, text in self.texts.items():
+                data = text.encode()
+                yield from _added(tar, buffer, path, data, executable=False)
+            for path, file in self.copies.items():
+                yield from _added(
+                    tar, buffer, path, file.read_bytes(), executable=os.access(file, os.X_OK)
+                )
+        yield buffer.getvalue()
+
+
+def name_of(manifest: Mapping[str, str]) -> str:
+    """Return the name of the release that has these files, by their digests."""
+    return digest_of(repr(sorted(manifest.items())).encode())[:NAME_LENGTH]
+
+
+def _added(
+    tar: tarfile.TarFile, buffer: io.BytesIO, path: str, data: bytes, *, executable: bool
+) -> Iterator[bytes]:
+    entry = tarfile.TarInfo(path)
+    entry.size, entry.mode = len(data), 0o755 if executable else 0o644
+    tar.addfile(entry, io.BytesIO(data))
+    yield buffer.getvalue()
+    buffer.seek(0)
+    buffer.truncate()
+
+
+def packed(robot: Robot, wheels: Path | None = None) -> Release:
+    """Return the release of a right robot, whose relative paths begin in this folder.
+
+    Files keep their places to each other, so that a map finds its picture, and a mesh its
+    textures.
+
+    Raises:
+        RejectedError: with what is named and cannot be copied.
+    """
+    top = Path.cwd().as_posix()
+    draft = _Packing(top=top)
+    plan_of(robot.with_final_names(), draft)
+    for one in assets(robot):
+        draft.address(one)
+    for part in robot.parts:
+        for one in assets(part.robot):
+            draft.address(one)
+    files = _with_named(draft.places)
+    places = _places(files, draft.places)
+    target = _Packing(top=top, folder=".", places={file: places[file] for file in draft.places})
+    texts = {file.path: file.text for file in emit(robot, target)}
+    plan = replace(
+        plan_of(robot.with_final_names(), target), hosts={}
+    )  # where hosts are may change, and nothing else
+    texts["plan.json"] = write_plan(plan)
+    copies = {places[file]: Path(file) for file in files}
+    for wheel in sorted(wheels.glob("*.whl")) if wheels else ():
+        copies[f"{WHEELS}/{wheel.name}"] = wheel
+    return Release(plan, texts, copies)
+
+
+def _with_named(named: Mapping[str, str]) -> list[str]:
+    """Return the files, those in named folders, and those that they name themselves, by absolute paths.
+
+    Raises:
+        RejectedError: if one is not there, or they are too many.
+    """
+    found: dict[str, None] = {}
+    size = 0
+    waiting = sorted(named)
+    while waiting:
+        path = Path(waiting.pop())
+        if path.as_posix() in found:
+            continue
+        if path.is_dir():
+            inside = (one for one in sorted(path.rglob("*")) if one.is_file())
+            waiting += [one.as_posix() for one in inside if not _is_hidden(one.relative_to(path))]
+        elif path.is_file():
+            found[path.as_posix()] = None
+            size += path.stat().st_size
+            waiting += _named_in(path)
+        else:
+            raise RejectedError([finding("TF912", f"{path} is named, and does not exist", None)])
+        if len(found) + len(waiting) > MOST_FILES or size > MOST_BYTES:
+            most = f"{MOST_FILES:,} files or {MOST_BYTES // 10**9} GB"
+            advice = "name a folder with only what the robot needs"
+            raise RejectedError(
+                [finding("TF912", f"what the robot names is more than {most}", None, help=advice)]
+            )
+    return sorted(found)
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") or part == "__pycache__" for part in path.parts)
+
+
+def _named_in(path: Path) -> list[str]:
+    """Return the files that a file names by paths that begin in its own folder."""
+    if path.suffix.lower() not in _NAMING or path.stat().st_size > _MOST_NAMING_BYTES:
+        return []
+    words = {word.decode().strip() for word in _WORD.findall(path.read_bytes())}
+    files = (path.parent / word for word in words if not word.startswith("/") and len(word) < 200)  # noqa: PLR2004
+    return [os.path.normpath(file) for file in files if file.is_file()]
+
+
+def _places(files: list[str], named: Mapping[str, str]) -> dict[str, str]:
+    """Return where files and named folders are in the release: as they are below the folder that has all of them."""
+    everything = [*files, *named]
+    folders = [posixpath.dirname(file) for file in files] + [
+        folder for folder in named if Path(folder).is_dir()
+    ]
+    top = posixpath.commonpath(folders) if folders else "/"
+    return {
+        file: posixpath.normpath(f"{NAMED}/{posixpath.relpath(file, top)}") for file in everything
+    }

@@ -1,0 +1,653 @@
+"""The order in which a release comes to all hosts, or to none.
+
+Ask every host what it has; take every lock; send the release and rehearse it. Only then end what
+runs, on all hosts, start the release on trial, and wait until every edge of every host is live;
+launchers that can follow the release go on meanwhile. Then keep it everywhere, or go back
+everywhere.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import difflib
+import getpass
+import os
+import time
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
+from tfcompose.foundation.text import counted, duration, listed
+from tfcompose.model.plan.file import read_plan
+from tfcompose.model.plan.fleet import INSTALL, is_fleet_share
+from tfcompose.model.plan.hosts import hosts_of, share_of, without_computer
+from tfcompose.tools.deploy.agent import UNIT
+from tfcompose.tools.deploy.connection import Host, LostError, RefusedError, connected, settings_of
+from tfcompose.tools.deploy.following import can_follow, same_files
+from tfcompose.tools.deploy.release import name_of
+from tfcompose.tools.deploy.unit import Unit
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.plan import Plan, PlanHost
+    from tfcompose.tools.deploy.release import Release
+
+#: A part of a release that is sent at once, in bytes.
+CHUNK = 1_000_000
+#: The plan among a release's files.
+PLAN = "plan.json"
+#: How long a host waits before it says how far it is, in seconds.
+SLICE_S = 3.0
+#: So many names are listed.
+NAMED_AT_MOST = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What is deployed to: the hosts of a plan by name, with their places in the robot file, and how.
+
+    ``is_complete`` says that these are all hosts that have processes; ``clock_limit_s`` is by how
+    much clocks may differ.
+    """
+
+    plan: Plan
+    hosts: Mapping[str, PlanHost]
+    places: Mapping[str, Span]
+    system: bool = False
+    is_complete: bool = True
+    clock_limit_s: float = 0.1
+    timeout_s: float = 60.0
+    waits: bool = True
+
+
+@dataclass(slots=True)
+class Share:
+    """A host while it is deployed to: what it has, and what it is to have.
+
+    ``follows`` says that its launcher can change to the release while it runs.
+    """
+
+    host: Host
+    unit: Unit
+    probe: dict[str, Any]
+    state: dict[str, Any] = field(default_factory=dict)
+    release: Release | None = None
+    goal: str = ""
+    follows: bool = False
+
+    @property
+    def name(self) -> str:
+        """The host's name."""
+        return self.host.name
+
+    @property
+    def wanted(self) -> Release:
+        """The release that it is compared with."""
+        assert self.release is not None, "it is made before anything is compared"  # noqa: S101
+        return self.release
+
+    def described(self) -> str:
+        """Return what the host has, in words."""
+        probe = self.probe
+        version = f"tfcompose {probe['tfcompose']}" if probe["tfcompose"] else "no tfcompose"
+        logout = (
+            "" if probe["lingers"] else ", ends at logout (loginctl enable-linger lets it stay)"
+        )
+        return f"Python {probe['python']}, {version}{logout}"
+
+    def changes(self) -> list[str]:
+        """Return what is to change on the host, one line each; nothing if it runs the release as it is."""
+        if self.release is None:
+            return [f"release {self.state['release']} → {self.goal}"]
+        there, wanted = self.state["files"], self.wanted.manifest
+        words = [("new", wanted.keys() - there.keys()), ("removed", there.keys() - wanted.keys())]
+        words.append(
+            (
+                "changed",
+                {path for path in wanted.keys() & there.keys() if wanted[path] != there[path]},
+            )
+        )
+        lines = [f"{path}: {word}" for word, paths in words for path in sorted(paths)]
+        if self.state["unit"] != self.unit.text():
+            lines.append(f"{self.unit.file}: {'changed' if self.state['unit'] else 'new'}")
+        if not lines and (self.state["unsettled"] or not self.state["active"]):
+            lines.append(f"{self.unit.file}: started")
+        if not lines and not self.state["enabled"]:
+            lines.append(f"{self.unit.file}: enabled")
+        return lines
+
+
+class Rollout:
+    """A deployment to connected hosts. ``report`` is given lines about what is done."""
+
+    def __init__(self, target: Target, shares: list[Share], report: Callable[[str], None]) -> None:
+        self.target = target
+        self.shares = shares
+        self.report = report
+
+    # Before anything changes.
+
+    async def examine(self) -> list[Finding]:
+        """Return what is in the way on the hosts, and apart between them."""
+        offsets = await self._by_name(lambda one: one.host.clock_offset_s())
+        found = [one for share in self.shares for one in self._unfit(share)]
+        found += _clocks_apart(offsets, self.target)
+        found += _settings_apart(self.shares, self.target)
+        for share in self.shares:
+            self.report(
+                f"{share.name}: {share.described()}, clock {offsets[share.name] * 1000:+.1f} ms"
+            )
+        return found
+
+    def _unfit(self, share: Share) -> Iterable[Finding]:
+        probe, at, name = share.probe, share.host.at, share.name
+        for problem in probe["problems"]:
+            yield finding("TF914", f"{name} cannot run the robot: {problem}", at)
+        if probe["tfcompose"] is None and not probe["problems"] and not share.unit.has_wheels:
+            advice = (
+                f"install it there, name its Python, hosts: {{{name}: {{python: FILE}}}}, or give"
+                " --wheels FOLDER"
+            )
+            yield finding(
+                "TF914", f"{name} has no tfcompose for {probe['executable']}", at, help=advice
+            )
+        elif not probe["zenoh"] and not probe["problems"] and not share.unit.has_wheels:
+            for process in self.target.plan.managed:
+                if process.host == name and is_fleet_share(process):
+                    message = (
+                        f"{name} has no eclipse-zenoh for {probe['executable']}, and"
+                        f" {process.name} needs it"
+                    )
+                    yield finding("TF914", message, at, help=f"there: {INSTALL}")
+
+    async def compare(self, release: Release) -> None:
+        """Learn what each host has, and what it would have with this release."""
+        states = await self._by_name(lambda one: one.host.ask("state"))
+        for share in self.shares:
+            share.state = states[share.name]
+            share.release = release.with_text(UNIT, share.unit.text())
+            share.goal = share.release.name
+        await self._decide_who_follows(release.plan)
+
+    async def _decide_who_follows(self, plan: Plan) -> None:
+        """Find out which hosts can go on while they change, which all of them have to allow."""
+        changing = [one for one in self.shares if one.changes() and one.state["release"]]
+        texts = await asyncio.gather(
+            *(one.host.ask("texts", paths=[PLAN], any_size=True) for one in changing)
+        )
+        try:
+            before = [read_plan(some[PLAN], PLAN) for some in texts if some.get(PLAN)]
+        except RejectedError:  # another version's
+            return
+        if len(before) < len(changing) or not all(can_follow(one, plan) for one in before):
+            return
+        for share in changing:
+            share.follows = self._is_sound(share) and same_files(
+                share.state["files"], share.wanted.manifest
+            )
+
+    def _is_sound(self, share: Share) -> bool:
+        """Whether a host runs its release as it was brought there, with all that it starts."""
+        state, robot = share.state, share.state["robot"]
+        if (
+            robot is None
+            or state["failed"]
+            or state["unsettled"]
+            or not state["active"]
+            or state["unit"] != share.unit.text()
+        ):
+            return False
+        late = any(
+            one["failed"] or not one["ready"]
+            for one in robot["processes"]
+            if one["kind"] != "external"
+        )
+        return not late and name_of(state["files"]) == state["release"]
+
+    def strangers(self) -> list[Finding]:
+        """Return which robots run on hosts without having been deployed."""
+        return [
+            finding(
+                "TF914",
+                f"{self.target.plan.robot} runs on {share.name} already, and not as"
+                f" {share.unit.file}: pid {share.state['stranger']}",
+                share.host.at,
+                help=f"there: tfcompose down --robot {share.unit.name}",
+            )
+            for share in self.shares
+            if share.state["stranger"]
+        ]
+
+    def changes(self) -> dict[str, list[str]]:
+        """Return what is to change, by host, one line each; no host that has its goal, and runs it."""
+        found = {share.name: share.changes() for share in self.shares}
+        return {name: lines for name, lines in found.items() if lines}
+
+    def described(self) -> str:
+        """Return which releases run where, in words."""
+        return listed(
+            [f"{share.name} runs release {share.state['release']}" for share in self.shares],
+            NAMED_AT_MOST,
+        )
+
+    async def difference(self) -> list[str]:
+        """Return the lines of a unified difference of all texts that would change."""
+        lines: list[str] = []
+        for share in self.shares:
+            there, wanted = share.state["files"], share.wanted.manifest
+            paths = sorted(
+                path
+                for path in there.keys() | wanted.keys()
+                if there.get(path) != wanted.get(path)
+            )
+            texts = await share.host.ask("texts", paths=[path for path in paths if path in there])
+            for path in paths:
+                before, after = texts.get(path), share.wanted.texts.get(path)
+                if before is None and after is None:
+                    lines.append(f"{share.name}/{path}: differs, and is no text")
+                    continue
+                names = (f"{share.name}/{path} (there)", f"{share.name}/{path} (here)")
+                lines += difflib.unified_diff(
+                    (before or "").splitlines(), (after or "").splitlines(), *names, lineterm=""
+                )
+        return lines
+
+    # The change.
+
+    async def lock(self) -> None:
+        """Take the locks of all hosts, in one order for everybody.
+
+        Raises:
+            RejectedError: with who holds one.
+        """
+        who = f"{getpass.getuser()}@{os.uname().nodename}, pid {os.getpid()}"
+        for share in sorted(self.shares, key=lambda one: one.name):
+            answer = await self._ask(share, "take_lock", who=who)
+            if answer["holder"]:
+                message = f"{share.name} is being deployed to by {answer['holder']}"
+                raise RejectedError(
+                    [finding("TF915", message, share.host.at, help="wait until that has ended")]
+                )
+
+    async def send(self) -> None:
+        """Bring the release to the hosts that do not have it, and rehearse it there.
+
+        Raises:
+            RejectedError: with what keeps it from being started; nothing runs otherwise than
+            before.
+        """
+        await self._all(self._send)
+        found = [one for some in await self._all(self._rehearse) for one in some]
+        if found:
+            await self._all(lambda one: self._ask(one, "discard", release=one.wanted.name))
+            raise RejectedError(found)
+
+    async def _send(self, share: Share) -> None:
+        release = share.wanted
+        if share.state["release"] == release.name and share.state["files"] == release.manifest:
+            return
+        size = 0
+        rest = b""
+        for part in release.archive():
+            rest += part
+            while len(rest) >= CHUNK:
+                await self._ask(share, "chunk", data=base64.b64encode(rest[:CHUNK]).decode())
+                size, rest = size + CHUNK, rest[CHUNK:]
+        await self._ask(share, "chunk", data=base64.b64encode(rest).decode())
+        await self._ask(
+            share, "unpack", timeout_s=1200.0, release=release.name, wheels=release.has_wheels
+        )
+        files = counted(len(release.manifest), "file")
+        self.report(
+            f"{share.name}: release {release.name}, {files}, {(size + len(rest)) / 1e6:.1f} MB"
+        )
+
+    async def _rehearse(self, share: Share) -> list[Finding]:
+        found = await self._ask(share, "rehearse", release=share.wanted.name, host=share.name)
+        place = share.host.at
+        return [
+            finding(one["code"], f"{share.name}: {one['message']}", place, help=one["help"])
+            for one in found
+        ]
+
+    async def activate(self) -> str:
+        """Start each host's goal on trial, and keep it once everything is live; return what there is to say.
+
+        A host that has its goal already, and runs it, goes on; on one that can follow, only what
+        is different starts again.
+
+        Raises:
+            RejectedError: with what is missing, or which host was lost, and what the others went
+            back to.
+        """
+        begun = time.monotonic()
+        changing = [one for one in self.shares if one.changes()]
+        anew = [one for one in changing if not one.follows]
+        try:
+            await self._all(lambda one: self._ask(one, "stop"), anew)
+            await self._all(lambda one: self._ask(one, "start", release=one.goal), anew)
+            await self._all(self._follow, [one for one in changing if one.follows])
+            live = await self._until_live(begun) if self.target.waits else "started"
+            await self._all(lambda one: self._ask(one, "commit", release=one.goal), changing)
+        except RejectedError as error:
+            first, *others = error.findings
+            notes = (*first.notes, *await self._back(changing))
+            raise RejectedError([replace(first, notes=notes), *others]) from None
+        except BaseException:
+            await self._back(changing)
+            raise
+        await self._all(self._settle, changing)
+        return f"{live} after {duration(time.monotonic() - begun)}"
+
+    async def _follow(self, share: Share) -> None:
+        answer = await self._ask(share, "follow", release=share.goal, host=share.name)
+        self.report(f"{share.name}: {answer}")
+
+    async def _settle(self, share: Share) -> None:
+        try:
+            await self._ask(share, "settle")
+        except RejectedError as error:
+            notes = (Note("everything was live, and the other hosts keep the release"),)
+            advice = "deploy again once it is back: it may have returned to the release before"
+            raise RejectedError([replace(error.findings[0], notes=notes, help=advice)]) from None
+
+    async def _until_live(self, begun: float) -> str:
+        end = begun + self.target.timeout_s
+        while True:
+            left = end - time.monotonic()
+            seconds = max(min(SLICE_S, left), 0.1)
+            states = await self._all(self._waiting(seconds))
+            missing = [one for some in map(self._missing, self.shares, states) for one in some]
+            if not missing:
+                hosts = listed([one.name for one in self.shares], NAMED_AT_MOST)
+                return f"{counted(len(self._edges()), 'edge')} live on {hosts}"
+            if left <= seconds or any(state["failed"] for state in states):
+                raise RejectedError(missing)
+
+    def _waiting(self, seconds: float) -> Callable[[Share], Awaitable[Any]]:
+        return lambda one: self._ask(one, "wait", seconds=seconds)
+
+    def not_live(self) -> list[Finding]:
+        """Return what was not live on the hosts when they were compared."""
+        return [one for share in self.shares for one in self._missing(share, share.state)]
+
+    async def plan_return(self) -> None:
+        """Let the goal of each host be the release before.
+
+        Raises:
+            RejectedError: if a host has none.
+        """
+        states = await self._by_name(lambda one: one.host.ask("state"))
+        found = []
+        for share in self.shares:
+            share.state, share.goal = states[share.name], states[share.name]["previous"] or ""
+            if not share.goal:
+                found.append(
+                    finding("TF912", f"{share.name} has no release before this one", share.host.at)
+                )
+        if found:
+            raise RejectedError(found)
+
+    def _edges(self) -> list[str]:
+        plan, names = self.target.plan, {one.name for one in self.shares}
+        own = {process.name for process in plan.processes if process.host in names}
+        return [edge.name for edge in plan.edges if self.target.is_complete or edge.owner in own]
+
+    def _missing(self, share: Share, state: dict[str, Any]) -> list[Finding]:
+        """Return what is not as it has to be on a host, as its launcher says; for some of the hosts, of theirs."""
+        plan, robot, at = self.target.plan, state["robot"], share.host.at
+        notes = [Note(line) for line in state["lines"]]
+        if robot is None or state["failed"]:
+            what = "ends again and again" if state["failed"] else "does not run"
+            return [finding("TF917", f"{plan.robot} {what} on {share.name}", at, notes=notes)]
+        expected = set(self._edges())
+        missing = [
+            edge
+            for edge in dict.fromkeys((*robot["missing"], *robot["silent"]))
+            if edge in expected
+        ]
+        late = [
+            one
+            for one in robot["processes"]
+            if one["kind"] != "external" and (one["failed"] or not one["ready"])
+        ]
+        found = []
+        if missing:
+            hosts = {edge.name: plan.process(edge.owner).host or edge.owner for edge in plan.edges}
+            named = [
+                f"{edge} (of {hosts[edge]})" if hosts[edge] != share.name else edge
+                for edge in missing
+            ]
+            message = f"{len(missing)} of {len(expected)} edges are not live on {share.name}: "
+            found.append(finding("TF917", message + listed(named, NAMED_AT_MOST), at))
+        if late:
+            named = [
+                f"{one['name']} ({one['detail'] or one['waits'] or one['state']})" for one in late
+            ]
+            found.append(
+                finding("TF917", f"not ready on {share.name}: {listed(named, NAMED_AT_MOST)}", at)
+            )
+        return found
+
+    async def _back(self, shares: Sequence[Share]) -> list[Note]:
+        """Let these hosts go back, whatever becomes of the others, and return what each says."""
+        answers = await asyncio.gather(
+            *(one.host.ask("back") for one in shares), return_exceptions=True
+        )
+        notes = []
+        for share, answer in zip(shares, answers, strict=True):
+            if isinstance(answer, BaseException):
+                notes.append(
+                    Note(
+                        f"{share.name} {answer}; it goes back by itself when it can, or when it"
+                        " boots"
+                    )
+                )
+            elif answer is None:
+                continue
+            elif answer["release"]:
+                runs = "and runs it" if answer["active"] else "which does not run, as before"
+                notes.append(Note(f"{share.name} is back on release {answer['release']}, {runs}"))
+            else:
+                notes.append(Note(f"{share.name} had no release before, and runs nothing"))
+        return notes
+
+    # How hosts are asked.
+
+    async def _ask(self, share: Share, request: str, **arguments: Any) -> Any:
+        """Return the answer.
+
+        Raises:
+            RejectedError: if the host is lost, or cannot do it.
+        """
+        try:
+            return await share.host.ask(request, **arguments)
+        except LostError as error:
+            raise RejectedError(
+                [finding("TF917", f"{share.name} {error}", share.host.at)]
+            ) from None
+        except RefusedError as error:
+            raise RejectedError(
+                [finding("TF917", f"{share.name}: {error}", share.host.at)]
+            ) from None
+
+    async def _all(
+        self, do: Callable[[Share], Awaitable[Any]], shares: Sequence[Share] | None = None
+    ) -> list[Any]:
+        """Do it on all hosts, or these, at once, and return the answers.
+
+        Raises:
+            RejectedError: with what went wrong on any host, once all are done with it.
+        """
+        answers = await asyncio.gather(
+            *(map(do, self.shares if shares is None else shares)), return_exceptions=True
+        )
+        found: list[Finding] = []
+        for answer in answers:
+            if isinstance(answer, RejectedError):
+                found += answer.findings
+            elif isinstance(answer, BaseException):
+                raise answer
+        if found:
+            raise RejectedError(found)
+        return answers
+
+    async def _by_name(self, do: Callable[[Share], Awaitable[Any]]) -> dict[str, Any]:
+        async def safe(share: Share) -> Any:
+            try:
+                return await do(share)
+            except (LostError, RefusedError) as error:
+                raise RejectedError(
+                    [finding("TF913", f"{share.name} {error}", share.host.at)]
+                ) from None
+
+        answers = await self._all(safe)
+        return {share.name: answer for share, answer in zip(self.shares, answers, strict=True)}
+
+
+async def _probed(host: Host) -> dict[str, Any]:
+    try:
+        probe: dict[str, Any] = await host.ask("probe")
+    except (LostError, RefusedError) as error:
+        raise RejectedError([finding("TF913", f"{host.name} {error}", host.at)]) from None
+    return probe
+
+
+def target_of(
+    plan: Plan, names: Sequence[str], places: Mapping[str, Span], **options: Any
+) -> Target:
+    """Return what is deployed to: all hosts that have processes, or the named ones; ``options`` are a ``Target``'s.
+
+    Raises:
+        RejectedError: with what the robot file lacks.
+    """
+    used = [name for name in plan.hosts if name in hosts_of(plan)]
+    if not plan.hosts:
+        advice = "hosts: {NAME: {ssh: user@address}}, and processes: {static: {host: NAME}}"
+        raise RejectedError(
+            [finding("TF912", f"{plan.robot} has no hosts to deploy to", None, help=advice)]
+        )
+    if nowhere := without_computer(plan):
+        message = f"{listed(nowhere, NAMED_AT_MOST)} would run on no host"
+        advice = (
+            "what names no host runs where static does: processes: {static: {host:"
+            f" {next(iter(plan.hosts))}}}}}"
+        )
+        raise RejectedError([finding("TF912", message, None, help=advice)])
+    found = []
+    for name in names:
+        if name not in used:
+            known = f"there is {', '.join(used)}"
+            message = f"no process of {plan.robot} runs on a host {name}"
+            found.append(finding("TF819", message, None, help=did_you_mean(name, used, known)))
+    shares = [share_of(plan, name, "") for name in used]
+    found += [share for share in shares if isinstance(share, Finding)]
+    if found:
+        raise RejectedError(found)
+    chosen = {name: plan.hosts[name] for name in used if not names or name in names}
+    return Target(plan, chosen, places, is_complete=len(chosen) == len(used), **options)
+
+
+def _clocks_apart(offsets: Mapping[str, float], target: Target) -> Iterable[Finding]:
+    """Yield a finding if clocks of hosts differ by more than may be."""
+    if len(offsets) < 2:  # noqa: PLR2004 (a difference needs two)
+        return
+    first, last = (
+        min(offsets, key=lambda name: offsets[name]),
+        max(offsets, key=lambda name: offsets[name]),
+    )
+    apart_s = offsets[last] - offsets[first]
+    if apart_s > target.clock_limit_s:
+        message = f"the clock of {last} is {duration(apart_s)} ahead of that of {first}"
+        advice = (
+            "bring the clocks together (chrony, or timedatectl set-ntp true), or --clock-limit S"
+            " allows more"
+        )
+        yield finding("TF834", message, target.places.get(last), help=advice)
+
+
+#: What nodes of one robot must agree about, by the variable that decides it, and what it is
+#: without.
+_AGREED = {"ROS_DOMAIN_ID": "0", "RMW_IMPLEMENTATION": "the default", "ROS_LOCALHOST_ONLY": "0"}
+#: The key that decides it for all hosts.
+_HOLDS = {
+    "ROS_DOMAIN_ID": "ros: {domain_id: N} holds for all hosts",
+    "RMW_IMPLEMENTATION": "ros: {rmw: fastdds}, or another, holds for all hosts",
+}
+
+
+def _settings_apart(shares: Sequence[Share], target: Target) -> Iterable[Finding]:
+    """Yield what keeps the hosts' nodes from finding each other: another domain, middleware, or no discovery."""
+    ros = target.plan.ros
+    given = {"ROS_DOMAIN_ID": ros.domain_id, "RMW_IMPLEMENTATION": ros.rmw}
+    for variable, default in _AGREED.items():
+        if given.get(variable) is not None:
+            continue
+        values = {share.name: share.probe["env"].get(variable, default) for share in shares}
+        if len(set(values.values())) > 1:
+            words = ", ".join(f"{value} on {name}" for name, value in values.items())
+            yield finding(
+                "TF916",
+                f"{variable} is {words}",
+                None,
+                help=_HOLDS.get(variable, "set it alike in setup"),
+            )
+    if ros.rmw == "zenoh" or len({share.probe["machine"] for share in shares}) == 1:
+        return  # a router connects them; or all are one computer
+    range_of = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    reaches = {
+        share.name: (ros.discovery or share.probe["env"].get(range_of, "subnet")).lower()
+        for share in shares
+    }
+    for reach in ("localhost", "off"):
+        if kept := [name for name, one in reaches.items() if one == reach]:
+            message = (
+                f"discovery: {reach} keeps nodes from those of other hosts on"
+                f" {listed(kept, NAMED_AT_MOST)}"
+            )
+            yield finding("TF916", message, None, help="ros: {discovery: subnet}")
+
+
+@asynccontextmanager
+async def reached(
+    target: Target,
+    has_wheels: bool,  # noqa: FBT001
+    report: Callable[[str], None],
+) -> AsyncIterator[Rollout]:
+    """Connect to all hosts of the target at once.
+
+    Raises:
+        RejectedError: with the hosts that cannot be reached, or run no agent.
+    """
+    plan = target.plan
+    connecting = []
+    for name, host in target.hosts.items():
+        settings = settings_of(plan.robot, name, host, system=target.system)
+        connecting.append(connected(name, host, settings, target.places.get(name)))
+    done = await asyncio.gather(*connecting)
+    hosts = [one for one in done if isinstance(one, Host)]
+    try:
+        if found := [one for one in done if isinstance(one, Finding)]:
+            raise RejectedError(found)
+        rollout = Rollout(target, [], report)
+        for there, probe in zip(
+            hosts, await asyncio.gather(*(_probed(host) for host in hosts)), strict=True
+        ):
+            unit = Unit(
+                f"{plan.robot}.{there.name}",
+                plan.robot,
+                there.name,
+                probe["base"],
+                probe["executable"],
+                tuple(probe["setup"]),
+                target.system,
+                has_wheels,
+            )
+            rollout.shares.append(Share(there, unit, probe))
+        yield rollout
+    finally:
+        await asyncio.gather(*(host.close() for host in hosts), return_exceptions=True)

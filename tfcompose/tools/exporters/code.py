@@ -1,0 +1,57 @@
+"""Python source in short lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+#: No line is longer, unless a single word is.
+_WIDTH = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """An expression in brackets: what is before its parts, the parts, and what is behind them."""
+
+    begin: str
+    parts: tuple[Code | str, ...]
+    end: str
+
+    def __str__(self) -> str:
+        return f"{self.begin}{', '.join(map(str, self.parts))}{self.end}"
+
+    def lines(self, indent: str = "", end: str = "") -> Iterator[str]:
+        """Yield it in lines, in one if that is short enough; each part on a line of its own otherwise."""
+        if len(indent) + len(str(self)) + len(end) <= _WIDTH:
+            yield f"{indent}{self}{end}"
+            return
+        yield f"{indent}{self.begin}"
+        for part in self.parts:
+            yield from (
+                [f"{indent}    {part},"]
+                if isinstance(part, str)
+                else part.lines(f"{indent}    ", ",")
+            )
+        yield f"{indent}{self.end}{end}"
+
+
+def call(name: str, *parts: Code | str) -> Code:
+    """Return the call of a function."""
+    return Code(f"{name}(", parts, ")")
+
+
+def items(parts: Iterable[Code | str], keyword: str = "") -> Code:
+    """Return a list, or a keyword with one."""
+    return Code(f"{keyword}=[" if keyword else "[", tuple(parts), "]")
+
+
+def keyword(name: str, value: Code | str) -> Code | str:
+    """Return a keyword with its value."""
+    return (
+        f"{name}={value}"
+        if isinstance(value, str)
+        else Code(f"{name}={value.begin}", value.parts, value.end)
+    )

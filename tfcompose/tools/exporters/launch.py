@@ -1,0 +1,726 @@
+"""A Python launch file: stock nodes for what is fixed and jointed, and each process as a node of its own."""
+
+from __future__ import annotations
+
+import graphlib
+import io
+import json
+import re
+import shlex
+import tokenize
+from itertools import pairwise
+from keyword import iskeyword
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+from tfcompose.foundation.numbers import number
+from tfcompose.model.files import File
+from tfcompose.model.plan.middleware import middleware_variables
+from tfcompose.model.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
+from tfcompose.tools.exporters.code import Code, call, items, keyword
+from tfcompose.tools.exporters.launch_values import (
+    LaunchValues,
+    condition_code,
+    parameter_code,
+    text_code,
+)
+from tfcompose.tools.exporters.supervisors import plain_name, waiting_s
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator, Mapping
+
+    from tfcompose.model.plan import Plan, PlanEdge, PlanProcess
+    from tfcompose.tools.exporters.launch_values import Text
+    from tfcompose.tools.exporters.supervisors import Machine
+
+_EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
+_LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
+_PLACEHOLDER = re.compile(r"\$\{(?:executable:|launch:|plan\})")
+_MOVED = ("-r", "--params-file")
+#: What the launch file needs of which module.
+_IMPORTS = {
+    "launch.actions": (
+        "DeclareLaunchArgument", "EmitEvent", "ExecuteProcess", "GroupAction", "IncludeLaunchDescription",
+        "OpaqueFunction", "RegisterEventHandler", "SetEnvironmentVariable", "Shutdown", "TimerAction",
+    ),
+    "launch.conditions": ("IfCondition", "UnlessCondition"),
+    "launch.event_handlers": ("OnProcessExit", "OnProcessStart"),
+    "launch.events": ("matches_action",),
+    "launch.launch_description_sources": ("AnyLaunchDescriptionSource",),
+    "launch.substitutions": (
+        "AndSubstitution", "EnvironmentVariable", "EqualsSubstitution", "LaunchConfiguration",
+        "NotEqualsSubstitution", "NotSubstitution", "OrSubstitution", "PythonExpression",
+    ),
+    "launch_ros.actions": (
+        "ComposableNodeContainer", "LifecycleNode", "LoadComposableNodes", "Node", "PushRosNamespace", "SetParameter",
+        "SetRemap",
+    ),
+    "launch_ros.descriptions": ("ComposableNode",),
+    "launch_ros.event_handlers": ("OnStateTransition",),
+    "launch_ros.events.lifecycle": ("ChangeState",),
+    "launch_ros.parameter_descriptions": ("ParameterValue",),
+    "lifecycle_msgs.msg": ("Transition",),
+}  # fmt: skip
+#: Functions that a launch file has where it calls them.
+_HELPERS = {
+    "process": (
+        '''
+def process(name, **more):
+    """One of tfcompose's own, or one that only the plan knows how to start."""
+    command = [sys.executable, "-m", "tfcompose.launcher.exec", str(BUILD / "plan.json"), name]
+    return ExecuteProcess(cmd=command, name=name, output="screen", **more)
+'''
+    ),
+    "description": (
+        '''
+def description():
+    """What robot_state_publisher is given."""
+    return ParameterValue((BUILD / "robot.urdf").read_text(encoding="utf-8"), value_type=str)
+'''
+    ),
+    "fixed": (
+        '''
+def fixed(name, parent, child, xyz, quat_xyzw, **more):
+    """A fixed edge that is not in the URDF."""
+    keys = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
+    pose = [word for key, value in zip(keys, (*xyz, *quat_xyzw)) for word in (key, str(value))]
+    ends = ["--frame-id", parent, "--child-frame-id", child]
+    program = {"package": "tf2_ros", "executable": "static_transform_publisher"}
+    return Node(**program, name=name, arguments=pose + ends, output="screen", **more)
+'''
+    ),
+    "managed": (
+        '''
+def change(node, transition):
+    return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(node), transition_id=transition))
+
+
+def managed(node, active):
+    """The node, which is configured when it was started, and activated once it is inactive."""
+    configure = change(node, Transition.TRANSITION_CONFIGURE)
+    yield node
+    if active:
+        activate = change(node, Transition.TRANSITION_ACTIVATE)
+        then = OnStateTransition(
+            target_lifecycle_node=node, start_state="configuring", goal_state="inactive", entities=[activate]
+        )
+        yield RegisterEventHandler(then)
+    yield RegisterEventHandler(OnProcessStart(target_action=node, on_start=[configure]))
+'''
+    ),
+    "included": (
+        '''
+def included(package, name, arguments, settings, **more):
+    """A package's launch file, in its share folder or anywhere below, in a group with what holds for all its nodes."""
+
+    def found(context):
+        share = Path(get_package_share_directory(package))
+        direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
+        file = (direct or sorted(share.rglob(name)) or [share / name])[0]
+        return [IncludeLaunchDescription(AnyLaunchDescriptionSource(str(file)), launch_arguments=arguments)]
+
+    return GroupAction([*settings, OpaqueFunction(function=found)], **more)
+'''
+    ),
+}
+
+
+def launch(
+    plan: Plan, machine: Machine, urdf: str, values: LaunchValues | None = None
+) -> tuple[tuple[File, ...], list[str]]:
+    """Return the launch file, and what it does not keep of the plan. ``urdf`` is the text of the plan's robot.urdf.
+
+    A stock robot_state_publisher sends what that URDF holds as fixed or jointed, and a
+    static_transform_publisher each fixed edge elsewhere; where the URDF is not all of what
+    tfcompose's own publishers send, these are started instead. ``values`` are what the launch file
+    decides itself.
+    """
+    export = _Export(plan, values or LaunchValues())
+    stock = _stock(plan, urdf)
+    actions = list(export.actions(stock))
+    text = _text(plan, machine, actions, export.named)
+    return (File(f"{plain_name(plan.robot)}.launch.py", text),), export.gaps
+
+
+def _text(plan: Plan, machine: Machine, actions: list[Code], named: Mapping[str, Code]) -> str:
+    """Return the launch file: what it imports, the functions that it calls, and its actions.
+
+    ``named`` are actions that others refer to, by their variables' names.
+    """
+    body = "".join(
+        f"{line}\n" for name, action in named.items() for line in _assigned(name, action)
+    )
+    body += "    return LaunchDescription([\n"
+    body += (
+        "".join(f"{line}\n" for action in actions for line in action.lines(" " * 8, ","))
+        + "    ])\n"
+    )
+    helpers = "".join(
+        f"\n{text}" for name, text in _HELPERS.items() if re.search(rf"\b{name}\(", body)
+    )
+    used = set(re.findall(r"\w+", helpers + body))
+    lines = [f'"""The TF tree and the processes of {plan.robot}, for ros2 launch."""', ""]
+    lines += ["import sys"] if "sys" in used else []
+    lines += ["from pathlib import Path", ""]
+    if "get_package_share_directory" in used:
+        lines.append("from ament_index_python.packages import get_package_share_directory")
+    lines.append("from launch import LaunchDescription")
+    for module, names in _IMPORTS.items():
+        several = [name for name in names if name in used]
+        imported = Code(f"from {module} import ", tuple(several), "")
+        if len(str(imported)) > 100:  # noqa: PLR2004 (as long as lines of code are)
+            imported = Code(f"from {module} import (", tuple(several), ")")
+        lines += imported.lines() if several else []
+    for name in ("BUILD", "HERE"):
+        if name in used:
+            folder = f"Path(__file__).resolve().parent / {machine.folder!r}"
+            lines += [
+                "",
+                (
+                    f"BUILD = ({folder}).resolve()"
+                    if name == "BUILD"
+                    else "HERE = Path(__file__).resolve().parent"
+                ),
+            ]
+    begin = "\n\ndef generate_launch_description():\n"
+    return _in_double_quotes(
+        "\n".join(lines).replace("\n\nHERE", "\nHERE") + f"\n{helpers}{begin}{body}"
+    )
+
+
+def _in_double_quotes(text: str) -> str:
+    """Return Python's source with double quotes around all texts that hold none."""
+    lines = text.splitlines(keepends=True)
+    for token in reversed(list(tokenize.generate_tokens(io.StringIO(text).readline))):
+        (line, begin), (last, end) = token.start, token.end
+        if (
+            token.type == tokenize.STRING
+            and token.string[0] == "'"
+            and line == last
+            and '"' not in token.string
+        ):
+            inside = token.string[1:-1]
+            lines[line - 1] = f'{lines[line - 1][:begin]}"{inside}"{lines[line - 1][end:]}'
+    return "".join(lines)
+
+
+def _assigned(name: str, action: Code) -> Iterator[str]:
+    return Code(f"{name} = {action.begin}", action.parts, action.end).lines("    ")
+
+
+class _Export:
+    """The actions of a launch file; ``gaps`` are what they do not keep, ``named`` those that others refer to."""
+
+    def __init__(self, plan: Plan, values: LaunchValues) -> None:
+        self.plan, self.values = plan, values
+        self.processes = (*plan.managed, *values.more)
+        self.known = {process.name: process for process in (*plan.processes, *values.more)}
+        self.gaps: list[str] = []
+        self.named: dict[str, Code] = {}
+        self._variables: dict[str, str] = {}
+        self._delays_s = _delays_s(self.known)
+
+    def actions(self, stock: list[PlanEdge] | None) -> Iterator[Code]:
+        """Yield the actions in order; ``stock`` are the edges of static_transform_publishers, None without such."""
+        plan = self.plan
+        yield from (argument.code() for argument in self.values.arguments)
+        yield from (
+            call("SetEnvironmentVariable", repr(name), repr(value))
+            for name, value in _variables(plan)
+        )
+        if stock is not None:
+            names = static_names(plan)
+            yield from (
+                _state_publisher(plan),
+                *(_fixed(plan, edge, names[edge.child]) for edge in stock),
+            )
+            self.gaps.append(
+                "robot_description is robot.urdf, in which edges of other owners are floating"
+                " joints"
+            )
+        for name in self._awaited(stock):
+            self._variables[name] = _variable_name(name, self._variables.values())
+        for process in self.processes:
+            if process.kind == "guard":
+                self.gaps.append("the guard is left out: it belongs to tfcompose up")
+                continue
+            if process.kind in OWN_KINDS and stock is not None:
+                continue
+            before = self._before(process)
+            self._waits(process, before[:1])
+            self.gaps += self._unlike(process)
+            if self._comes_with_container(process):
+                continue
+            action = self._started(process)
+            if process.name in self._variables:
+                self.named[self._variables[process.name]] = action
+                action = Code(self._variables[process.name], (), "")
+            delay_s = self._delays_s[process.name]
+            action = (
+                call("TimerAction", f"period={delay_s!r}", items([action], "actions"))
+                if delay_s
+                else action
+            )
+            if before:
+                ended = f"target_action={self._variables[before[0]]}"
+                action = call(
+                    "RegisterEventHandler",
+                    call("OnProcessExit", ended, items([action], "on_exit")),
+                )
+            yield action
+
+    def _before(self, process: PlanProcess) -> list[str]:
+        """Return the processes for whose end it waits."""
+        return [
+            name
+            for name, what in process.after.items()
+            if what == "done" and name in self._variables
+        ]
+
+    def _comes_with_container(self, process: PlanProcess) -> bool:
+        """Return whether the action of its container loads it: it waits for nothing else, and launch starts that."""
+        container = self.known.get(process.component.container) if process.component else None
+        return (
+            container is not None
+            and container.kind == "run"
+            and _is_node(container)
+            and not self._before(process)
+            and self._delays_s[process.name] == self._delays_s[container.name]
+        )
+
+    def _awaited(self, stock: list[PlanEdge] | None) -> list[str]:
+        """Return the processes for whose end others wait and which are actions of their own."""
+        own = set() if stock is None else OWN_KINDS
+        names = {
+            name
+            for process in self.processes
+            for name, what in process.after.items()
+            if what == "done"
+        }
+        return [
+            process.name for process in self.processes
+            if process.name in names and process.kind not in {"guard", *own}
+            and not _is_launch(process) and not process.lifecycle
+        ]  # fmt: skip
+
+    def _waits(self, process: PlanProcess, before: list[str]) -> None:
+        """Say for what the process does not wait as it does under ``up``."""
+        container = process.component.container if process.component else ""
+        rest = [
+            name for name, what in process.after.items()
+            if name in self.known and name not in {*before, container} and not waiting_s(self.known[name], what)
+        ]  # fmt: skip
+        if rest:
+            self.gaps.append(
+                f"{process.name} does not wait for {', '.join(rest)}: launch knows no readiness"
+            )
+        self.gaps += [f"{process.name} is started also when {name} fails" for name in before]
+
+    def _texts_of(self, process: PlanProcess, place: str) -> dict[str, Text]:
+        """Return the texts of a place, args, env, params or remap, that the launch file makes itself."""
+        several = self.values.texts.get(process.name, {})
+        return {
+            key.removeprefix(f"{place}."): text
+            for key, text in several.items()
+            if key.startswith(f"{place}.")
+        }
+
+    def _condition(self, process: PlanProcess) -> list[Code | str]:
+        expression = self.values.conditions.get(process.name)
+        return (
+            [keyword("condition", condition_code(expression, self.values.kinds))]
+            if expression
+            else []
+        )
+
+    def _unlike(self, process: PlanProcess) -> Iterator[str]:
+        """Yield what launch does otherwise with a process."""
+        yield from _unlike(process)
+        loads = [one.name for one in self._loaded_by(process)]
+        if loads and process.restart != "no":
+            yield (
+                f"when {process.name} is started again, it has none of its components:"
+                f" {', '.join(loads)}"
+            )
+
+    def _loaded_by(self, container: PlanProcess) -> list[PlanProcess]:
+        return [
+            one
+            for one in self.processes
+            if one.component and one.component.container == container.name
+        ]
+
+    def _started(self, process: PlanProcess) -> Code:
+        if process.component:
+            container = self.known[process.component.container].nodes[0]
+            several = items([self._component(process)], "composable_node_descriptions")
+            return call(
+                "LoadComposableNodes",
+                f"target_container={container!r}",
+                several,
+                *self._condition(process),
+            )
+        if _is_launch(process):
+            return self._included(process)
+        delay = 1.0 if process.restart_delay is None else process.restart_delay
+        again = [] if process.restart == "no" else ["respawn=True", f"respawn_delay={delay}"]
+        again += (
+            [f"respawn_max_retries={process.max_restarts}"]
+            if again and process.max_restarts is not None
+            else []
+        )
+        ends = ("on_exit=Shutdown()",) if process.required else ()
+        more = [*again, *ends, *self._condition(process)]
+        if _is_node(process):
+            return self._node(process, more)
+        if _is_command(process):
+            words = self._filled(process, process.argv)
+            for index, text in self._texts_of(process, "args").items():
+                words[int(index)] = text_code(text)
+            run = [items(words, "cmd"), f"name={process.name!r}", *self._surroundings(process)]
+            return call("ExecuteProcess", *run, *more)
+        return call("process", repr(process.name), *more)
+
+    def _file(self, process: PlanProcess) -> str:
+        """Return Python that gives the process's parameter file."""
+        return f"{'HERE' if process in self.values.more else 'BUILD'} / {process.params_file!r}"
+
+    def _filled(self, process: PlanProcess, words: Iterable[str]) -> list[Code | str]:
+        return [_filled(word, self._file(process)) for word in words]
+
+    def _environment(self, process: PlanProcess) -> dict[str, Code | str]:
+        """Return the process's variables, as Python."""
+        env: dict[str, Code | str] = {
+            name: _filled(value, self._file(process)) for name, value in process.env.items()
+        }  # fmt: skip
+        return env | {
+            name: text_code(text) for name, text in self._texts_of(process, "env").items()
+        }
+
+    def _surroundings(self, process: PlanProcess) -> Iterator[Code | str]:
+        """Yield the keywords that any process takes."""
+        env = self._environment(process)
+        if process.cwd is not None:
+            yield f"cwd={_filled(process.cwd, '')}"
+        if env:
+            yield _mapping(env, "additional_env")
+        if process.prefix:
+            yield f"prefix={shlex.join(process.prefix)!r}"
+        stop = process.stop
+        kill_timeout_s = stop.timeout_s if stop.kill_timeout_s is None else stop.kill_timeout_s
+        for word, value in (("sigterm", stop.timeout_s), ("sigkill", kill_timeout_s)):
+            if value is not None:
+                yield f"{word}_timeout={number(value)!r}"
+        if process.emulate_tty:
+            yield "emulate_tty=True"
+        yield f"output={_OUTPUTS[process.output]}"
+
+    def _node(self, process: PlanProcess, more: list[Code | str]) -> Code:
+        package = _EXECUTABLE.fullmatch(process.argv[0])
+        own, ros_words = _rest(process)
+        words = self._filled(process, own)
+        for index, text in self._texts_of(process, "args").items():
+            words[int(index)] = text_code(text)
+        texts = {
+            name: parameter_code(text) for name, text in self._texts_of(process, "params").items()
+        }
+        given: list[Code | str] = (
+            [f"str({self._file(process)})"] if "--params-file" in process.argv else []
+        )
+        given += [_mapping(texts)] if texts else []
+        named = (
+            []
+            if process.nodes[0].endswith(f"/{process.name}")
+            else [f"exec_name={process.name!r}"]
+        )
+        parts: list[Code | str] = [
+            f"package={package[1]!r}" if package else "", f"executable={package[2]!r}" if package else "",
+            *_named(process), *named, *self._remapped(process),
+            *([items(words, "arguments")] if words else []),
+            *([items(self._filled(process, ros_words), "ros_arguments")] if ros_words else []),
+            *([items(given, "parameters")] if given else []),
+            *self._surroundings(process), *more,
+        ]  # fmt: skip
+        if loaded := self._loaded_by(process):
+            components = [
+                self._component(one) for one in loaded if self._comes_with_container(one)
+            ]
+            return call(
+                "ComposableNodeContainer",
+                *parts,
+                items(components, "composable_node_descriptions"),
+            )
+        state = process.lifecycle.get(process.nodes[0])
+        if not state:
+            return call("Node", *parts)
+        return call("*managed", call("LifecycleNode", *parts), f"active={state == 'active'}")
+
+    def _component(self, process: PlanProcess) -> Code:
+        """Return the description of a component; its condition is here if its container's action loads it."""
+        if process.component is None:
+            raise ValueError(f"{process.name} is no component")
+        found = process.component
+        params = {name: self._value(process, value) for name, value in found.params.items()}
+        params |= {
+            name: parameter_code(text) for name, text in self._texts_of(process, "params").items()
+        }
+        extra = {name: repr(value) for name, value in found.extra_arguments.items()}
+        also, conditions = self._comes_with_container(process), self.values.conditions
+        needed = also and conditions.get(process.name) != conditions.get(found.container)
+        condition = self._condition(process) if needed else []
+        return call(
+            "ComposableNode", f"package={found.package!r}", f"plugin={found.plugin!r}", *_named(process),
+            *self._remapped(process), *([items([_mapping(params)], "parameters")] if params else []),
+            *([items([_mapping(extra)], "extra_arguments")] if extra else []), *condition,
+        )  # fmt: skip
+
+    def _value(self, process: PlanProcess, value: Any) -> Code | str:
+        if isinstance(value, list):
+            return items([self._value(process, one) for one in value])
+        return _filled(value, self._file(process)) if isinstance(value, str) else repr(value)
+
+    def _remapped(self, process: PlanProcess) -> Iterator[Code]:
+        remap: dict[str, Code | str] = {old: repr(new) for old, new in process.remap.items()}
+        remap |= {old: text_code(text) for old, text in self._texts_of(process, "remap").items()}
+        if remap:
+            yield items((f"({old!r}, {new})" for old, new in remap.items()), "remappings")
+
+    def _included(self, process: PlanProcess) -> Code:
+        """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
+        plan, meant = self.plan, _LAUNCH.fullmatch(process.argv[0])
+        package, file = (meant[1], meant[2]) if meant else ("", "")
+        texts = self._texts_of(process, "args")
+        pairs = [word.split(":=", 1) for word in process.argv[1:]]
+        arguments = [
+            (name, texts.get(str(index)), value) for index, (name, value) in enumerate(pairs)
+        ]
+        namespace = plan.ros.namespace if process.namespace is None else process.namespace
+        settings = [
+            *(
+                call("SetEnvironmentVariable", repr(name), value)
+                for name, value in self._environment(process).items()
+            ),
+            *([call("PushRosNamespace", repr(namespace))] if namespace else []),
+            *(call("SetRemap", repr(old), repr(new)) for old, new in process.remap.items()),
+            *([call("SetParameter", "'use_sim_time'", "True")] if plan.ros.clock == "sim" else []),
+        ]
+        given = items(
+            f"({name!r}, {text_code(text) if text else _filled(value, self._file(process))})"
+            for name, text, value in arguments
+        )
+        return call(
+            "included",
+            repr(package),
+            repr(file),
+            given,
+            items(settings),
+            *self._condition(process),
+        )
+
+
+def _named(process: PlanProcess) -> Iterator[str]:
+    namespace, _, node = process.nodes[0].rpartition("/")
+    yield f"name={node!r}"
+    yield f"namespace={namespace or '/'!r}"
+
+
+#: Where a process's output goes, as launch says it: its words for screen and log are others.
+_OUTPUTS = {"both": "'both'", "screen": "{'both': 'screen'}", "log": "{'both': 'log'}"}
+
+
+def _variable_name(name: str, taken: Collection[str]) -> str:
+    plain = re.sub(r"\W", "_", name)
+    plain = plain if plain.isidentifier() and not iskeyword(plain) else f"process_{plain}"
+    while plain in taken:
+        plain += "_"
+    return plain
+
+
+def _mapping(values: Mapping[str, Code | str], name: str = "") -> Code:
+    """Return a dict, or a keyword with one."""
+    several = (
+        (
+            f"{key!r}: {value}"
+            if isinstance(value, str)
+            else Code(f"{key!r}: {value.begin}", value.parts, value.end)
+        )
+        for key, value in values.items()
+    )
+    return Code(f"{name}={{" if name else "{", tuple(several), "}")
+
+
+def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
+    """Return how long after the launch each is started: when all for which it waits so many seconds have had them."""
+    delays: dict[str, float] = {}
+    waiting = {
+        name: {other: what for other, what in process.after.items() if other in known}
+        for name, process in known.items()
+    }  # fmt: skip
+    for name in graphlib.TopologicalSorter(waiting).static_order():
+        waits = (
+            delays[other] + waiting_s(known[other], what) for other, what in waiting[name].items()
+        )
+        delays[name] = max(waits, default=0.0)
+    return delays
+
+
+def _unlike(process: PlanProcess) -> Iterator[str]:
+    if process.component and process.lifecycle:
+        yield f"{process.name} is a component, and is not brought into its lifecycle state"
+    if process.kind == "run" and process.lifecycle and not _is_node(process):
+        yield (
+            f"{', '.join(process.lifecycle)} of {process.name} is not brought into its lifecycle"
+            " state"
+        )
+    if _is_launch(process):
+        if process.restart != "no":
+            yield f"{process.name} is not started again: it is a launch file"
+        if process.required:
+            yield f"{process.name} is required: its end does not end the others here"
+        return
+    if process.kind == "run" and process.restart != "no":
+        whatever = "whatever its exit code, and " if process.restart == "on-failure" else ""
+        count = process.max_restarts
+        limit = (
+            "without a limit"
+            if count is None
+            else f"with a limit of {count} in all, and not in a row"
+        )
+        yield f"{process.name} is started again {whatever}{limit}"
+    if process.stop.signal != "SIGINT":
+        yield f"{process.name} is ended by SIGINT, and not by {process.stop.signal}"
+
+
+def _variables(plan: Plan) -> Iterator[tuple[str, str]]:
+    if plan.ros.domain_id is not None:
+        yield "ROS_DOMAIN_ID", str(plan.ros.domain_id)
+    if plan.ros.discovery is not None:
+        yield "ROS_AUTOMATIC_DISCOVERY_RANGE", plan.ros.discovery.upper()
+    yield from middleware_variables(plan.ros, {}).items()
+
+
+def published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
+    """Return the edges (parent, child) that a stock robot_state_publisher sends of this URDF: all but floating ones."""
+    joints = [
+        joint
+        for joint in ET.fromstring(urdf).iter("joint")  # noqa: S314
+        if joint.get("type") not in (None, "floating")
+    ]
+    return {
+        (prefix + parent.get("link", ""), prefix + child.get("link", ""))
+        for joint in joints
+        if (parent := joint.find("parent")) is not None
+        and (child := joint.find("child")) is not None
+    }
+
+
+def _stock(plan: Plan, urdf: str) -> list[PlanEdge] | None:
+    """Return the fixed edges outside the URDF; None where own publishers must send all."""
+    own = {process.name for process in plan.started if process.kind in OWN_KINDS}
+    if not own or len(own) > len(OWN_KINDS) or any(plan.process(name).description for name in own):
+        return None
+    if any(_package(process) == STATE_PUBLISHER for process in plan.processes):
+        return None
+    edges = {(edge.parent, edge.child): edge for edge in plan.edges if edge.owner in own}
+    of_urdf = published_by(urdf, plan.ros.frame_prefix)
+    rest = [edge for ends, edge in edges.items() if ends not in of_urdf]
+    if not of_urdf or of_urdf - set(edges) or any(edge.kind != "static" for edge in rest):
+        return None
+    return rest
+
+
+def _package(process: PlanProcess) -> str:
+    meant = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
+    return meant[1] if meant else ""
+
+
+def _keywords(plan: Plan) -> Iterator[str | Code]:
+    """Yield the keywords of stock nodes: namespace, and the publishers' remappings."""
+    remap = {
+        old: new for one in plan.started if one.kind in OWN_KINDS for old, new in one.remap.items()
+    }
+    if plan.ros.namespace:
+        yield f"namespace={plan.ros.namespace!r}"
+    if remap:
+        yield items(map(repr, remap.items()), "remappings")
+
+
+def _state_publisher(plan: Plan) -> Code:
+    """Return robot_state_publisher, which passes on as many joint states as the plan's publisher does."""
+    joints = next((process for process in plan.started if process.kind == "joints"), None)
+    given = _params(joints.argv) if joints else {}
+    values = {"publish_frequency": min(given.pop("publish_frequency", MOST_HZ), MOST_HZ), **given}
+    values["use_sim_time"] = plan.ros.clock == "sim"
+    if plan.ros.frame_prefix:
+        values["frame_prefix"] = plan.ros.frame_prefix
+    params = Code(
+        "{",
+        ('"robot_description": description()', *(f"{k!r}: {v!r}" for k, v in values.items())),
+        "}",
+    )
+    named = (
+        f"package={STATE_PUBLISHER!r}",
+        f"executable={STATE_PUBLISHER!r}",
+        f"name={STATE_PUBLISHER!r}",
+    )
+    return call("Node", *named, *_keywords(plan), items([params], "parameters"), "output='screen'")
+
+
+def _params(argv: tuple[str, ...]) -> dict[str, Any]:
+    """Return the parameters that one of tfcompose's own processes is given in its command."""
+    words = [word for before, word in pairwise(argv) if before == "-p"]
+    return {name: json.loads(value) for name, _, value in (word.partition(":=") for word in words)}
+
+
+def _fixed(plan: Plan, edge: PlanEdge, name: str) -> Code:
+    ends = (repr(name), repr(edge.parent), repr(edge.child))
+    numbers = (
+        Code("(", tuple(map(number, part)), ")") for part in (edge.pose.xyz, edge.pose.quat_xyzw)
+    )
+    return call("fixed", *ends, *numbers, *_keywords(plan))
+
+
+def _is_launch(process: PlanProcess) -> bool:
+    return bool(process.argv) and _LAUNCH.fullmatch(process.argv[0]) is not None
+
+
+def _is_node(process: PlanProcess) -> bool:
+    """Return whether launch can start the process as one node, and not only as a process."""
+    return bool(_package(process)) and len(process.nodes) == 1 and not process.schedule
+
+
+def _is_command(process: PlanProcess) -> bool:
+    """Return whether the process's command is one that launch can start as it is."""
+    words = (*process.argv, *process.env.values())
+    return (
+        process.kind == "run" and not process.schedule and not any(map(_PLACEHOLDER.search, words))
+    )
+
+
+def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
+    """Return the program's arguments and ROS's; names, remappings and parameter files are keywords of their own."""
+    words = list(process.argv[1:])
+    at = words.index("--ros-args") if "--ros-args" in words else len(words)
+    kept, rest = [], iter(words[at + 1 :])
+    for word in rest:
+        if word in _MOVED:
+            next(rest, None)
+        else:
+            kept.append(word)
+    return words[:at], kept
+
+
+#: What a word of the plan stands for in the launch file.
+_WORDS = {
+    "${build_dir}": "str(BUILD)",
+    "${python}": "sys.executable",
+    "${params_file}": "str({file})",
+}
+
+
+def _filled(word: str, file: str) -> str:
+    """Return the word as Python that knows the plan's folder; ``file`` is Python that gives the parameter file."""
+    found = {mark: code.replace("{file}", file) for mark, code in _WORDS.items() if mark in word}
+    if word in found:
+        return found[word]
+    return repr(word) + "".join(f".replace({mark!r}, {code})" for mark, code in found.items())

@@ -1,0 +1,182 @@
+"""What of a robot file a launch file decides at its own start: arguments, the environment, and conditions.
+
+A plan has the values with which it was built. Where they decide no more than whether processes are
+started and what these are told, a launch file can have the arguments themselves.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import TYPE_CHECKING
+
+from tfcompose.tools.exporters.code import Code, call, items
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.model.plan import PlanProcess
+
+#: launch's substitutions for the signs of expressions; others are left to Python.
+_EQUALITY = {ast.Eq: "EqualsSubstitution", ast.NotEq: "NotEqualsSubstitution"}
+_ORDER: dict[type[ast.cmpop], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
+_FLIPPED: dict[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE
+}  # fmt: skip
+_TYPES = {"bool": "bool", "int": "int", "float": "float", "string": "str"}
+_TRUTHS = ("true", "false")
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """A launch argument. ``kind`` is bool, int, float or string; ``env`` a variable that gives the default."""
+
+    name: str
+    kind: str
+    default: str
+    choices: tuple[str, ...] = ()
+    description: str = ""
+    env: str | None = None
+
+    def code(self) -> Code:
+        """Return its declaration."""
+        default: Code | str = repr(self.default)
+        if self.env:
+            default = call(
+                "EnvironmentVariable", repr(self.env), f"default_value={self.default!r}"
+            )
+        parts: list[Code | str] = [repr(self.name), f"default_value={default}"]
+        parts += [items(map(repr, self.choices), "choices")] if self.choices else []
+        parts += [f"description={self.description!r}"] if self.description else []
+        return call("DeclareLaunchArgument", *parts)
+
+
+@dataclass(frozen=True, slots=True)
+class ArgumentValue:
+    """The value of an argument, inside of a text or as all of it."""
+
+    name: str
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class VariableValue:
+    """The value of an environment variable, or what stands for it."""
+
+    name: str
+    default: str | None
+
+
+#: A text with what it inserts, in order.
+Text = tuple[str | ArgumentValue | VariableValue, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LaunchValues:
+    """What a launch file decides itself.
+
+    ``conditions`` are expressions by process, ``texts`` what processes are told, by process and
+    then by place: ``args.0``, ``env.NAME``, ``params.NAME`` or ``remap.NAME``. ``more`` are
+    processes that are in other combinations of the arguments' values alone; their parameter files
+    stand beside the launch file.
+    """
+
+    arguments: tuple[Argument, ...] = ()
+    conditions: Mapping[str, str] = field(default_factory=dict)
+    texts: Mapping[str, Mapping[str, Text]] = field(default_factory=dict)
+    more: tuple[PlanProcess, ...] = ()
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """The arguments' kinds, by name."""
+        return {one.name: one.kind for one in self.arguments}
+
+
+def text_code(text: Text) -> Code | str:
+    """Return the substitutions that make a text."""
+    several = [_part(part) for part in text]
+    return several[0] if len(several) == 1 else items(several)
+
+
+def parameter_code(text: Text) -> Code | str:
+    """Return the substitutions as the value of a parameter, with its type."""
+    only, *rest = text
+    kind = _TYPES[only.kind] if not rest and isinstance(only, ArgumentValue) else "str"
+    return call("ParameterValue", text_code(text), f"value_type={kind}")
+
+
+def _part(part: str | ArgumentValue | VariableValue) -> Code | str:
+    if isinstance(part, str):
+        return repr(part)
+    if isinstance(part, ArgumentValue):
+        return call("LaunchConfiguration", repr(part.name))
+    default = [] if part.default is None else [f"default_value={part.default!r}"]
+    return call("EnvironmentVariable", repr(part.name), *default)
+
+
+def condition_code(expression: str, kinds: Mapping[str, str]) -> Code:
+    """Return launch's condition for an expression of a robot file.
+
+    Raises:
+        ValueError: if launch has none.
+    """
+    try:
+        node = ast.parse(expression.strip(), mode="eval").body
+    except SyntaxError:
+        raise ValueError(expression) from None
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        return call("UnlessCondition", _truth(node.operand, kinds))
+    return call("IfCondition", _truth(node, kinds))
+
+
+def _truth(node: ast.expr, kinds: Mapping[str, str]) -> Code | str:
+    match node:
+        case ast.BoolOp(op=op, values=values):
+            name = "AndSubstitution" if isinstance(op, ast.And) else "OrSubstitution"
+            return reduce(
+                lambda left, right: call(name, left, right), [_truth(one, kinds) for one in values]
+            )
+        case ast.UnaryOp(op=ast.Not(), operand=inner):
+            return call("NotSubstitution", _truth(inner, kinds))
+        case ast.Name(id=word) if word in _TRUTHS:
+            return repr(word)
+        case ast.Compare(left=left, ops=[op], comparators=[right]):
+            return _comparison(left, op, right, kinds)
+    name = _argument(node)
+    if kinds.get(name) != "bool":
+        raise ValueError(ast.unparse(node))
+    return call("LaunchConfiguration", repr(name))
+
+
+def _comparison(left: ast.expr, op: ast.cmpop, right: ast.expr, kinds: Mapping[str, str]) -> Code:
+    if not _argument(left):
+        left, right, op = right, left, _FLIPPED.get(type(op), type(op))()
+    name, value = _argument(left), _constant(right)
+    if name not in kinds or value is None:
+        raise ValueError(ast.unparse(left))
+    given = call("LaunchConfiguration", repr(name))
+    if type(op) in _EQUALITY:
+        return call(_EQUALITY[type(op)], given, repr(value))
+    if type(op) not in _ORDER or kinds[name] not in {"int", "float"}:
+        raise ValueError(ast.unparse(left))
+    return call("PythonExpression", items([given, repr(f" {_ORDER[type(op)]} {value}")]))
+
+
+def _argument(node: ast.expr) -> str:
+    """Return the argument that an expression is, or nothing."""
+    match node:
+        case ast.Attribute(value=ast.Name(id="args"), attr=name):
+            return name
+    return ""
+
+
+def _constant(node: ast.expr) -> str | None:
+    match node:
+        case ast.Name(id=word) if word in _TRUTHS:
+            return word
+        case ast.Constant(value=str(value)):
+            return value
+        case ast.Constant(value=int(value) | float(value)) if not isinstance(value, bool):
+            return ast.unparse(node)
+    return None

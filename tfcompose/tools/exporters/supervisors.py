@@ -1,0 +1,464 @@
+"""A plan for other supervisors: a unit for systemd, or a service for docker compose, for each process.
+
+What they and ``kubernetes`` share comes first: names, the order of starts, restarts, probes and
+the YAML of the files.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from tfcompose.model.files import File
+from tfcompose.model.plan.middleware import middleware_variables
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
+    from tfcompose.model.plan import Plan, PlanProcess
+
+
+#: How long a process has to end, in seconds: SIGINT and SIGTERM, five each, in the launcher's
+#: hands.
+STOP_S = 10.0
+
+_NO_NAME = re.compile(r"[^A-Za-z0-9_.]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """Where an export runs: the plan's folder there, its Python, setup files to source, variables to set, and an image.
+
+    ``folder`` is absolute for systemd, and relative to the written file for the others.
+    """
+
+    folder: str
+    python: str = "python3"
+    setup: tuple[str, ...] = ()
+    env: dict[str, str] = field(default_factory=dict)
+    image: str = ""
+
+
+def plain_name(name: str) -> str:
+    """Return the name with nothing that units and services may not have in theirs."""
+    return _NO_NAME.sub("-", name)
+
+
+def plain_names(plan: Plan, plain_of: Callable[[str], str] = plain_name) -> dict[str, str]:
+    """Return the plain name of each process, by its own: no two are the same, and one that is plain stays."""
+    return distinct([process.name for process in plan.processes], plain_of)
+
+
+def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str, str]:
+    """Return the plain form of each name, by the name: no two are the same, and one that is plain stays."""
+    made = {name: name for name in names if plain_of(name) == name}
+    taken = set(made)
+    for name in names:
+        if name not in made:
+            plain = plain_of(name)
+            made[name] = next(
+                one for n in count(1) if (one := f"{plain}-{n}" if n > 1 else plain) not in taken
+            )
+            taken.add(made[name])
+    return made
+
+
+def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:
+    """Return the words that start the process as ``tfcompose up`` does."""
+    return [python, "-m", "tfcompose.launcher.exec", plan_file, process.name]
+
+
+def restart_of(process: PlanProcess) -> str:
+    """Return when it is started again: tfcompose's own after each failure, for here no launcher ends everything."""
+    return process.restart if process.kind == "run" else "on-failure"
+
+
+def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
+    """Return which processes come first here, and what of them is waited for; a strict guard is among them.
+
+    In place of a component comes its container.
+    """
+    waits: dict[str, str] = {}
+    for name, what in process.after.items():
+        component = plan.process(name).component
+        if component and plan.process(component.container).kind != "external":
+            waits.setdefault(component.container, "started")
+        elif not component and plan.process(name).kind != "external":
+            waits[name] = what
+    guards = [
+        one.name for one in plan.started if one.kind == "guard" and plan.guard.mode == "strict"
+    ]
+    return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
+
+
+def waiting_s(process: PlanProcess, what: str) -> float:
+    """Return how many seconds after its start a process is ready, where that is known and waited for; else 0."""
+    ready = process.ready
+    return ready.number if what == "ready" and ready and ready.kind == "time" else 0.0
+
+
+def gaps_of(plan: Plan) -> list[str]:
+    """Return what a supervisor that knows nothing of ROS does not do of the plan, one sentence each."""
+    gaps = []
+    if plan.guard.on_violation != "report":
+        gaps.append(
+            f"the guard reports: nobody here follows on_violation: {plan.guard.on_violation}"
+        )
+    if plan.guard.mode == "strict":
+        gaps.append(
+            "the fence is one of remappings; what a sender latched before its last message ends"
+            " with the guard"
+        )
+    for process in plan.processes:
+        if process.kind == "external":
+            gaps.append(f"{process.name} is external, and not started")
+        if process.required:
+            gaps.append(f"{process.name} is required: its end does not end the others here")
+        component = process.component
+        for name in process.after:
+            if component and name != component.container:
+                gaps.append(
+                    f"{process.name} does not wait for {name}: the guard loads it once"
+                    f" {component.container} runs"
+                )
+            elif not component and (other := plan.process(name).component):
+                gaps.append(
+                    f"{process.name} waits for the container {other.container}, and not until it"
+                    f" has {name}"
+                )
+    return gaps
+
+
+#: A probe does not come through the image's entry point, which sources the setup file for the
+#: process itself.
+_SOURCED = (
+    'setup=/opt/ros/${ROS_DISTRO:-RELEASE}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
+)
+
+
+def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
+    """Return the command that succeeds in a container while the first edge of the process is live; it has to own one.
+
+    It looks at one edge, and not at all of them, because each look is a process that joins the
+    robot's domain.
+    """
+    edge = plan.edges_of(process.name)[0]
+    words = [
+        "python3",
+        "-m",
+        "tfcompose",
+        "echo",
+        edge.parent,
+        edge.child,
+        "--once",
+        "--timeout",
+        "5",
+    ]
+    namespace = process.topics[0].removesuffix("/tf")
+    sourced = _SOURCED.replace("RELEASE", plan.ros.distro or "jazzy")
+    return ["sh", "-c", sourced, "sh", *words, *(["--namespace", namespace] if namespace else [])]
+
+
+def outside_of(plan: Plan, folder: str) -> list[str]:
+    """Return what processes need that is not in a container, which has the plan's folder alone, a sentence each."""
+    gaps = []
+    for process in plan.started:
+        named = (*process.argv, *process.env.values(), process.cwd or "")
+        outside = [word for word in named if "${build_dir}/.." in word]
+        gaps += [
+            f"{process.name} needs {word}, which is outside of {folder}: add a volume"
+            for word in outside
+        ]
+    return gaps
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes each string that some reader of YAML, 1.1 or 1.2, could take for something else."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        """Write what stands twice twice."""
+        del data
+        return True
+
+    def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:  # noqa: FBT001, FBT002 (PyYAML's)
+        """Indent lists below their keys."""
+        del indentless
+        super().increase_indent(flow, indentless=False)
+
+
+#: What no YAML takes for a number, a date, a truth value or null.
+_UNQUOTED = re.compile(
+    r"(?!(?:y|n|yes|no|on|off|true|false|null|inf|nan)\Z)[A-Za-z/][A-Za-z0-9_./-]*", re.IGNORECASE
+)
+
+
+def _string(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = "|" if "\n" in text else None if _UNQUOTED.fullmatch(text) else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style)
+
+
+_Dumper.add_representer(str, _string)
+
+
+def yaml_text(value: Mapping[str, Any]) -> str:
+    """Return the value as YAML in blocks, its keys in their order."""
+    return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000)
+
+
+#: Sources its arguments up to ``--``, then becomes the command behind it; bash, because ROS's
+#: setup files are bash's.
+SOURCING = 'until [ "$1" = -- ]; do . "$1"; shift; done; shift; exec "$@"'
+
+
+def sourced(setup: Sequence[str], words: list[str]) -> list[str]:
+    """Return the words that source the setup files and become the command; the command's own where there are none."""
+    return ["/bin/bash", "-c", SOURCING, "bash", *setup, "--", *words] if setup else words
+
+
+def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
+    """Return the units, and what they do not keep of the plan.
+
+    tfcompose's own processes say when they are ready (``Type=notify``), so that ``After=`` waits
+    for that; of others systemd knows that they were executed. One that others wait for until it is
+    done is ``Type=oneshot``. One that is ready so many seconds after its start has only started,
+    for systemd, when a sleep of so many has ended.
+    """
+    awaited = {
+        name for process in plan.started for name, what in process.after.items() if what == "done"
+    }
+    names = {
+        name: f"{plain_name(plan.robot)}-{plain}.service"
+        for name, plain in plain_names(plan).items()
+    }
+    units = [
+        File(
+            names[process.name],
+            _unit_text(plan, process, machine, names, done=process.name in awaited),
+        )
+        for process in plan.started
+    ]
+    gaps = gaps_of(plan)
+    for process in plan.started:
+        for name, what in process.after.items():
+            other = plan.process(name)
+            if what == "ready" and other.kind == "run" and not waiting_s(other, what):
+                gaps.append(
+                    f"{process.name} waits until {name} was executed: systemd cannot see that it"
+                    " is ready"
+                )
+            if what == "started" and _settling_s(plan, other):
+                gaps.append(f"{process.name} waits until {name} is ready, as others do")
+    return (File(_target_name(plan), _target(plan, [unit.path for unit in units])), *units), gaps
+
+
+def _target_name(plan: Plan) -> str:
+    return f"{plain_name(plan.robot)}.target"
+
+
+def _target(plan: Plan, units: list[str]) -> str:
+    wanted = "\n".join(f"Wants={unit}" for unit in units)
+    return (
+        f"[Unit]\nDescription=Robot {plan.robot}\n"
+        f"Wants=network-online.target\nAfter=network-online.target\n{wanted}\n\n"
+        "[Install]\nWantedBy=default.target\n"
+    )
+
+
+def _settling_s(plan: Plan, process: PlanProcess) -> float:
+    """Return how many seconds after its start others wait for a process; 0 where none does."""
+    name = process.name
+    return max(
+        (waiting_s(process, one.after[name]) for one in plan.started if name in one.after),
+        default=0.0,
+    )
+
+
+def _unit_text(
+    plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str], *, done: bool
+) -> str:
+    """Return the unit of a process; ``names`` are those of all units, by process."""
+    target = _target_name(plan)
+    before = [names[name] for name in after(plan, process)]
+    kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
+    restart = restart_of(process)
+    settling_s = _settling_s(plan, process)
+    unit = [
+        f"Description={_plain(process.name)} of robot {plan.robot}",
+        f"PartOf={target}",
+        *(f"{key}={' '.join(before)}" for key in ("After", "Wants") if before),
+        *(
+            []
+            if restart == "no"
+            else ["StartLimitIntervalSec=300", f"StartLimitBurst={process.restart_limit + 1}"]
+        ),
+    ]
+    service = [
+        f"Type={kind}",
+        *(["NotifyAccess=all"] if kind == "notify" else []),
+        *([f"TimeoutStartSec={60 + settling_s:g}"] if kind == "notify" or settling_s else []),
+        *(
+            f"Environment={quoted(f'{name}={value}')}"
+            for name, value in sorted(machine.env.items())
+        ),
+        *_logs(plan, machine),
+        f"WorkingDirectory={_plain(machine.folder)}",
+        f"ExecStart={_exec(process, machine)}",
+        *([f"ExecStartPost=/bin/sleep {settling_s:g}"] if settling_s else []),
+        f"Restart={'on-failure' if done and restart == 'always' else restart}",
+        f"RestartSec={1 if process.restart_delay is None else process.restart_delay:g}",
+        f"KillSignal={process.stop.signal}",
+        "KillMode=mixed",
+        f"TimeoutStopSec={STOP_S if process.stop.timeout_s is None else process.stop.timeout_s:g}",
+        f"SuccessExitStatus={process.stop.signal} 130",
+    ]
+    parts = (("Unit", unit), ("Service", service), ("Install", [f"WantedBy={target}"]))
+    return "\n".join("\n".join([f"[{name}]", *lines, ""]) for name, lines in parts)
+
+
+def _logs(plan: Plan, machine: Machine) -> list[str]:
+    """Return where ROS logs to, unless that is set: no node starts without, and a system's service has no home."""
+    if {"ROS_LOG_DIR", "ROS_HOME"} & machine.env.keys():
+        return []
+    folder = f"tfcompose/{plain_name(plan.robot)}"
+    return [f"LogsDirectory={folder}", f"Environment=ROS_LOG_DIR=%L/{folder}"]
+
+
+def _exec(process: PlanProcess, machine: Machine) -> str:
+    words = sourced(
+        machine.setup, command_of(process, machine.python, f"{machine.folder}/plan.json")
+    )
+    return " ".join(quoted(word).replace("$", "$$") for word in words)
+
+
+def _plain(text: str) -> str:
+    return text.replace("%", "%%")
+
+
+def quoted(word: str) -> str:
+    """Return the word as systemd reads it back; a percent sign is doubled."""
+    text = _plain(word)
+    if text and all(c.isalnum() or c in "/.:=@+,-_%" for c in text):
+        return text
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+#: Where the plan's folder is inside a container.
+INSIDE = "/robot"
+IMAGE = "${TFCOMPOSE_IMAGE:?set it to an image with ROS 2 Jazzy and tfcompose}"
+_MET = {
+    "started": "service_started",
+    "ready": "service_healthy",
+    "done": "service_completed_successfully",
+}
+
+
+def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
+    """Return the compose file, and what it does not keep of the plan.
+
+    A process that owns edges is healthy while the first of them is live; ``after: ready`` waits
+    for that. One that runs on a host is in the profile of that name, and waits only for what is on
+    the same host.
+    """
+    names = plain_names(plan)
+    services = {
+        names[process.name]: _compose_service(plan, process, machine, names)
+        for process in plan.started
+    }
+    gaps = gaps_of(plan)
+    for process in plan.started:
+        for name, what in process.after.items():
+            other = plan.process(name)
+            if what == "ready" and other.kind != "external" and not plan.edges_of(name):
+                gaps.append(
+                    f"{process.name} waits until {name} was started: compose cannot see that it is"
+                    " ready"
+                )
+            if other.kind != "external" and _profile(plan, other) not in (
+                None,
+                _profile(plan, process),
+            ):
+                gaps.append(f"{process.name} does not wait for {name}, which is on {other.host}")
+    text = yaml_text({"name": plain_name(plan.robot), "services": services})
+    return (File("compose.yaml", text),), gaps + outside_of(plan, INSIDE)
+
+
+def _profile(plan: Plan, process: PlanProcess) -> str | None:
+    """Return the profile that a service is in: its host, unless the plan is one host's share already."""
+    return plain_name(process.host) if process.host and plan.host is None else None
+
+
+def _compose_service(
+    plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return the service of a process; ``names`` are those of all services, by process."""
+    profile = _profile(plan, process)
+    waits = {
+        name: what
+        for name, what in after(plan, process).items()
+        if _profile(plan, plan.process(name)) in (None, profile)
+    }
+    stop_s = STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
+    domain = "${ROS_DOMAIN_ID:-0}" if plan.ros.domain_id is None else str(plan.ros.domain_id)
+    service: dict[str, Any] = {
+        **({"profiles": [profile]} if profile else {}),
+        "image": machine.image or IMAGE,
+        "network_mode": "host",
+        "ipc": "host",
+        "init": True,
+        "command": [_kept(word) for word in command_of(process, "python3", f"{INSIDE}/plan.json")],
+        "environment": {"ROS_DOMAIN_ID": domain, **_discovery(plan)},
+        "volumes": [
+            {"type": "bind", "source": machine.folder, "target": INSIDE, "read_only": True}
+        ],
+        "working_dir": INSIDE,
+        "restart": _restart(process),
+        "stop_signal": process.stop.signal,
+        "stop_grace_period": f"{round(stop_s * 1000)}ms",
+    }
+    if waits:
+        service["depends_on"] = {
+            names[name]: {
+                "condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]
+            }
+            for name, what in waits.items()
+        }
+    if plan.edges_of(process.name):
+        test = ["CMD", *map(_kept, probe_of(plan, process))]
+        service["healthcheck"] = {
+            "test": test,
+            "interval": "10s",
+            "timeout": "8s",
+            "start_period": "30s",
+            "retries": 3,
+        }
+    return service
+
+
+def _discovery(plan: Plan) -> dict[str, str]:
+    """Return what the health check needs; the process itself has it from the plan."""
+    discovery = (
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
+    )
+    return discovery | middleware_variables(plan.ros, {})
+
+
+def _restart(process: PlanProcess) -> str:
+    restart = restart_of(process)
+    most = process.restart_limit
+    return (
+        f"on-failure:{most}"
+        if restart == "on-failure" and most
+        else "no"
+        if restart == "on-failure"
+        else restart
+    )
+
+
+def _kept(text: str) -> str:
+    """Return the text as compose reads it back: it fills in variables itself."""
+    return text.replace("$", "$$")

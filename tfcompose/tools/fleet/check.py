@@ -1,0 +1,79 @@
+"""What is wrong with a fleet's file: edges that clash, and robots that are in no common tree."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, Note, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.spec.language import FleetSpec
+    from tfcompose.spec.load import Path, Source
+
+
+def check_fleet(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
+    """Yield the findings of a fleet that could be read."""
+    yield from _shared_twice(fleet, source)
+    yield from _apart(fleet, source)
+
+
+def _shared_twice(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each frame that two edges give a parent: lookups would jump between them."""
+    first: dict[str, tuple[str, Path]] = {}
+    for robot in fleet.robots:
+        for index, shared in enumerate(fleet.edges_of(robot)):
+            parent, child = (fleet.final(robot, frame) for frame in shared.ends)
+            at = _path(fleet, robot, index)
+            other, place = first.setdefault(child, (robot, at))
+            if (other, place) == (robot, at):
+                continue
+            message = (
+                f"{parent} → {child} of {robot} is a second parent of {child}, which {other}"
+                " shares"
+            )
+            advice = (
+                "give the robots different prefixes" if other != robot else "remove one of them"
+            )
+            notes = [Note("the other one", source.at(place))]
+            yield finding("TF880", message, source.at(at), notes=notes, help=advice)
+
+
+def _path(fleet: FleetSpec, robot: str, index: int) -> Path:
+    return (
+        ("share", index)
+        if fleet.robots[robot].share is None
+        else ("robots", robot, "share", index)
+    )
+
+
+def _apart(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each robot whose frames are not in one tree with those of the first."""
+    trees: dict[str, set[str]] = {}
+    for robot in fleet.robots:
+        frames = {
+            fleet.final(robot, frame) for shared in fleet.edges_of(robot) for frame in shared.ends
+        }
+        if not frames:
+            place = source.at_key(("robots", robot))
+            yield finding(
+                "TF881",
+                f"{robot} shares no edge",
+                place,
+                help="share: [map → odom, odom → base_link]",
+            )
+            continue
+        trees[robot] = frames
+    names = list(trees)
+    reached, together = set(names[:1]), set().union(*(trees[name] for name in names[:1]))
+    while more := [
+        name for name in names if name not in reached and not together.isdisjoint(trees[name])
+    ]:
+        reached.update(more)
+        together.update(*(trees[name] for name in more))
+    for robot in names:
+        if robot not in reached:
+            message = f"{robot} shares no frame with {names[0]}: there are no poses between them"
+            advice = f"share an edge from one of shared_frames: {', '.join(fleet.shared_frames)}"
+            yield finding("TF881", message, source.at_key(("robots", robot)), help=advice)

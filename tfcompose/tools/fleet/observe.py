@@ -1,0 +1,291 @@
+"""The fleet as it is seen from anywhere: what each robot shares, how old it is, and poses between robots."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.foundation.findings import Finding, finding
+from tfcompose.tf.ros.tf_codec import Decoder
+from tfcompose.tf.tf2.pose_buffer import PoseBuffer
+from tfcompose.tools.fleet.session import connected
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.spec.language import FleetSpec
+
+#: A robot sends twice a second: where the last that came was sent longer ago, its link is stale,
+#: in seconds.
+STALE_S = 2.0
+#: An edge is stale after so many periods, and never before ``STALE_S``.
+_PERIODS = 4.0
+#: By so much the clocks of two computers may differ, in seconds.
+CLOCK_S = 0.5
+_RETRY_S = 1.0
+_LATE = "is its link slow? else its clock is behind: chrony, or systemd-timesyncd"
+_SECOND_NS = 1_000_000_000
+
+LinkState = Literal["live", "stale", "silent", "unreachable"]
+
+
+class StaleError(Exception):
+    """Raised where a pose needs a link or an edge that is stale, or never came; the message names the first of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeStatus:
+    """A shared edge, by its names in the fleet; ages are in seconds since it was sent, None: it never came.
+
+    ``delay_s`` is its last arrival here minus its stamp, by the two computers' clocks; None for a
+    fixed edge.
+    """
+
+    parent: str
+    child: str
+    age_s: float | None
+    delay_s: float | None
+    stale: bool
+
+
+@dataclass(frozen=True, slots=True)
+class RobotStatus:
+    """What is known of a robot: whether it is reached, how long ago it sent, and what it shares.
+
+    live: it sends; stale: nothing came that was sent within ``STALE_S``; silent: its router is
+    reached, and it has sent nothing yet; unreachable: its router is not. ``delay_s`` is how long
+    what came last was on its way, by the two computers' clocks.
+    """
+
+    robot: str
+    router: str
+    state: LinkState
+    age_s: float | None
+    edges: tuple[EdgeStatus, ...]
+    delay_s: float = 0.0
+
+
+@dataclass(slots=True)
+class _Link:
+    """What came of a robot; times are when it was sent, by the monotonic clock here, in seconds."""
+
+    last: float | None = None
+    delay_s: float = 0.0
+    edges: dict[tuple[str, str], tuple[float, float | None]] = field(default_factory=dict)
+    decoder: Decoder = field(default_factory=Decoder)
+
+
+class FleetObserver:
+    """Listens to all robots of a fleet until it is closed; ``buffer`` answers lookups between them."""
+
+    def __init__(self, fleet: FleetSpec) -> None:
+        self.fleet = fleet
+        self.buffer = PoseBuffer()
+        self._lock = threading.Lock()
+        self._links = {robot: _Link() for robot in fleet.robots}
+        ends = (
+            [fleet.final(one, frame) for frame in edge.ends]
+            for one in fleet.robots
+            for edge in fleet.edges_of(one)
+        )
+        self._parents = {child: parent for parent, child in ends}
+        self._sessions: dict[str, Any] = {}
+        self._ended = threading.Event()
+        self._threads = [
+            threading.Thread(
+                target=self._connect, args=(router,), name=f"router {router}", daemon=True
+            )
+            for router in dict.fromkeys(one.router for one in fleet.robots.values())
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        """End the sessions."""
+        self._ended.set()
+        for thread in self._threads:
+            thread.join()
+        for session in self._sessions.values():
+            session.close()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait so long; return whether every edge of every robot has come before."""
+        end = time.monotonic() + seconds
+        while not (complete := self.is_complete()) and (left := end - time.monotonic()) > 0:
+            self._ended.wait(min(0.05, left))
+        return complete
+
+    def is_complete(self) -> bool:
+        """Return whether every edge of every robot has come."""
+        return all(edge.age_s is not None for robot in self.status() for edge in robot.edges)
+
+    def status(self) -> list[RobotStatus]:
+        """Return what is known now of each robot, in the order of the file."""
+        now = time.monotonic()
+        with self._lock:
+            return [self._status(robot, now) for robot in self.fleet.robots]
+
+    def pose(self, target: str, source: str) -> tuple[Pose, int | None]:
+        """Return the newest pose of ``source`` in ``target``, and its stamp as ``PoseBuffer.latest`` does.
+
+        Raises:
+            StaleError: if a link or an edge between the two is stale, of which the buffer still
+            has the last pose; or
+                nothing came from a robot.
+            TransformException: if there is none.
+        """
+        needed = self._between(target, source)
+        is_shared = {target, source} <= self._parents.keys() | set(self._parents.values())
+        for one in self.status():
+            edges = [edge for edge in one.edges if edge.child in needed]
+            if edges and one.age_s is None and is_shared:
+                raise StaleError(
+                    f"{one.robot} is {one.state}: nothing came from it (tfcompose fleet doctor)"
+                )
+            if edges and one.age_s is not None and one.age_s > STALE_S:
+                raise StaleError(f"the link to {one.robot} is stale")
+            for edge in edges:
+                if edge.stale:
+                    raise StaleError(f"{edge.parent} → {edge.child} of {one.robot} is stale")
+        return self.buffer.latest(target, source)
+
+    def findings(self) -> Iterator[Finding]:
+        """Yield what is wrong now."""
+        for one in self.status():
+            yield from problems_of(one)
+
+    def _between(self, target: str, source: str) -> set[str]:
+        """Return the children of the fleet's edges that are between two frames."""
+        chains = []
+        for frame in (target, source):
+            chain = [frame]
+            while (parent := self._parents.get(chain[-1])) is not None and parent not in chain:
+                chain.append(parent)
+            chains.append(set(chain))
+        return chains[0] ^ chains[1]
+
+    def _status(self, robot: str, now: float) -> RobotStatus:
+        link, router = self._links[robot], self.fleet.robots[robot].router
+        edges = []
+        for shared in self.fleet.edges_of(robot):
+            parent, child = (self.fleet.final(robot, frame) for frame in shared.ends)
+            came, delay_s = link.edges.get((parent, child), (None, None))
+            age_s = None if came is None else now - came
+            stale = age_s is not None and age_s > max(STALE_S, _PERIODS / shared.rate)
+            edges.append(EdgeStatus(parent, child, age_s, delay_s, stale))
+        age_s = None if link.last is None else now - link.last
+        return RobotStatus(
+            robot, router, self._state(router, age_s), age_s, tuple(edges), link.delay_s
+        )
+
+    def _state(self, router: str, age_s: float | None) -> LinkState:
+        if age_s is not None and age_s <= STALE_S:
+            return "live"
+        session = self._sessions.get(router)
+        if session is None or not session.info.routers_zid():
+            return "unreachable"
+        return "silent" if age_s is None else "stale"
+
+    def _connect(self, router: str) -> None:
+        """Connect to a router as soon as it is there, and listen to the robots that share on it."""
+        while not self._ended.is_set():
+            try:
+                session = connected(router)
+            except ConnectionError:
+                self._ended.wait(_RETRY_S)
+                continue
+            with self._lock:
+                self._sessions[router] = session
+            for robot, one in self.fleet.robots.items():
+                for static in (False, True) if one.router == router else ():
+                    key = f"{self.fleet.key_of(robot)}/{'tf_static' if static else 'tf'}"
+                    session.declare_subscriber(key, partial(self._take, robot, static))
+            return
+
+    def _take(self, robot: str, static: bool, sample: Any) -> None:  # noqa: FBT001 (given by partial)
+        now, now_ns = time.monotonic(), time.time_ns()
+        time_s = now_ns / _SECOND_NS
+        with self._lock:
+            link = self._links[robot]
+            try:
+                rows = tuple(link.decoder.rows(bytes(sample.payload)))
+            except ValueError:
+                return
+            link.delay_s = (
+                0.0
+                if sample.timestamp is None
+                else time_s - sample.timestamp.get_time().timestamp()
+            )
+            sent = now - max(
+                link.delay_s, 0.0
+            )  # what waited in a link that was cut is as old as it is
+            link.last = max(sent, link.last or sent)
+            for row in rows:
+                stamp_ns = row[2] * _SECOND_NS + row[3]
+                link.edges[row[0], row[1]] = (
+                    sent,
+                    None if static else (now_ns - stamp_ns) / _SECOND_NS,
+                )
+        self.buffer.insert(rows, static=static, authority=robot)
+
+
+def problems_of(one: RobotStatus) -> Iterator[Finding]:
+    """Yield what is wrong with a robot."""
+    if one.state == "unreachable":
+        ago = f", and nothing came for {one.age_s:.1f} s" if one.age_s is not None else ""
+        advice = (
+            "is the robot on, and in this network? its router is the process zenoh_router, or"
+            " zenohd"
+        )
+        yield finding(
+            "TF882",
+            f"the router of {one.robot} at {one.router} is not reached{ago}",
+            None,
+            help=advice,
+        )
+        return
+    if one.state == "stale":
+        message = (
+            f"the link to {one.robot} is stale: what came last was sent {one.age_s:.1f} s ago"
+        )
+        advice = (
+            _LATE
+            if one.delay_s > CLOCK_S
+            else f"does its process still run? tfcompose fleet share {one.robot}"
+        )
+        yield finding("TF883", message, None, help=advice)
+        return
+    if one.state == "silent":
+        advice = f"start it on the robot: tfcompose fleet share {one.robot}"
+        message = f"{one.robot} shares nothing: its router is reached, and nothing came"
+        yield finding("TF883", message, None, help=advice)
+        return
+    if one.delay_s > CLOCK_S:
+        yield finding(
+            "TF885",
+            f"what {one.robot} sends comes {one.delay_s:.1f} s after it was sent",
+            None,
+            help=_LATE,
+        )
+    for edge in one.edges:
+        name = f"{edge.parent} → {edge.child}"
+        if edge.age_s is None or edge.stale:
+            when = (
+                "never came"
+                if edge.age_s is None
+                else f"was sent {edge.age_s:.1f} s ago for the last time"
+            )
+            advice = "does the robot publish it under these names? tfcompose doctor on the robot"
+            yield finding("TF884", f"{name} of {one.robot} {when}", None, help=advice)
+        elif edge.delay_s is not None and edge.delay_s < -CLOCK_S:
+            message = (
+                f"{name} of {one.robot} is stamped {-edge.delay_s:.1f} s ahead of this computer's"
+                " clock"
+            )
+            yield finding(
+                "TF885", message, None, help="synchronise the clocks: chrony, or systemd-timesyncd"
+            )

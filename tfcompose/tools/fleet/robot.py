@@ -1,0 +1,37 @@
+"""The process on a robot that shares its edges; it reads TF by ROS."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.model.plan.topics import topics_below
+from tfcompose.tf.ros.tf_listener import ThreadListener, Topic
+from tfcompose.tools.fleet.share import BEAT_S, Sender
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.spec.language import FleetSpec
+
+
+def share(
+    fleet: FleetSpec, robot: str, namespace: str, stop: Stop, say: Callable[[str], None]
+) -> None:
+    """Share a robot's edges until ``stop`` is requested; ``namespace`` is that of its TF topics.
+
+    Raises:
+        RosError: if ROS cannot start a node.
+    """
+    sender = Sender(fleet, robot, say)
+    moving, fixed = topics_below(namespace)
+    topics = [Topic(fixed, static=True, qos=None), Topic(moving, static=False, qos=None)]
+    listener = ThreadListener(sender.on_message, topics, use_sim_time=False)
+    listener.start()
+    try:
+        while not stop.requested:
+            sender.beat()
+            stop.wait(BEAT_S)
+    finally:
+        listener.close()
+        sender.close()

@@ -1,0 +1,107 @@
+"""What a robot_state_publisher is given, in the draft of a robot: a xacro file as a part, a URDF as links."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.urdf.lint import read_urdf
+from tfcompose.compiler.urdf.packages import Packages
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.tools.importers.programs import PACKAGE, path_from, where
+from tfcompose.tools.importers.robot_file import imported, put_into
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from tfcompose.compiler.resolve import Library
+    from tfcompose.model.files import Target
+    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.programs import Description
+
+#: As what the text of a description is read.
+_TEXT = "robot_description.urdf"
+
+
+@dataclass(frozen=True, slots=True)
+class Workshop:
+    """What reads descriptions: the packages, folders of those that are named, and presets, None to match none."""
+
+    packages: Packages
+    target: Target
+    library: Library | None
+    folders: Mapping[str, str] = field(default_factory=dict)
+
+
+def add_descriptions(
+    draft: Draft, descriptions: Iterable[Description], workshop: Workshop
+) -> None:
+    """Add what robot_state_publishers are given; of several URDFs the first becomes links, and each other is named."""
+    for described in descriptions:
+        if described.file and not described.file.endswith(".urdf"):
+            _add_part(draft, described, workshop)
+        elif draft.sections["links"]:
+            draft.todo(
+                "a second robot_state_publisher with a URDF",
+                described.at,
+                advice="parts: {NAME: {urdf: FILE}}",
+            )
+        else:
+            _add_links(draft, described, workshop)
+
+
+def _add_part(draft: Draft, described: Description, workshop: Workshop) -> None:
+    path = described.file
+    around = (
+        (name, folder)
+        for name, folder in workshop.folders.items()
+        if path.startswith(folder.rstrip("/") + "/")
+    )
+    package, folder = next(around, ("", ""))
+    if package:
+        address = f"{PACKAGE}{package}/{posixpath.relpath(path, folder)}"
+        draft.sections["packages"][package] = workshop.target.from_folder(folder)
+    elif found := _installed(path, workshop.packages):
+        address = found
+    else:
+        address = path if path.startswith(PACKAGE) else path_from(workshop.target, path)
+    keys = {"xacro": address}
+    keys |= {"args": dict(described.args)} if described.args else {}  # type: ignore[dict-item]
+    keys |= {"prefix": described.prefix} if described.prefix else {}
+    draft.has_unknown_frames = True
+    name = posixpath.basename(path).partition(".")[0].replace("-", "_") or "robot"
+    draft.sections["parts"][name] = keys
+    draft.note(("parts", name), where(described.at, "what robot_state_publisher is given"))
+
+
+def _installed(path: str, packages: Packages) -> str:
+    """Return the address of a file in a package that is installed, empty for any other."""
+    for prefix in packages.disk.prefixes if packages.disk else ():
+        share = prefix.rstrip("/") + "/share/"
+        if path.startswith(share) and path.count("/", len(share)):
+            return PACKAGE + path.removeprefix(share)
+    return ""
+
+
+def _add_links(draft: Draft, described: Description, workshop: Workshop) -> None:
+    packages, file = workshop.packages, described.file
+    if described.text and packages.disk:
+        text = described.text
+        own = replace(packages.disk, read=lambda _: text)
+        packages, file = Packages(own, packages.named, packages.advice), _TEXT
+    elif file.startswith(PACKAGE):
+        draft.todo(f"the description {file}: its package is not found here", described.at)
+        return
+    try:
+        document = read_urdf(file, packages)
+    except RejectedError as error:
+        draft.todo(f"the description: {error.findings[0].message}", described.at)
+        return
+    for one in document.findings():
+        if one.severity == "error":
+            draft.todo(f"the description has {one.code}: {one.message}", described.at)
+    robot = imported(document, workshop.target, draft.robot, packages.local, workshop.library)
+    if described.prefix:
+        draft.sections["ros"]["frame_prefix"] = described.prefix
+    put_into(draft, robot)

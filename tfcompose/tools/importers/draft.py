@@ -1,0 +1,224 @@
+"""A robot file in the making: sections with entries, comments at them, and what could not be imported.
+
+Readers of launch files, scripts and running robots fill it in the order of their source; it writes
+the text.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, Span, finding
+from tfcompose.foundation.geometry import norm, normalised
+from tfcompose.model.robot import BUILT_IN
+from tfcompose.tools.importers.values import angle, rotation
+from tfcompose.tools.importers.yaml_text import comment, entry, flow, section, without_expressions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.foundation.geometry import Pose, Vector
+
+#: A section and the name of an entry in it; both are empty for the file itself.
+Entry = tuple[str, str]
+
+#: In the order of the language.
+SECTIONS = (
+    "args", "ros", "packages", "links", "joints", "ros2_control", "xml", "frames", "sensors", "parts", "containers",
+    "processes", "rules",
+)  # fmt: skip
+#: So near to 1 a quaternion's length is left as the source has it.
+_UNIT = 1e-7
+_NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
+
+
+@dataclass(slots=True)
+class Draft:
+    """A robot file in the making.
+
+    ``sections`` hold plain data as in a robot file, ``notes`` the comments above entries,
+    ``found`` what is not imported: each of those is a comment as well. ``head`` are comments above
+    everything, ``base`` the robot's base where it is not the usual one. ``brought`` are frames
+    that sensors bring: they are no roots. With ``has_unknown_frames`` there are parts that bring
+    others, whose names are not known.
+    """
+
+    robot: str
+    head: list[str] = field(default_factory=list)
+    base: str | None = None
+    sections: dict[str, dict[str, Any]] = field(
+        default_factory=lambda: {name: {} for name in SECTIONS}
+    )
+    notes: dict[Entry, list[str]] = field(default_factory=dict)
+    found: list[Finding] = field(default_factory=list)
+    brought: set[str] = field(default_factory=set)
+    has_unknown_frames: bool = False
+
+    def note(self, at: Entry, *texts: str) -> None:
+        """Put comments above an entry, each once."""
+        known = self.notes.setdefault(at, [])
+        known += [text for text in texts if text not in known]
+
+    def todo(
+        self, message: str, span: Span | None, at: Entry = ("", ""), advice: str = ""
+    ) -> None:
+        """Say that something of the source is not imported: in a comment, and as a finding."""
+        where = f"{posixpath.basename(span.file)}:{span.line}: " if span and span.file else ""
+        self.note(at, f"TODO {where}{message}")
+        one = finding("TF020", message, span, help=advice)
+        if one not in self.found:
+            self.found.append(one)
+
+    def frame(
+        self, parent: str, child: str, keys: Mapping[str, Any], span: Span | None, *notes: str
+    ) -> bool:
+        """Add a fixed frame, unless there is one of that name; return whether it was added."""
+        frames = self.sections["frames"]
+        known = frames.get(child)
+        if known is not None:
+            same = known == {"parent": parent, **keys}
+            more = "" if same else f"; {_described(parent, keys)} here"
+            self.todo(f"{child} is published a second time{more}", span, ("frames", child))
+            return False
+        frames[child] = {**({"parent": parent} if parent else {}), **keys}
+        self.note(("frames", child), *notes)
+        return True
+
+    def process(
+        self, wanted: str, keys: Mapping[str, Any], *notes: str, section: str = "processes"
+    ) -> str:
+        """Add a process, or a container, under a name that is free, and return that."""
+        name = self.free_name(wanted)
+        self.sections[section][name] = dict(keys)
+        self.note((section, name), *notes)
+        return name
+
+    def entry_of(self, process: str) -> Entry:
+        """Return the section of a process that is there, or of a container, with its name."""
+        return ("containers" if process in self.sections["containers"] else "processes", process)
+
+    def started(self) -> dict[str, dict[str, Any]]:
+        """Return the containers and processes by their names."""
+        return {**self.sections["containers"], **self.sections["processes"]}
+
+    def free_name(self, wanted: str) -> str:
+        """Return a name for a process or sensor, made of letters, digits and _; a number makes it one of its own."""
+        plain = _NO_NAME.sub("_", wanted).strip("_") or "process"
+        plain = plain if plain[0].isalpha() else f"process_{plain}"
+        taken = {
+            *self.sections["processes"],
+            *self.sections["sensors"],
+            *self.sections["containers"],
+            *BUILT_IN,
+        }
+        count, name = 1, plain
+        while name in taken:
+            count += 1
+            name = f"{plain}_{count}"
+        return name
+
+    def is_empty(self) -> bool:
+        """Return whether no section has an entry."""
+        return not any(self.sections.values())
+
+    def text(self) -> str:
+        """Return the robot file."""
+        sections = {name: entries for name, entries in self._with_roots().items() if entries}
+        lines = [
+            *comment(self.head),
+            *entry("tfcompose", 1),
+            *comment(self.notes.get(("", ""), ())),
+        ]
+        lines += entry("robot", self.robot)
+        lines += entry("base", self.base) if self.base else []
+        sections, variables = without_expressions(sections)
+        lines += variables
+        for title, entries in sections.items():
+            lines += section(
+                title, entries, {name: self.notes.get((title, name), ()) for name in entries}
+            )
+        homeless = [
+            f"{name}: {text}" for (title, name), texts in self.notes.items()
+            if title and name not in sections.get(title, {}) for text in texts
+        ]  # fmt: skip
+        return "\n".join([*lines, *comment(homeless), ""])
+
+    def _with_roots(self) -> dict[str, dict[str, Any]]:
+        """Return the sections, with frames that are parents alone as roots above those that hang on them."""
+        frames = self.sections["frames"]
+        known = {*frames, *self.sections["links"], *self.brought}
+        known |= {joint["child"] for joint in self.sections["joints"].values()}
+        if self.has_unknown_frames:
+            return self.sections
+        roots: dict[str, Any] = {}
+        for keys in [
+            *frames.values(),
+            *self.sections["joints"].values(),
+            *self.sections["sensors"].values(),
+        ]:
+            for key in ("parent", "relative_to"):
+                if isinstance(parent := keys.get(key), str) and parent not in known:
+                    roots.setdefault(parent, {})
+        return {**self.sections, "frames": {**roots, **frames}}
+
+
+def _described(parent: str, keys: Mapping[str, Any]) -> str:
+    return flow({"parent": parent, **keys})
+
+
+def pose_keys(
+    pose: Pose, rpy: Vector | None = None, *, quaternion: bool = False
+) -> dict[str, Any]:
+    """Return the keys of a pose, nothing for the identity.
+
+    ``rpy`` (rad) are the angles by which the source has the rotation; with ``quaternion`` it has
+    that, and it is kept where no whole degrees are meant.
+    """
+    keys: dict[str, Any] = {"xyz": [value + 0.0 for value in pose.xyz]} if any(pose.xyz) else {}
+    if rpy is not None:
+        angles = [angle(value) for value in rpy]
+        return keys | ({"rpy": angles} if any(angles) else {})
+    unit = normalised(pose.quat_xyzw)
+    turned = rotation(unit)
+    if turned is None or not any(turned):
+        return keys
+    if quaternion and any(isinstance(value, float) and value for value in turned):
+        return keys | {
+            "quat_xyzw": list(pose.quat_xyzw if abs(norm(pose.quat_xyzw) - 1) < _UNIT else unit)
+        }
+    return keys | {"rpy": turned}
+
+
+def robot_name(wanted: str) -> str:
+    """Return a robot's name: lower case letters, digits and _, a letter first."""
+    name = re.sub(r"[^a-z0-9_]+", "_", wanted.lower()).strip("_")
+    if not name:
+        return "robot"
+    return name if name[0].isalpha() else f"robot_{name}"
+
+
+def text_with_findings(draft: Draft, lint: Callable[[str], Compiled]) -> tuple[str, Compiled]:
+    """Return the robot file, and what ``lint`` finds in it.
+
+    Names of the source are no errors, and a source without frames gives a robot of one.
+    """
+    if not any(
+        draft.sections[title] for title in ("links", "joints", "frames", "sensors", "parts")
+    ):
+        draft.frame(
+            "",
+            "base_link",
+            {},
+            None,
+            "the source says nothing of frames: those of the robot belong here",
+        )
+    compiled = lint(draft.text())
+    if any(one.code == "TF501" for one in compiled.errors):
+        draft.sections["rules"]["TF501"] = "warning"
+        draft.note(("rules", "TF501"), "the names are those of the source")
+        compiled = lint(draft.text())
+    return draft.text(), compiled

@@ -1,0 +1,489 @@
+"""Clearpath's ``robot.yaml`` and Autoware's calibration files, as drafts of robot files.
+
+Clearpath's generator calls a xacro macro of its packages for the platform and for each attachment,
+mount, sensor and manipulator (read in clearpath_common and clearpath_config): so do the parts
+here, under the same names.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.tools.importers.draft import pose_keys
+from tfcompose.tools.importers.programs import where
+from tfcompose.tools.importers.yaml_text import Expression, argument
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping
+    from pathlib import Path
+
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.files import Target
+    from tfcompose.spec.load import Path as Steps
+    from tfcompose.spec.load import Source
+    from tfcompose.tools.importers.draft import Draft
+
+_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+#: Of Clearpath's mounts those that are in a folder of their own.
+_PACS = frozenset({"bracket", "riser"})
+#: What all macros are written for: the generated robot includes it.
+_COMMON = "package://clearpath_platform_description/urdf/common.urdf.xacro"
+#: What of an entry the macro's call has, and not its parameters.
+_OF_CALL = frozenset({"parent", "xyz", "rpy", "name", "type", "enabled", "urdf_enabled"})
+_LINKS = ("box", "cylinder", "frame", "mesh", "sphere")
+#: Where everything is mounted that names no parent.
+_MOUNT = "default_mount"
+#: What attachments are unless the file says otherwise, by platform and type: the generator writes all of it.
+_ATTACHMENTS: dict[str, dict[str, Any]] = {
+    "a200.bumper": {"parent": "front_bumper_mount", "extension": 0.0},
+    "a200.sensor_arch": {"model": "sensor_arch_300"},
+    "j100.fender": {"parent": "base_link"},
+    "j100.top_plate": {"model": "ark_enclosure"},
+    **{
+        f"{one}.top_plate": {"model": "pacs", "height": 0.1}
+        for one in ("dd100", "dd150", "do100", "do150")
+    },
+    "r100.fams": {"table_height": 0.3},
+    "r100.hams": {"table_height": 0.6, "mount_height": 0.3},
+    "r100.tower": {"left_height": 0.0, "right_height": 0.0},
+}
+#: The joint by which an arm of Kinova's knows its gripper, behind the gripper's name.
+_GRIPPER_JOINTS = {
+    "kinova_2f_lite": "_right_finger_bottom_joint",
+    "robotiq_2f_140": "_finger_joint",
+    "robotiq_2f_85": "_robotiq_85_left_knuckle_joint",
+}
+_NUMBERED = re.compile(r"([a-z]+[0-9]+)-")
+
+
+def is_clearpath(source: Source) -> bool:
+    """Return whether it is a robot.yaml of Clearpath's."""
+    data = source.data
+    return isinstance(data.get("serial_number"), str) and bool(
+        data.keys() & {"platform", "system", "sensors", "mounts"}
+    )
+
+
+def is_autoware(source: Source) -> bool:
+    """Return whether it is a calibration of Autoware's: frames below their parents, each with x, y, z and angles."""
+    return bool(source.data) and all(
+        isinstance(children, dict)
+        and bool(children)
+        and all(
+            isinstance(child, dict) and {"x", "y", "z"} <= child.keys()
+            for child in children.values()
+        )
+        for children in source.data.values()
+    )
+
+
+def add_autoware(draft: Draft, source: Source) -> None:
+    """Add the frames of a calibration file."""
+    draft.note(
+        ("", ""),
+        "calibration: FILE at a frame, instead of xyz and rpy, reads its pose from the calibration"
+        " file",
+    )
+    for parent, children in source.data.items():
+        for child, values in children.items():
+            path: Steps = (parent, child)
+            at = source.at_key(path)
+            numbers = [values.get(axis, 0.0) for axis in _AXES]
+            if not all(
+                isinstance(value, (int, float)) and not isinstance(value, bool)
+                for value in numbers
+            ):
+                draft.todo(f"{child}: its values are no numbers", at)
+                continue
+            x, y, z, roll, pitch, yaw = map(float, numbers)
+            rpy = (roll, pitch, yaw)
+            pose = Pose((x, y, z), quat_from_rpy(*rpy))
+            draft.frame(str(parent), str(child), pose_keys(pose, rpy), at, where(at))
+            left = sorted(values.keys() - set(_AXES))
+            if left:
+                draft.todo(f"{child}: {', '.join(left)}", at, ("frames", str(child)))
+
+
+#: In a package of individual parameters: config/VEHICLE/KIT/….
+_CALIBRATIONS = ("sensors_calibration.yaml", "sensor_kit_calibration.yaml")
+
+
+def add_vehicles(
+    draft: Draft,
+    folder: Path,
+    target: Target,
+    given: Mapping[str, str],
+    read: Callable[[str], Source],
+) -> None:
+    """Add the calibrations of Autoware's individual parameters, in which each vehicle has a folder with its kits.
+
+    The folder of a kit's description has but those of the kit itself. The vehicle stays an
+    argument of the robot file where there are several. ``given`` may choose ``vehicle_id`` and
+    ``sensor_model``, as Autoware's launch files do.
+
+    Raises:
+        RejectedError: if the folder holds no calibrations, or it is not said of which kit they are
+        to be.
+    """
+    config = folder / "config" if (folder / "config").is_dir() else folder
+    own = sorted(
+        config.glob("*_calibration.yaml"),
+        key=lambda file: (file.name != _CALIBRATIONS[0], file.name),
+    )
+    if own:  # the description of one kit, whose calibrations are those of no vehicle
+        for file in own:
+            add_kit(draft, read(str(file)))
+        return
+    kits: dict[str, list[str]] = {}
+    for inner in sorted(config.glob("*/*")):
+        if any((inner / name).is_file() for name in _CALIBRATIONS):
+            kits.setdefault(inner.name, []).append(inner.parent.name)
+    kit = _one_of(kits, given, "sensor_model", str(folder), "kit")
+    vehicles = kits[kit]
+    usual = "default" if "default" in vehicles else vehicles[0]
+    vehicle = _one_of(
+        vehicles,
+        {"vehicle_id": given.get("vehicle_id", usual)},
+        "vehicle_id",
+        str(folder),
+        "vehicle",
+    )
+    word = argument("vehicle_id", vehicle) if len(vehicles) > 1 else vehicle
+    if len(vehicles) > 1:
+        draft.sections["args"]["vehicle_id"] = {
+            "type": "string",
+            "default": vehicle,
+            "choices": vehicles,
+        }
+    draft.note(("", ""), f"the calibrations of {kit}, which stay in their files")
+    for name in _CALIBRATIONS:
+        files = {one: config / one / kit / name for one in vehicles}
+        sources = {one: read(str(file)) for one, file in files.items() if file.is_file()}
+        path = f"{target.from_folder(str(config))}/{word}/{kit}/{name}"
+        for (parent, child), several in _calibrated(draft, sources).items():
+            keys: dict[str, Any] = {"calibration": path}
+            if len(several) < len(vehicles):
+                keys["when"] = Expression(
+                    " or ".join(f"args.vehicle_id == {_quoted(one)}" for one in several)
+                )
+            draft.frame(parent, child, keys, sources[several[0]].at_key((parent, child)))
+
+
+def _quoted(word: str) -> str:
+    return f'"{word}"' if "'" in word else f"'{word}'"
+
+
+def _calibrated(draft: Draft, sources: Mapping[str, Source]) -> dict[tuple[str, str], list[str]]:
+    """Return the edges of calibrations, each with the vehicles that have it."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for vehicle, source in sources.items():
+        if not is_autoware(source):
+            draft.todo("no calibration of Autoware's", Span(source.file))
+            continue
+        for parent, children in source.data.items():
+            for child in children:
+                found.setdefault((str(parent), str(child)), []).append(vehicle)
+    return found
+
+
+def _one_of(
+    known: Collection[str], given: Mapping[str, str], argument: str, folder: str, what: str
+) -> str:
+    """Return the name that is given, or the only one.
+
+    Raises:
+        RejectedError: if there are none, or several and none is given.
+    """
+    wanted = given.get(argument, next(iter(known)) if len(known) == 1 else "")
+    if wanted in known:
+        return wanted
+    if not known:
+        message = f"no {' or '.join(_CALIBRATIONS)} below config/VEHICLE/KIT"
+        raise RejectedError([finding("TF002", message, Span(folder))])
+    message = f"there is no {what} {wanted}" if wanted else f"several {what}s: {', '.join(known)}"
+    raise RejectedError(
+        [finding("TF002", message, Span(folder), help=f"{argument}:={'|'.join(known)}")]
+    )
+
+
+def _words(value: Any) -> Any:
+    """Return a macro's parameter: of a list its words, as URDF has them."""
+    return " ".join(map(str, value)) if isinstance(value, list) else value
+
+
+class _Clearpath:
+    """Reads one robot.yaml."""
+
+    def __init__(self, draft: Draft, source: Source) -> None:
+        self.draft, self.source, self.data = draft, source, source.data
+        found = _NUMBERED.match(source.data["serial_number"])
+        self.platform = found[1] if found else ""
+
+    def add(self) -> None:
+        """Add all sections."""
+        self._system()
+        self._platform()
+        for kind in _LINKS:
+            for index, path, entry in self._entries("links", kind):
+                name = entry.get("name", f"{kind}_{index}")
+                file = f"clearpath_platform_description/urdf/links/{kind}.urdf.xacro"
+                self._part(name, file, kind, self._link(name, entry, path), path)
+        for kind in self._kinds("mounts"):
+            for index, path, entry in self._entries("mounts", kind):
+                folder = "urdf/pacs" if kind in _PACS else "urdf"
+                file = f"clearpath_mounts_description/{folder}/{kind}.urdf.xacro"
+                self._part(f"{kind}_{index}", file, kind, entry, path)
+        for kind in self._kinds("sensors"):
+            for index, path, entry in self._entries("sensors", kind):
+                self._sensor(f"{kind}_{index}", entry, path)
+        for kind in self._kinds("manipulators"):
+            self._manipulators(kind)
+        known = {
+            "serial_number",
+            "version",
+            "system",
+            "platform",
+            "links",
+            "mounts",
+            "sensors",
+            "manipulators",
+        }
+        for key in self.data.keys() - known:
+            self.draft.todo(f"{key} is not imported", self.source.at_key((key,)))
+
+    def _kinds(self, section: str) -> list[str]:
+        found = self.data.get(section)
+        return (
+            [kind for kind, several in found.items() if several] if isinstance(found, dict) else []
+        )
+
+    def _entries(self, section: str, kind: str) -> list[tuple[int, Steps, dict[str, Any]]]:
+        found = self.data.get(section)
+        several = found.get(kind) if isinstance(found, dict) else None
+        listed = several if isinstance(several, list) else []
+        return [
+            (i, (section, kind, i), one) for i, one in enumerate(listed) if isinstance(one, dict)
+        ]
+
+    def _system(self) -> None:
+        system = self.data.get("system")
+        ros = system.get("ros2") if isinstance(system, dict) else None
+        settings = ros if isinstance(ros, dict) else {}
+        namespace = str(settings.get("namespace") or "").strip("/")
+        if namespace:
+            self.draft.sections["ros"] |= {"namespace": namespace, "isolate": "topics"}
+            self.draft.note(
+                ("ros", "namespace"), where(self.source.at_key(("system", "ros2", "namespace")))
+            )
+        domain = settings.get("domain_id")
+        if isinstance(domain, int):
+            self.draft.sections["ros"]["domain_id"] = domain
+        for key in settings.keys() - {"namespace", "domain_id"}:
+            self.draft.todo(
+                f"system.ros2.{key}: {settings[key]}", self.source.at_key(("system", "ros2", key))
+            )
+        for key in system.keys() - {"ros2"} if isinstance(system, dict) else ():
+            self.draft.todo(f"system.{key} is not imported", self.source.at_key(("system", key)))
+
+    def _platform(self) -> None:
+        platform = self.data.get("platform")
+        given = platform if isinstance(platform, dict) else {}
+        at = self.source.at_key(("serial_number",))
+        if not self.platform or self.platform == "generic":
+            self.draft.todo(
+                f"the platform {self.data['serial_number']}: its description is of its own", at
+            )
+        else:
+            model = self.platform
+            wheel = {"wheel": given.get("wheel", "default")}
+            keys = {
+                "xacro": self._of_platform(),
+                "macro": model,
+                "params": wheel,
+                "include": [_COMMON],
+            }
+            self.draft.sections["parts"]["platform"] = keys
+            self.draft.note(("parts", "platform"), where(at))
+        attachments = given.get("attachments")
+        for index, entry in enumerate(attachments if isinstance(attachments, list) else []):
+            path: Steps = ("platform", "attachments", index)
+            if not isinstance(entry, dict):
+                continue
+            of, _, kind = str(entry.get("type", "")).rpartition(".")
+            if entry.get("enabled") is False:
+                self.draft.todo(
+                    f"the attachment {entry.get('name')} is not enabled", self.source.at(path)
+                )
+                continue
+            of = of or self.platform
+            file = f"clearpath_platform_description/urdf/{of}/attachments/{kind}.urdf.xacro"
+            usual = {"model": "default", **_ATTACHMENTS.get(f"{of}.{kind}", {})}
+            self._part(
+                str(entry.get("name", f"{kind}_{index}")), file, kind, {**usual, **entry}, path
+            )
+        for key in given.keys() - {"attachments", "wheel"}:
+            self.draft.todo(
+                f"platform.{key} is not imported", self.source.at_key(("platform", key))
+            )
+
+    def _of_platform(self) -> str:
+        return f"package://clearpath_platform_description/urdf/{self.platform}/{self.platform}.urdf.xacro"
+
+    def _link(self, name: str, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
+        """Return a link's entry with its mesh as an address; what its macro does not take is named."""
+        own = dict(entry)
+        mesh = own.get("visual")
+        if isinstance(mesh, dict):
+            package, file = mesh.get("package"), str(mesh.get("path", ""))
+            own["visual"] = (
+                f"package://{package}/{file.lstrip('/')}" if package else f"file://{file}"
+            )
+        for key in own.keys() & {"offset_xyz", "offset_rpy"}:
+            self.draft.todo(
+                f"{name}: {key}, which Clearpath's macros do not take",
+                self.source.at_key((*path, key)),
+            )
+            del own[key]
+        return own
+
+    def _part(self, name: str, file: str, macro: str, entry: dict[str, Any], path: Steps) -> None:
+        """Add what the generator calls a macro for."""
+        at = self.source.at(path)
+        params: dict[str, Any] = {"name": name, "parent_link": entry.get("parent", _MOUNT)}
+        origin = self._origin(entry, path)
+        params |= {key: _words(value) for key, value in entry.items() if key not in _OF_CALL}
+        params["origin"] = origin
+        include = [_COMMON]
+        if (
+            path[0] in {"sensors", "manipulators"} and self.platform
+        ):  # which take the arguments of the platform's file
+            include.append(self._of_platform())
+        keys: dict[str, Any] = {
+            "xacro": f"package://{file}",
+            "macro": macro,
+            "params": params,
+            "include": include,
+        }
+        self.draft.sections["parts"][name] = keys
+        self.draft.note(("parts", name), where(at))
+
+    def _origin(self, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
+        vectors: dict[str, Vector] = {}
+        for key in ("xyz", "rpy"):
+            value = entry.get(key, [0.0, 0.0, 0.0])
+            is_one = isinstance(value, list) and len(value) == len(_AXES) // 2
+            if not is_one or not all(isinstance(one, (int, float)) for one in value):
+                self.draft.todo(f"{key}: {value}", self.source.at((*path, key)))
+                value = [0.0, 0.0, 0.0]
+            x, y, z = map(float, value)
+            vectors[key] = (x, y, z)
+        return pose_keys(Pose(vectors["xyz"], quat_from_rpy(*vectors["rpy"])), vectors["rpy"]) or {
+            "xyz": [0, 0, 0]
+        }
+
+    def _sensor(self, name: str, entry: dict[str, Any], path: Steps) -> None:
+        at, model = self.source.at(path), str(entry.get("model", ""))
+        if entry.get("urdf_enabled") is False:
+            self.draft.todo(f"{name}, {model}: urdf_enabled is false", at)
+            return
+        call = {key: value for key, value in entry.items() if key in _OF_CALL} | self._camera(
+            model, entry
+        )
+        self._part(
+            name, f"clearpath_sensors_description/urdf/{model}.urdf.xacro", model, call, path
+        )
+        given = entry.get("ros_parameters")
+        if entry.get("launch_enabled") is not False:
+            nodes = f" ({', '.join(given)})" if isinstance(given, dict) and given else ""
+            message = f"the driver of {name}, {model}, with its ros_parameters{nodes}"
+            advice = (
+                "sensors: {NAME: {preset: VENDOR/MODEL, …}} starts it; tfcompose presets lists"
+                " them"
+            )
+            self.draft.todo(message, at, ("parts", name), advice)
+
+    def _camera(self, model: str, entry: dict[str, Any]) -> dict[str, Any]:
+        """Return the parameter that says which camera of a family it is, where the macro's frames depend on it."""
+        if model != "stereolabs_zed":
+            return {}
+        node = (entry.get("ros_parameters") or {}).get(model)
+        known = (
+            node.get("general.camera_model") or (node.get("general") or {}).get("camera_model")
+            if node
+            else None
+        )
+        return {"model": known or "zed2"}
+
+    def _arm(self, name: str, model: str, entry: dict[str, Any]) -> dict[str, Any]:
+        """Return the parameters of an arm's macro."""
+        own = {
+            key: value
+            for key, value in entry.items()
+            if key not in {"model", "ros_parameters", "gripper", "ip"}
+        }
+        if "ip" in entry:
+            own["robot_ip" if model.startswith("kinova") else "ip"] = entry["ip"]
+        gripper = entry.get("gripper")
+        joint = (
+            _GRIPPER_JOINTS.get(str(gripper.get("model", "")))
+            if isinstance(gripper, dict)
+            else None
+        )
+        if joint and model.startswith("kinova"):
+            own |= {
+                "use_internal_bus_gripper_comm": True,
+                "gripper_joint_name": f"{name}_gripper{joint}",
+            }
+        return own
+
+    def _manipulators(self, kind: str) -> None:
+        for index, path, entry in self._entries("manipulators", kind):
+            model, type_ = str(entry.get("model", "")), kind.removesuffix("s")
+            name = f"{type_}_{index}"
+            own = self._arm(name, model, entry)
+            self._part(
+                name,
+                f"clearpath_manipulators_description/urdf/{type_}/{model}.urdf.xacro",
+                model,
+                own,
+                path,
+            )
+            gripper = entry.get("gripper")
+            if isinstance(gripper, dict):
+                grip = str(gripper.get("model", ""))
+                file = f"clearpath_manipulators_description/urdf/gripper/{grip}.urdf.xacro"
+                held = {"parent": f"{name}_end_effector_link", **gripper}
+                held.pop("model", None)
+                self._part(f"{name}_gripper", file, grip, held, (*path, "gripper"))
+            for key in entry.keys() & {"ros_parameters"}:
+                self.draft.todo(
+                    f"{name}: {key}", self.source.at_key((*path, key)), ("parts", name)
+                )
+
+
+def add_clearpath(draft: Draft, source: Source) -> None:
+    """Add what Clearpath's generator would describe."""
+    draft.has_unknown_frames = True
+    _Clearpath(draft, source).add()
+
+
+def add_kit(draft: Draft, source: Source) -> None:
+    """Add a YAML file that is Clearpath's or Autoware's.
+
+    Raises:
+        RejectedError: if it is neither.
+    """
+    if is_clearpath(source):
+        add_clearpath(draft, source)
+    elif is_autoware(source):
+        add_autoware(draft, source)
+    else:
+        advice = (
+            "a launch file has launch:, Clearpath's robot.yaml serial_number:, Autoware's PARENT:"
+            " {CHILD: {x, …}}"
+        )
+        message = "neither a launch file, nor Clearpath's robot.yaml, nor Autoware's calibration"
+        raise RejectedError([finding("TF002", message, Span(source.file), help=advice)])

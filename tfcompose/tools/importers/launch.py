@@ -1,0 +1,673 @@
+"""Launch files as a draft of a robot file: read in a process of their own, and put into the language's words."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import posixpath
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.foundation.numbers import number
+from tfcompose.tools.importers.confinement import MOST_CPU_S
+from tfcompose.tools.importers.launch_substitutions import marks, scalar_of, shown, without_marks
+from tfcompose.tools.importers.programs import (
+    CONTAINERS,
+    JOINT_PUBLISHERS,
+    PACKAGE,
+    STATE_PUBLISHER,
+    Description,
+    Program,
+    add_program,
+    is_setting,
+    isolated,
+    one_clock,
+    path_from,
+    where,
+)
+from tfcompose.tools.importers.static_transforms import PLUGIN as STATIC_PLUGIN
+from tfcompose.tools.importers.static_transforms import PROGRAM, static_words
+from tfcompose.tools.importers.yaml_text import Bare, Expression, arguments_in, with_values
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.model.files import Target
+    from tfcompose.tools.importers.draft import Draft
+
+_MOST_WALL_S = 60.0
+#: How long launch waits for the end of a process after each signal, unless it is told.
+_LAUNCH_STOP_S = 5.0
+#: The delay that exports write for a process without ``restart_delay``, whose first delay it is.
+_FIRST_DELAY_S = 1.0
+#: Programs whose arguments are read: they have their values.
+_READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
+_ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
+#: The programs that are components, too, by their classes.
+_PUBLISHERS = {
+    STATIC_PLUGIN: PROGRAM,
+    "robot_state_publisher::RobotStatePublisher": STATE_PUBLISHER,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Launch:
+    """A launch file to be read.
+
+    ``arguments`` are its launch arguments, ``packages`` folders of packages that are not
+    installed, ``prefixes`` those of AMENT_PREFIX_PATH. With ``every_branch`` conditions do not
+    count. ``shown`` is how findings call the file, unless by its name.
+    """
+
+    file: str
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    packages: Mapping[str, str] = field(default_factory=dict)
+    prefixes: tuple[str, ...] = ()
+    every_branch: bool = False
+    shown: str = ""
+
+    def span(self, line: int = 1) -> Span:
+        """Return the place of one of its lines."""
+        return Span(self.shown or self.file, max(line, 1))
+
+
+def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
+    """Add what a launch file starts to the draft; return what its robot_state_publishers are given.
+
+    Raises:
+        RejectedError: if it is no launch file, or takes too long or too much memory.
+    """
+    answer = _read(draft, launch)
+    draft.head[-1] += ", a launch file of ROS 1" if _is_of_ros1(answer) else ""
+    work = _Work(draft, launch, target, answer["records"])
+    for record in answer["records"]:
+        work.add(record)
+    work.finish(answer["decided"])
+    if answer["stopped"]:
+        at = launch.span(answer["line"])
+        if not any(
+            one["kind"] not in {"package", "todo", "argument"} for one in answer["records"]
+        ):
+            raise RejectedError([finding("TF002", answer["stopped"], at), *draft.found])
+        draft.todo(f"the launch file is not read to its end: {answer['stopped']}", at)
+    return work.descriptions
+
+
+def _read(draft: Draft, launch: Launch) -> dict[str, Any]:
+    """Return what ROS's launch records of the file where it is installed, what the stand-in does elsewhere.
+
+    Raises:
+        RejectedError: if neither can read it.
+    """
+    if not has_launch():
+        return _answered(launch, with_launch=False)
+    try:
+        answer = _answered(launch, with_launch=True)
+        reason, line = answer["stopped"], answer["line"]
+    except RejectedError as error:
+        reason, line = error.findings[0].message, 0
+    if not reason:
+        draft.head[-1] += ", read by ROS's launch"
+        return answer
+    answer = _answered(launch, with_launch=False)
+    if not answer["stopped"] and not _is_of_ros1(answer):
+        draft.todo(
+            f"ROS's launch does not read it, tfcompose's own reader does: {reason}",
+            launch.span(line),
+        )
+    return answer
+
+
+def _is_of_ros1(answer: dict[str, Any]) -> bool:
+    return any(record.get("ros1") for record in answer["records"])
+
+
+def has_launch() -> bool:
+    """Return whether ROS's launch can be imported: folders of that name are often near launch files, and are not it."""
+    several = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
+    return all(spec is not None and spec.origin is not None for spec in several)
+
+
+def _answered(launch: Launch, *, with_launch: bool) -> dict[str, Any]:
+    request = {
+        "file": str(Path(launch.file).absolute()), "arguments": dict(launch.arguments),
+        "packages": {name: str(Path(folder).absolute()) for name, folder in launch.packages.items()},
+        "prefixes": list(launch.prefixes), "every_branch": launch.every_branch, "with_launch": with_launch,
+    }  # fmt: skip
+    program = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "  # a Ctrl-C is for who asked
+        f"sys.path[:] = {sys.path!r}; from tfcompose.tools.importers.launch_process import main;"
+        " main()"
+    )
+    command = [sys.executable, "-c", program]
+    try:
+        done = subprocess.run(
+            command, input=json.dumps(request).encode(), stdout=subprocess.PIPE, timeout=_MOST_WALL_S, check=False,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"},  # sets keep an order
+        )  # fmt: skip
+        answer: dict[str, Any] = json.loads(done.stdout)
+    except subprocess.TimeoutExpired:
+        message = f"the launch file takes more than {_MOST_WALL_S:g} s"
+    except json.JSONDecodeError:
+        message = f"the launch file ends the process that reads it, with code {done.returncode}"
+        if done.returncode < 0:
+            message = f"the launch file {_ended_by(-done.returncode)}"
+    else:
+        return answer
+    raise RejectedError([finding("TF008", message, launch.span())])
+
+
+def _ended_by(number: int) -> str:
+    """Return what a signal says of the launch file whose process it ended."""
+    if number == signal.SIGXCPU:
+        return f"takes more than {MOST_CPU_S} s of processor time"
+    if number == signal.SIGKILL:
+        return "was killed by the system, or by somebody: it may have needed too much memory"
+    name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
+    return f"was ended by {name}, which it raised itself, or a module that it loads"
+
+
+class _Work:
+    """Turns records into entries."""
+
+    def __init__(
+        self, draft: Draft, launch: Launch, target: Target, records: list[dict[str, Any]]
+    ) -> None:
+        self.draft, self.launch, self.target = draft, launch, target
+        self.descriptions: list[Description] = []
+        self._names: dict[str, str] = {}
+        self._after: list[tuple[str, dict[str, str]]] = []
+        self._delays: list[tuple[str, float]] = []
+        self._missing: dict[str, Span] = {}
+        #: What components are loaded into: the ids of actions, or the full names of nodes.
+        self._loading = {
+            record["container"] for record in records if record["kind"] == "component"
+        }
+        self._containers: dict[str, str] = {}
+        self._components: list[tuple[str, str, Span]] = []
+        self._only_when = ""
+        self._arguments: dict[str, tuple[dict[str, Any], Span]] = {}
+        #: Those whose values are in frames.
+        self._read: set[str] = set()
+
+    def add(self, record: dict[str, Any]) -> None:
+        """Add one record."""
+        span = self._span(record["at"])
+        kind = record["kind"]
+        several: dict[str, Callable[[dict[str, Any], Span], None]] = {
+            "node": self._node,
+            "process": self._node,
+            "container": self._node,
+            "component": self._component,
+            "include": self._include,
+            "argument": self._argument,
+            "lifecycle": self._lifecycle,
+            "required": self._required,
+        }
+        if kind in several:
+            several[kind](record, span)
+        elif kind == "package":
+            self._missing.setdefault(record["name"], span)
+        elif kind == "skipped":
+            self.draft.todo(
+                f"left out: {record['text']}", span, advice="--all-branches takes it in"
+            )
+        else:
+            self.draft.todo(record["text"], span)
+
+    def finish(self, decided: list[str]) -> None:
+        """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
+        self._args({*decided, *self._read})
+        self._into_containers()
+        started = self.draft.started()
+        for name, after in self._after:
+            own = started[name].get("container")
+            known = {
+                self._names[key]: what
+                for key, what in after.items()
+                if self._names.get(key, own) != own
+            }
+            if known:
+                started[name].setdefault("after", {}).update(known)
+        self._delay()
+        one_clock(self.draft)
+        for package, span in self._missing.items():
+            self.draft.todo(f"package {package} not found", span, advice=_ADVICE)
+
+    def _span(self, at: Any) -> Span:
+        file, line = (at[0], at[1]) if at else ("", 1)
+        absolute = str(Path(self.launch.file).absolute())
+        return (
+            self.launch.span(line)
+            if file in {absolute, ""}
+            else Span(os.path.relpath(file), max(line, 1))
+        )
+
+    def _argument(self, record: dict[str, Any], span: Span) -> None:
+        self._arguments[record["name"]] = (record, span)
+
+    def _args(self, decided: set[str]) -> None:
+        """Add the arguments that entries name, and say of the others which values they had."""
+        used = arguments_in(self.draft.sections) | self._in_conditions()
+        unread = {
+            name: span
+            for name, (_, span) in self._arguments.items()
+            if name not in used and name not in decided
+        }
+        if unread:
+            several = f"the launch argument{'' if len(unread) == 1 else 's'} {', '.join(unread)}"
+            self.draft.todo(
+                f"nothing that is imported reads {several}", next(iter(unread.values()))
+            )
+        fixed: dict[str, Span] = {}
+        for name, (record, span) in self._arguments.items():
+            value, at = record["value"], ("args", name)
+            if name in used:
+                typed = scalar_of(value)
+                kind = {str: "string", float: "float"}.get(type(typed))
+                keys: dict[str, Any] = {"type": kind} if kind else {}
+                keys |= {"default": typed}
+                choices = [scalar_of(one) for one in record["choices"]]
+                keys |= (
+                    {"choices": choices}
+                    if choices and {type(one) for one in choices} == {type(typed)}
+                    else {}
+                )
+                keys |= (
+                    {"description": " ".join(record["description"].split())}
+                    if record["description"].strip()
+                    else {}
+                )
+                keys |= {"env": record["env"]} if record["env"] else {}
+                self.draft.sections["args"][name] = keys
+                self.draft.note(at, where(span))
+            if name in decided:
+                fixed[f"{name}:={shown(value) or repr('')}"] = span
+                if name in used:
+                    self.draft.note(
+                        at,
+                        f"where it decides what is started, or is computed with, it is {value!r}",
+                    )
+        if fixed:
+            several = (
+                f"{'this launch argument' if len(fixed) == 1 else 'these launch arguments'}:"
+                f" {' '.join(fixed)}"
+            )
+            advice = (
+                "import … NAME:=VALUE takes another value, --all-branches what conditions"
+                " leave out"
+            )
+            self.draft.todo(
+                f"what is imported holds for {several}", next(iter(fixed.values())), advice=advice
+            )
+
+    def _in_conditions(self) -> set[str]:
+        texts = [keys["when"] for entries in self.draft.sections.values() for keys in entries.values()
+                 if isinstance(keys, dict) and "when" in keys]  # fmt: skip
+        return {
+            name
+            for text in texts
+            for name in re.findall(r"\bargs\.([A-Za-z_][A-Za-z0-9_]*)", text)
+        }
+
+    def _node(self, record: dict[str, Any], span: Span) -> None:
+        program = self._program(record, span)
+        self._only_when = record.get("only_when", "")
+        if program.executable == STATE_PUBLISHER:
+            self._describe(program, span)
+            return
+        before = set(self.draft.sections["frames"])
+        name = add_program(self.draft, program, self.target)
+        if name is None:
+            for child in self.draft.sections["frames"].keys() - before:
+                self._conditions(record, ("frames", child))
+            return
+        self._started(record, name)
+        if program.loads:
+            self._containers[str(record["id"])] = self._containers[_full_name(program)] = name
+
+    def _started(self, record: dict[str, Any], name: str) -> None:
+        """Keep of what was added when it is started."""
+        self._names[str(record.get("id"))] = name
+        self._conditions(record, self.draft.entry_of(name))
+        if record.get("after"):
+            self._after.append((name, record["after"]))
+        if record.get("period"):
+            self._delays.append((name, record["period"]))
+
+    def _component(self, record: dict[str, Any], span: Span) -> None:
+        """Add a node that a container loads; that of a stock publisher's class is what its program is."""
+        plugin = record["plugin"]
+        if plugin in _PUBLISHERS:
+            words = static_words(record["params"]) if plugin == STATIC_PLUGIN else []
+            record = {**record, "executable": _PUBLISHERS[plugin], "argv": words}
+            self._node(record | ({"params": []} if words else {}), span)
+            return
+        program = replace(self._program(record, span), plugin=plugin)
+        extra: dict[str, Any] = {}
+        for one in record["extra"]:
+            extra |= one if isinstance(one, dict) else {}
+        keys = {"extra_arguments": extra} if extra else {}
+        name = add_program(self.draft, replace(program, keys=keys), self.target) or ""
+        self._started(record, name)
+        self._components.append((name, record["container"], span))
+
+    def _into_containers(self) -> None:
+        """Let components name their containers; one that the launch file does not start runs already."""
+        for name, wanted, span in self._components:
+            if wanted not in self._containers:
+                namespace, _, node = wanted.strip("/").rpartition("/")
+                free = self.draft.free_name(node)
+                keys: dict[str, Any] = {"external": True} | (
+                    {"node": node} if node != free else {}
+                )
+                keys |= {"namespace": namespace} if namespace else {}
+                note = where(span, "the source starts no such container: it is started elsewhere")
+                self._containers[wanted] = self.draft.process(
+                    free, keys, note, section="containers"
+                )
+            self.draft.sections["processes"][name]["container"] = self._containers[wanted]
+
+    def _conditions(self, record: dict[str, Any], at: tuple[str, str]) -> None:
+        for text in record.get("when", ()):
+            self.draft.note(at, f"only if {text}")
+        if record.get("only_when"):
+            entry = self.draft.sections[at[0]][at[1]]
+            entry["when"] = Expression(record["only_when"])
+
+    def _program(self, record: dict[str, Any], span: Span) -> Program:
+        todo: list[str] = []
+        params, description = _split_description(record.get("params", []), todo)
+        keys = self._keys(record, todo)
+        argv = tuple(record.get("argv", ()))
+        if record.get("executable") in _READ:
+            self._read |= arguments_in(list(argv))
+            argv = tuple(map(with_values, argv))
+        else:
+            argv = tuple(_without_texts(word, todo) for word in argv)
+        reader = None if record["kind"] == "process" else "ros2"
+        loads = record["kind"] == "container" or self._is_container(record)
+        if record.get("ros1"):
+            description = (
+                description if record["executable"] == STATE_PUBLISHER else None
+            )  # it is one of all nodes'
+            reader = "tf" if record["package"] == "tf" else "tf2_ros"
+        return Program(
+            span, record.get("package"), record.get("executable"), argv, bool(record.get("shell")),
+            record.get("name"), record.get("label"), record.get("namespace"), tuple(params),
+            tuple((old, new) for old, new in record.get("remap", ())), self._env(record), keys,
+            record.get("period", 0.0), reader, description, tuple(todo), loads,  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    def _is_container(self, record: dict[str, Any]) -> bool:
+        """Return whether a node loads components: by its program, or because some are loaded into it."""
+        if record["kind"] != "node":
+            return False
+        is_stock = record["package"] == CONTAINERS and record["executable"].startswith(
+            "component_container"
+        )
+        named = f"{(record['namespace'] or '').rstrip('/')}/{record['name']}"
+        return is_stock or bool({str(record["id"]), named} & self._loading)
+
+    def _env(self, record: dict[str, Any]) -> dict[str, str]:
+        """Return the process's variables, but for those that are settings of all."""
+        return {
+            name: value
+            for name, value in record.get("env", {}).items()
+            if not is_setting(self.draft, name, value)
+        }
+
+    def _keys(self, record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
+        keys: dict[str, Any] = {}
+        if record.get("lifecycle"):
+            keys["lifecycle"] = record["lifecycle"]
+        if record.get("cwd"):
+            keys["cwd"] = path_from(self.target, record["cwd"])
+        if record.get("required"):
+            keys["required"] = True
+        if record.get("respawn"):
+            keys |= _restarts(record)
+        if record.get("prefix"):
+            try:
+                keys["prefix"] = shlex.split(record["prefix"])
+            except ValueError:
+                todo.append(f"the prefix {record['prefix']}")
+        if record.get("only_env"):
+            todo.append("env replaces the environment: here its variables are added to it")
+        keys |= _output(record.get("output"))
+        if record.get("emulate_tty"):
+            keys["emulate_tty"] = True
+        keys |= _stop(record, todo)
+        return keys
+
+    def _describe(self, program: Program, span: Span) -> None:
+        params: dict[str, Any] = {}
+        for one in program.params:
+            params |= one if isinstance(one, dict) else {}
+        described = program.description
+        if described is None and program.argv and program.argv[0].endswith(".urdf"):
+            described = Description(file=program.argv[0])
+        if described is None:
+            self.draft.todo("robot_state_publisher without a description that is known here", span)
+            return
+        rest = {key: value for key, value in params.items() if key != "robot_description"}
+        self._state_publisher_params(rest, program, span)
+        if self._only_when:
+            self.draft.todo(f"robot_state_publisher is there only when {self._only_when}", span)
+        self.descriptions.append(
+            replace(described, at=span, prefix=str(rest.get("frame_prefix", "")))
+        )
+
+    def _state_publisher_params(
+        self, params: dict[str, Any], program: Program, span: Span
+    ) -> None:
+        ros, joints = (
+            self.draft.sections["ros"],
+            self.draft.sections["processes"].setdefault("joints", {}),
+        )
+        if params.get("use_sim_time") is True:
+            ros["clock"] = "sim"
+        own = {
+            key: params[key] for key in ("publish_frequency", "ignore_timestamp") if key in params
+        }
+        if own:
+            joints.setdefault("params", {}).update(own)
+            self.draft.note(
+                ("processes", "joints"), where(span, "what robot_state_publisher is told")
+            )
+        if not joints:
+            del self.draft.sections["processes"]["joints"]
+        known = {
+            "use_sim_time",
+            "publish_frequency",
+            "ignore_timestamp",
+            "frame_prefix",
+            "use_tf_static",
+        }
+        for key in params.keys() - known:
+            self.draft.todo(f"robot_state_publisher: the parameter {key}", span)
+        if program.namespace and program.namespace.strip("/"):
+            ros.setdefault("namespace", program.namespace.strip("/"))
+        moved = dict(program.remap)
+        if not isolated(self.draft, moved, program.namespace):
+            self.draft.todo(f"robot_state_publisher is remapped: {moved}", span)
+        for one in program.todo:
+            self.draft.todo(one, span)
+
+    def _include(self, record: dict[str, Any], span: Span) -> None:
+        """Add a launch file of a package that is not found as one process."""
+        package, _, file = record["file"].removeprefix(PACKAGE).partition("/")
+        keys: dict[str, Any] = {"run": {"launch": f"{package}/{file.removeprefix('launch/')}"}}
+        todo: list[str] = []
+        if record["args"]:
+            keys["run"]["args"] = {
+                key: _without_texts(value, todo) for key, value in record["args"].items()
+            }
+        namespace = (record.get("namespace") or "").strip("/")
+        keys |= {"namespace": namespace} if namespace else {}
+        env = self._env(record)
+        keys |= {"env": env} if env else {}
+        name = posixpath.basename(file).partition(".")[0]
+        name = self.draft.process(
+            name, keys, where(span, "an included launch file, which runs as one process")
+        )
+        self._conditions(record, ("processes", name))
+        for one in todo:
+            self.draft.todo(one, span, ("processes", name))
+        if record.get("after"):
+            self._after.append((name, record["after"]))
+        if record.get("period"):
+            self._delays.append((name, record["period"]))
+
+    def _lifecycle(self, record: dict[str, Any], span: Span) -> None:
+        name = self._names.get(str(record["node"]))
+        if name is None:
+            self.draft.todo("a change of a lifecycle node's state", span)
+        else:
+            process = self.draft.started()[name]
+            if process.get("lifecycle") != "active":
+                process["lifecycle"] = record["state"]
+
+    def _required(self, record: dict[str, Any], span: Span) -> None:
+        name = self._names.get(str(record["node"]))
+        if name is None:
+            self.draft.todo("the end of a process ends all", span)
+        else:
+            self.draft.started()[name]["required"] = True
+
+    def _delay(self) -> None:
+        """Let what a timer starts wait: for a process that counts as ready after that time."""
+        processes, started = self.draft.sections["processes"], self.draft.started()
+        gates: dict[float, str] = {}
+        unfit = {name for name, _ in self._delays}
+        unfit |= {self._names.get(key, "") for _, after in self._after for key in after}
+        for name, period_s in self._delays:
+            if period_s not in gates:
+                free = [
+                    one for one in self._names.values()
+                    if one not in unfit and one not in gates.values() and "run" in started[one]
+                    and not {"ready", "after", "when"} & processes[one].keys()
+                ]  # fmt: skip
+                if free:
+                    gates[period_s] = free[0]
+                    processes[free[0]]["ready"] = {"time": _seconds(period_s)}
+                else:
+                    text = number(period_s)
+                    gate = self.draft.process(
+                        f"delay_{text}", {"run": ["sleep", text]}, "the time of a timer"
+                    )
+                    gates[period_s] = gate
+            gate = gates[period_s]
+            what = "done" if processes[gate]["run"] == ["sleep", number(period_s)] else "ready"
+            started[name].setdefault("after", {})[gate] = what
+
+
+def _full_name(program: Program) -> str:
+    return f"{(program.namespace or '').rstrip('/')}/{program.name}"
+
+
+def _seconds(value: float) -> Bare:
+    return Bare(f"{number(value)} s")
+
+
+def _without_texts(word: str, todo: list[str]) -> str:
+    """Return a word of a command in which files stand for what xacro makes of them, or for their texts."""
+    plain, files = without_marks(word)
+    todo += [
+        f"an argument is what is made of {shown(file)}, or its text: here it is the file's name"
+        for file in files
+    ]
+    return plain
+
+
+def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], Description | None]:
+    """Return parameters without descriptions, and the robot's description."""
+    description: Description | None = None
+    kept: list[Any] = []
+    for one in params:
+        if isinstance(one, str):
+            kept.append(one)
+            continue
+        own = {}
+        for key, value in one.items():
+            if key == "robot_description" and isinstance(value, str):
+                description = _description(value)
+            elif isinstance(value, str) and marks(value):
+                todo.append(
+                    f"the parameter {key}, which is the text of {_description(value).file}"
+                )
+            elif value is None or value == [] or not _is_finite(value) or not _is_uniform(value):
+                todo.append(f"the parameter {key}: {value!r}")
+            else:
+                own[key] = value
+        if own:
+            kept.append(own)
+    return kept, description
+
+
+def _is_uniform(value: Any) -> bool:
+    if not isinstance(value, list):
+        return True
+    return len({type(one) for one in value}) == 1 and isinstance(value[0], (bool, int, float, str))
+
+
+def _is_finite(value: Any) -> bool:
+    several = value if isinstance(value, list) else [value]
+    return all(math.isfinite(one) for one in several if isinstance(one, float))
+
+
+def _description(value: str) -> Description:
+    found = marks(value)
+    return Description(found[0]["file"], found[0]["args"]) if found else Description(text=value)
+
+
+def _output(given: str | list[str] | None) -> dict[str, str]:
+    """Return the key for where launch sends a process's output, by its word for it or by the places.
+
+    With the word ``screen`` people want to see it: so they do by default here, and have it in the
+    log beside.
+    """
+    if given is None or isinstance(given, str):
+        return {"output": "log"} if given in {"log", "own_log"} else {}
+    if "screen" not in given:
+        return {"output": "log"}
+    return {"output": "screen"} if given == ["screen"] else {}
+
+
+def _stop(record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
+    """Return how long launch waits for an end after SIGINT, and after SIGTERM."""
+    times: dict[str, float] = {}
+    for key in ("sigterm_timeout", "sigkill_timeout"):
+        try:
+            times[key] = float(record.get(key, _LAUNCH_STOP_S))
+        except ValueError:
+            times[key] = math.nan
+        if not (math.isfinite(times[key]) and times[key] >= 0):
+            todo.append(f"{key} {record[key]}")
+            del times[key]
+    if len(times) < 2 or set(times.values()) == {_LAUNCH_STOP_S}:  # noqa: PLR2004 (both are known)
+        return {}
+    timeout_s, kill_s = times["sigterm_timeout"], times["sigkill_timeout"]
+    stop = {"timeout": _seconds(timeout_s)} if timeout_s != _LAUNCH_STOP_S else {}
+    return {"stop": stop | ({"kill_timeout": _seconds(kill_s)} if kill_s != timeout_s else {})}
+
+
+def _restarts(record: dict[str, Any]) -> dict[str, Any]:
+    """Return how a process that respawns is started again."""
+    keys: dict[str, Any] = {"restart": "always"}
+    retries = record.get("respawn_max_retries", -1)
+    if retries >= 0:
+        keys["max_restarts"] = int(retries)
+    delay_s = record.get("respawn_delay", 0.0)
+    if math.isfinite(delay_s) and delay_s > 0 and delay_s != _FIRST_DELAY_S:
+        keys["restart_delay"] = _seconds(delay_s)
+    return keys

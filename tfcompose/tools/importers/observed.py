@@ -1,0 +1,244 @@
+"""A tree that was observed, live or in a bag, as a draft: what is published, by which nodes, how often."""
+
+from __future__ import annotations
+
+import math
+import posixpath
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE
+from tfcompose.foundation.findings import Span
+from tfcompose.foundation.numbers import number
+from tfcompose.model.robot import Edge, Robot
+from tfcompose.tools.importers.draft import pose_keys
+from tfcompose.tools.importers.programs import STATE_PUBLISHER
+from tfcompose.tools.importers.robot_file import sensor_keys
+from tfcompose.tools.importers.sensors import recognised
+from tfcompose.tools.importers.yaml_text import Bare, flow
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from tfcompose.compiler.resolve import Library
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.tf.live.edges import EdgeState
+    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.sensors import Recognised
+
+#: The process that owns moving edges whose publisher nobody knows, as in a bag.
+RECORDED = "recorded"
+#: The node of tfcompose's own that publishes fixed edges.
+STATIC = "tfcompose_static"
+#: A rate is taken for a rounder one that is so near.
+_NEAR = 0.03
+_PID = re.compile(r"as pid (\d+)")
+_STEPS = (1, 2, 2.5, 3, 4, 5, 6, 7.5, 8, 10)
+
+
+@dataclass(slots=True)
+class Observed:
+    """What becomes of one observation.
+
+    ``where`` gives, by a publisher's id, on which machine and as which process it runs;
+    ``words_of`` the command line of a process of this machine, empty where that cannot be had.
+    ``namespace`` is that of the robot, without slashes.
+    """
+
+    draft: Draft
+    where: Callable[[bytes | None], str]
+    words_of: Callable[[int], Sequence[str]]
+    namespace: str = ""
+    _owners: dict[str, str] = field(default_factory=dict)
+    _poses: dict[str, Pose] = field(default_factory=dict)
+
+    def add(self, edges: Iterable[EdgeState]) -> None:
+        """Add the edges, parents before children, and their owners."""
+        taken = [edge for edge in edges if edge.stream.rejections < edge.stream.arrivals.count]
+        for edge in _parents_first(taken):
+            self._edge(edge)
+
+    def _edge(self, edge: EdgeState) -> None:
+        stream, frames = edge.stream, self.draft.sections["frames"]
+        at = ("frames", edge.child)
+        if edge.child in frames:
+            if edge.present is not False:
+                publisher = edge.publisher or "another publisher"
+                self.draft.todo(f"{publisher} publishes {edge.name} as well", None, at)
+            return
+        frames[edge.child] = {}  # its place is kept while its owner is named
+        if stream.static:
+            self._poses[edge.child] = stream.pose
+        owner = None if stream.static and self._is_own(edge) else self._owner(edge)
+        keys: dict[str, Any] = {"parent": edge.parent}
+        if stream.static:
+            keys |= pose_keys(stream.pose, quaternion=True)
+            keys |= {"owner": owner, "static": True} if owner else {}
+        else:
+            keys |= {"owner": owner or self._unknown()}
+            rate = round_rate(edge.timing.rate)
+            keys |= {"rate": Bare(f"{number(rate)} Hz")} if rate else {}
+        frames[edge.child] = keys
+
+    def _is_own(self, edge: EdgeState) -> bool:
+        """Return whether tfcompose's publisher of fixed edges sends the edge, or a stock node in its place."""
+        below = f"/{self.namespace}/" if self.namespace else "/"
+        return len(edge.nodes) == 1 and edge.nodes[0] in {below + STATIC, below + STATE_PUBLISHER}
+
+    def recognise(self, library: Library) -> None:
+        """Put sensors in the place of the fixed frames that a preset has, if at most one driver publishes these."""
+        frames = self.draft.sections["frames"]
+        for publisher in (DRIVER, TFCOMPOSE):
+            sensors, undecided = recognised(self._fixed(), library, publisher)
+            for sensor in sensors:
+                owners = {edge.child: frames[edge.child].get("owner") for edge in sensor.inside}
+                drivers = {owner for child, owner in owners.items() if child in sensor.sent} or {
+                    None
+                }
+                others = {
+                    owner for child, owner in owners.items() if child not in sensor.sent
+                } or {None}
+                if (
+                    others == {None}
+                    and len(drivers) == 1
+                    and (drivers == {None}) is (publisher == TFCOMPOSE)
+                ):
+                    self._sensor(sensor, drivers.pop() or "")
+            for mount, note in undecided.items():
+                if mount in frames:
+                    self.draft.note(("frames", mount), note)
+
+    def _fixed(self) -> Robot:
+        """Return the fixed frames that are in the draft as a robot."""
+        at, frames = Span(""), self.draft.sections["frames"]
+        edges = tuple(
+            Edge(parent=keys["parent"], child=child, kind="static", owner="", pose=self._poses[child], at=at)
+            for child, keys in frames.items() if child in self._poses
+        )  # fmt: skip
+        return Robot(
+            "", "", dict.fromkeys((edge.child for edge in edges), at), edges, {}, (), None
+        )
+
+    def _sensor(self, sensor: Recognised, driver: str) -> None:
+        """Put a sensor in the place of its frames; ``driver`` is the process that publishes those inside of it."""
+        frames, mount = self.draft.sections["frames"], sensor.mount.child
+        taken = sensor.name in self.draft.sections["processes"]
+        new = self._renamed(sensor.name) if taken else ""
+        own = {key: value for key, value in frames[mount].items() if key in {"owner", "static"}}
+        pose = pose_keys(sensor.mount.pose, quaternion=True)
+        keys = sensor_keys(sensor, pose, {}, new if driver == sensor.name else driver) | own
+        self.draft.sections["sensors"][sensor.name] = keys
+        for edge in sensor.edges:
+            self.draft.note(
+                ("sensors", sensor.name), *self.draft.notes.pop(("frames", edge.child), ())
+            )
+            del frames[edge.child]
+            self.draft.brought.add(edge.child)
+
+    def _renamed(self, name: str) -> str:
+        """Give a process another name, which a sensor has: its driver is often called as it is."""
+        sections, at = self.draft.sections, ("processes", name)
+        node = next(node for node, process in self._owners.items() if process == name)
+        new = self.draft.free_name(f"{name}_driver")
+        sections["processes"] = {
+            (new if one == name else one): keys | ({"node": node} if one == name else {})
+            for one, keys in sections["processes"].items()
+        }
+        self.draft.notes["processes", new] = self.draft.notes.pop(at, [])
+        for keys in (*sections["frames"].values(), *sections["sensors"].values()):
+            keys |= {key: new for key in ("owner", "driver") if keys.get(key) == name}
+        self._owners[node] = new
+        return new
+
+    def _owner(self, edge: EdgeState) -> str | None:
+        """Return the process of an edge's publisher, or None where its node is not known."""
+        if len(edge.nodes) != 1:
+            for node in edge.nodes:
+                self.draft.note(
+                    ("frames", edge.child), f"one of {', '.join(edge.nodes)} publishes it"
+                )
+                return self._process(node, edge)
+            return None
+        return self._process(edge.nodes[0], edge)
+
+    def _process(self, node: str, edge: EdgeState) -> str:
+        if node not in self._owners:
+            base = posixpath.basename(node)
+            name = self.draft.free_name(base)
+            plain = node == f"/{name}"
+            keys: dict[str, Any] = {"external": True} | ({} if plain else {"node": node})
+            self._owners[node] = self.draft.process(name, keys, *self._notes(edge))
+            if _ANONYMOUS.fullmatch(base):
+                self.draft.note(("processes", self._owners[node]), _ANEW)
+        return self._owners[node]
+
+    def _notes(self, edge: EdgeState) -> Iterable[str]:
+        where = self.where(edge.stream.gid)
+        found = _PID.search(where)
+        words = self.words_of(int(found[1])) if found else ()
+        run = started_by(words)
+        if run:
+            yield f"it runs here as: run: {flow(run)}"
+        elif where:
+            yield f"it runs {where}"
+
+    def _unknown(self) -> str:
+        if RECORDED not in self.draft.sections["processes"]:
+            self.draft.process(
+                RECORDED,
+                {"external": True},
+                "TODO a recording does not say who publishes: name the processes",
+            )
+        return RECORDED
+
+
+#: How ROS 2's static_transform_publisher names its node unless it is told.
+_ANONYMOUS = re.compile(r"static_transform_publisher_[A-Za-z0-9]{16}")
+_ANEW = (
+    "its node has another name at each start: name it by -r __node:=NAME, or remove owner and"
+    " static at its frames"
+)
+
+
+def _parents_first(edges: Sequence[EdgeState]) -> list[EdgeState]:
+    """Return the edges from the roots on; of several to one child the newest first."""
+    parents = {edge.child: edge.parent for edge in edges}
+
+    def depth(frame: str) -> int:
+        count = 0
+        while frame in parents and count <= len(parents):
+            frame, count = parents[frame], count + 1
+        return count
+
+    return sorted(
+        edges, key=lambda edge: (depth(edge.child), edge.stream.static, edge.parent, edge.child)
+    )
+
+
+def round_rate(rate_hz: float | None) -> float | None:
+    """Return the rate (Hz) that was meant by one that was measured: a round one near it, or what is surely reached."""
+    if not rate_hz or not math.isfinite(rate_hz) or rate_hz <= 0:
+        return None
+    scale = 10.0 ** math.floor(math.log10(rate_hz))
+    near = min((step * scale for step in _STEPS), key=lambda value: abs(value - rate_hz))
+    if abs(near - rate_hz) <= _NEAR * rate_hz:
+        return float(f"{near:.6g}")
+    return float(f"{math.floor(rate_hz / scale * 10) / 10 * scale:.6g}")
+
+
+def started_by(words: Sequence[str]) -> dict[str, Any]:
+    """Return the package, executable and arguments of a command line; nothing where it is no package's program.
+
+    A program of a Python package has the interpreter in front.
+    """
+    rest = list(words)
+    if rest and posixpath.basename(rest[0]).startswith("python") and rest[1:]:
+        rest.pop(0)
+    found = re.search(r"/lib/([^/]+)/([^/]+)$", rest[0]) if rest else None
+    if found is None:
+        return {}
+    own = rest[1 : rest.index("--ros-args")] if "--ros-args" in rest else rest[1:]
+    ros = rest[rest.index("--ros-args") :] if "--ros-args" in rest else []
+    keys: dict[str, Any] = {"package": found[1], "executable": found[2]}
+    return keys | ({"args": [*own, *ros]} if own or ros else {})

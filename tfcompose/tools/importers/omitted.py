@@ -1,0 +1,216 @@
+"""What a robot file cannot hold of a URDF: it is left out or changed, with a note."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.urdf.blocks import read_block, unknown_references
+from tfcompose.compiler.urdf.schema import OPAQUE
+from tfcompose.foundation.geometry import normalised, quat_from_rpy
+from tfcompose.model.robot import BOUNDED, materials
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.compiler.urdf.lint import Document
+    from tfcompose.compiler.urdf.read import Element
+    from tfcompose.foundation.findings import Span
+    from tfcompose.foundation.geometry import Quaternion, Vector
+    from tfcompose.model.robot import Link, Material, Robot, Shape
+
+    #: A section of the robot file and the name of an entry in it; both are empty for the file
+    #: itself.
+    Entry = tuple[str, str]
+    Notes = dict[Entry, list[str]]
+
+#: Known attributes that no robot holds.
+_NOT_HELD = {
+    "link": ("type",),
+    "visual": ("name",),
+    "collision": ("name",),
+    "limit": ("acceleration", "jerk", "deceleration"),
+    "calibration": ("reference_position",),
+}
+#: What has no effect in a joint that does not move.
+_OF_MOTION = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
+#: Blocks that are ignored if they refer to nothing; ros2_control does not start with an unknown
+#: joint.
+_UNUSED = ("<gazebo", "<transmission")
+_MATERIAL = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def omitted(document: Document) -> Notes:
+    """Return what is left out of each link and joint, by reading or by import; of the robot itself under no name."""
+    notes: Notes = {}
+    entries: list[tuple[Span, Entry]] = []
+    colours = _described_materials(document.root)
+    for element in document.root.children:
+        if element.tag not in {"link", "joint"}:
+            continue
+        at = (f"{element.tag}s", element.attributes.get("name", ""))
+        entries.append((element.at, at))
+        several = list(dict.fromkeys(_in_element(element, colours)))
+        if several:
+            notes.setdefault(at, []).append(f"left out: {', '.join(several)}")
+        if _has_no_ends(element):
+            notes.setdefault(at, []).append(
+                "the source gives no lower and upper limit, and parsers take 0"
+            )
+    for one in document.converted.of_elements:  # of blocks and files nothing is left out for it
+        if one.span:
+            notes.setdefault(_entry_at(one.span, entries), []).append(
+                f"{one.code} in the source: {one.message}"
+            )
+    of_robot = list(_in_robot(document.root, document.robot))
+    if of_robot:
+        notes.setdefault(("", ""), []).append(f"left out: {', '.join(of_robot)}")
+    return notes
+
+
+def _has_no_ends(element: Element) -> bool:
+    limit = element.first("limit") if element.attributes.get("type") in BOUNDED else None
+    return limit is not None and not limit.attributes.keys() & {"lower", "upper"}
+
+
+def _entry_at(span: Span, entries: list[tuple[Span, Entry]]) -> Entry:
+    before = [entry for at, entry in entries if (at.line, at.column) <= (span.line, span.column)]
+    return before[-1] if before else ("", "")
+
+
+def _in_robot(root: Element, robot: Robot) -> Iterator[str]:
+    for name in root.attributes:
+        if name != "name" and not name.startswith("xmlns"):
+            yield f'{name}="{root.attributes[name]}"'
+    known = {material.name for material in materials(robot.links)}
+    unused = [
+        name
+        for one in root.all("material")
+        if (name := one.attributes.get("name", "")) not in known
+    ]
+    if unused:
+        yield f"the unused material{'s' if unused[1:] else ''} {', '.join(unused)}"
+
+
+def _in_element(element: Element, colours: frozenset[str]) -> Iterator[str]:
+    """Yield what is in a link or joint and has no place."""
+    if element.tag == "joint" and element.attributes.get("type") == "fixed":
+        words = [child.tag for child in element.children if child.tag in _OF_MOTION]
+        yield from (f"the {word} of a fixed joint" for word in words)
+    for one in _elements_in(element):
+        for name, value in one.attributes.items():
+            if ":" in name or name in _NOT_HELD.get(one.tag, ()):
+                yield f'{one.tag} {name}="{value}"'
+        yield from (f"<{child.tag}>" for child in one.children if ":" in child.tag)
+        if (
+            one.tag == "material"
+            and one.attributes.get("name") not in colours
+            and not one.children
+        ):
+            yield f"the undefined material {one.attributes.get('name', '')}"
+
+
+def _described_materials(root: Element) -> frozenset[str]:
+    """Return the names of the materials that have a colour or a texture somewhere."""
+    visuals = [one for link in root.all("link") for one in link.all("visual")]
+    several = [material for around in (root, *visuals) for material in around.all("material")]
+    return frozenset(one.attributes.get("name", "") for one in several if one.children)
+
+
+def _elements_in(element: Element) -> Iterator[Element]:
+    """Yield the element and those in it, but for what is other programs' business."""
+    waiting = [element]
+    while waiting:
+        one = waiting.pop()
+        yield one
+        waiting += [
+            child for child in one.children if child.tag not in OPAQUE and ":" not in child.tag
+        ]
+
+
+def angles(root: Element) -> dict[Quaternion, Vector]:
+    """Return roll, pitch and yaw (rad) of each origin as the source has them, by the rotation that they are."""
+    rpy: dict[Quaternion, Vector] = {}
+    for top in root.children:
+        for one in _elements_in(top) if top.tag in {"link", "joint"} else ():
+            words = one.attributes.get("rpy", "").split() if one.tag == "origin" else []
+            try:
+                roll, pitch, yaw = map(float, words)
+            except ValueError:
+                continue
+            if max(map(abs, (roll, pitch, yaw))) < 1e9:  # noqa: PLR2004 (as where poses are read)
+                rpy.setdefault(normalised(quat_from_rpy(roll, pitch, yaw)), (roll, pitch, yaw))
+    return rpy
+
+
+def without_unused_blocks(robot: Robot) -> tuple[Robot, list[str]]:
+    """Return the robot without blocks about links and joints that it does not have, with a note for each."""
+    joints = {edge.joint_name: None for edge in robot.edges}
+    blocks, notes = [], []
+    for block in robot.blocks:
+        (element,) = read_block(block.text, robot.file).children
+        unknown = (
+            list(unknown_references(element, robot.frames, joints))
+            if block.text.startswith(_UNUSED)
+            else []
+        )
+        if unknown:
+            notes.append(f"left out: {_named(element)}: {unknown[0].message}")
+        else:
+            blocks.append(block)
+    return replace(robot, blocks=tuple(blocks)), notes
+
+
+def _named(element: Element) -> str:
+    name = next((key for key in ("name", "reference") if key in element.attributes), None)
+    return f'<{element.tag} {name}="{element.attributes[name]}">' if name else f"<{element.tag}>"
+
+
+def with_material_names(robot: Robot) -> tuple[Robot, list[str]]:
+    """Return the robot whose materials have names of letters, digits and _, with what each was called before.
+
+    Parts of colours beyond 0 to 1 are taken as the nearest that there is, and that is noted too.
+    """
+    names: dict[str, str] = {}
+    notes: list[str] = []
+    for material in materials(robot.links):
+        if material.name not in names:
+            names[material.name] = name = _material_name(material.name, {*names.values()})
+            if name != material.name:
+                notes.append(f"the material {name} is called {material.name!r} in the source")
+        if material.rgba and _bounded(material) != material.rgba:
+            colour = ", ".join(f"{part:g}" for part in material.rgba)
+            notes.append(f"the colour {material.name} is {colour} in the source: parts are 0 to 1")
+
+    def shape(one: Shape) -> Shape:
+        if one.material is None:
+            return one
+        name = names.get(one.material.name, one.material.name)
+        return replace(one, material=replace(one.material, name=name, rgba=_bounded(one.material)))
+
+    def link(one: Link) -> Link:
+        return replace(one, visuals=tuple(map(shape, one.visuals)))
+
+    links = {name: link(one) for name, one in robot.links.items()}
+    return replace(robot, links=links), list(dict.fromkeys(notes))
+
+
+def _material_name(name: str, taken: set[str]) -> str:
+    free = (
+        name
+        if _MATERIAL.fullmatch(name)
+        else re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "material"
+    )
+    free = free if free[0].isalpha() else f"m_{free}"
+    while free in taken:
+        free += "_"
+    return free
+
+
+def _bounded(material: Material) -> tuple[float, float, float, float] | None:
+    """Return the colour with parts from 0 to 1."""
+    if material.rgba is None:
+        return None
+    red, green, blue, opacity = (min(max(part, 0.0), 1.0) for part in material.rgba)
+    return (red, green, blue, opacity)

@@ -1,0 +1,552 @@
+"""Programs that a script or a launch file starts, as entries of a robot file.
+
+A ``static_transform_publisher`` is a frame, a ``robot_state_publisher`` the part or the links of
+its description, a ``joint_state_publisher`` a stand-in for joint states; all others are processes.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
+from tfcompose.foundation.numbers import number
+from tfcompose.tools.importers.static_transforms import (
+    PROGRAM,
+    RefusedError,
+    reader_of,
+    static_transform,
+)
+from tfcompose.tools.importers.yaml_text import (
+    Bare,
+    Expression,
+    argument,
+    arguments_in,
+    parameter,
+    with_values,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.model.files import Target
+    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.static_transforms import Reader
+
+STATE_PUBLISHER = "robot_state_publisher"
+JOINT_PUBLISHERS = frozenset({"joint_state_publisher", "joint_state_publisher_gui"})
+_FROM_TOPIC = (
+    "nothing, if the node takes the description from the topic robot_description, where tfcompose"
+    " publishes it"
+)
+#: The package of the stock containers of components.
+CONTAINERS = "rclcpp_components"
+#: A component's package and class, which YAML needs no quotes for.
+_PLUGIN = re.compile(r"[A-Za-z]\w*/[A-Za-z_]\w*(::\w+)*", re.ASCII)
+_NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+#: Between the words of a class's name.
+_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+#: How often joint_state_publisher sends, unless it is told.
+_JOINTS_HZ = 10.0
+#: As what a path begins whose package is not found.
+PACKAGE = "package://"
+#: Words that stand before a program and leave it what it is.
+BEFORE = frozenset({"exec", "nohup", "time", "stdbuf", "setsid"})
+_TF = ("/tf", "/tf_static")
+#: What of the environment is a setting of all processes.
+_SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What a robot_state_publisher is given: a xacro ``file`` with ``args``, or the text of a URDF.
+
+    ``prefix`` is written in front of its frames.
+    """
+
+    file: str = ""
+    args: Mapping[str, str] = field(default_factory=dict)
+    text: str = ""
+    prefix: str = ""
+    at: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A program as the source starts it.
+
+    ``argv`` are its own arguments, or the whole command without a package; ``shell`` says that it
+    is one text for a shell. ``params`` are parameters, and names of files, in order: the last one
+    counts. ``namespace`` is absolute, or None where nothing is said. ``keys`` are further keys of
+    the process, as in a robot file; ``period_s`` is how long after the launch it is started.
+    ``todo`` is what of it could not be taken. It is a container of components if it ``loads``
+    them, and a component where it has a ``plugin``, its class.
+    """
+
+    at: Span | None
+    package: str | None = None
+    executable: str | None = None
+    argv: tuple[str, ...] = ()
+    shell: bool = False
+    name: str | None = None
+    label: str | None = None
+    namespace: str | None = None
+    params: tuple[Mapping[str, Any] | str, ...] = ()
+    remap: tuple[tuple[str, str], ...] = ()
+    env: Mapping[str, str] = field(default_factory=dict)
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    period_s: float = 0.0
+    reader: Reader | None = None
+    description: Description | None = None
+    todo: tuple[str, ...] = ()
+    loads: bool = False
+    plugin: str = ""
+
+
+def add_program(draft: Draft, program: Program, target: Target) -> str | None:
+    """Add a program to the draft; return the name of its process, or None where it is none.
+
+    A robot_state_publisher is not added here: its description makes links or a part, which
+    ``descriptions`` does.
+    """
+    program = _split(program)
+    if program.executable == PROGRAM:
+        _add_transform(draft, program)
+        return None
+    if program.executable in JOINT_PUBLISHERS:
+        return _add_joint_publisher(draft, program)
+    return _add_process(draft, program, target)
+
+
+def one_clock(draft: Draft) -> None:
+    """Let the robot's clock be what parameters of nodes say, or the argument that they name, if they all agree."""
+    several = [process["params"] for process in draft.started().values() if "params" in process]
+    found = {params["use_sim_time"] for params in several if "use_sim_time" in params}
+    if found == {True}:
+        draft.sections["ros"]["clock"] = "sim"
+        for process in draft.started().values():
+            if process.get("params", {}).pop("use_sim_time", None) and not process["params"]:
+                del process["params"]
+    elif len(found) == 1 and isinstance(text := found.pop(), str):
+        for name in arguments_in(text):
+            if text == argument(name, with_values(text)):
+                draft.sections["ros"]["clock"] = Expression(f"'sim' if args.{name} else 'wall'")
+
+
+def is_setting(draft: Draft, name: str, value: str) -> bool:
+    """Return whether a variable is a setting of the whole robot, which then has it: the first value counts."""
+    if name not in _SETTINGS:
+        return False
+    known = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
+    wanted = known[_SETTINGS[name]]
+    allowed = (
+        wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
+    )
+    return allowed and draft.sections["ros"].setdefault(_SETTINGS[name], wanted) == wanted
+
+
+def path_from(target: Target, path: str) -> str:
+    """Return a path as the robot file has it: from its folder, or absolute where they have but the root in common."""
+    begin = posixpath.normpath(posixpath.join(target.top, target.folder))
+    is_near = posixpath.commonpath([begin, posixpath.join(target.top, path)]) != "/"
+    return (
+        target.from_folder(path)
+        if is_near
+        else posixpath.normpath(posixpath.join(target.top, path))
+    )
+
+
+def where(at: Span | None, what: str = "") -> str:
+    """Return the place of a value as a comment has it."""
+    place = f"{posixpath.basename(at.file)}:{at.line}" if at and at.file else ""
+    return ": ".join(word for word in (place, what) if word)
+
+
+def _split(program: Program) -> Program:
+    """Return the program with what it is a command line of, and with its ROS arguments as keys."""
+    if program.package is None and not program.shell:
+        program = _of_command(program)
+    return _without_ros_arguments(program) if program.package is not None else program
+
+
+def _of_command(program: Program) -> Program:
+    """Return the package's program that a command starts, if it starts one."""
+    words = list(program.argv)
+    while words and words[0] in BEFORE:
+        words.pop(0)
+    match words:
+        case ["ros2", "run", package, executable, *rest] if not package.startswith("-"):
+            reader: Reader | None = "ros2"
+        case ["rosrun", package, executable, *rest] if not package.startswith("-"):
+            reader = "tf" if package == "tf" else "tf2_ros"
+        case [path, *rest] if posixpath.basename(path) == PROGRAM:
+            package, executable, reader = "tf2_ros", PROGRAM, None
+        case _:
+            return program
+    return replace(
+        program,
+        package=package,
+        executable=executable,
+        argv=tuple(rest),
+        reader=program.reader or reader,
+    )
+
+
+def _without_ros_arguments(program: Program) -> Program:
+    """Return the program with what ``--ros-args`` says as its keys; what has no key stays an argument."""
+    own: list[str] = []
+    kept: list[str] = []
+    params, remap = list(program.params), list(program.remap)
+    found: dict[str, Any] = {"name": program.name, "namespace": program.namespace}
+    keys = dict(program.keys)
+    inside = False
+    words = iter(program.argv)
+    for word in words:
+        if not inside or word in {"--ros-args", "--"}:
+            inside = word == "--ros-args" if word in {"--ros-args", "--"} else inside
+            if not inside and word != "--ros-args":
+                own.append(word)
+            continue
+        value = next(words, "") if word in _WITH_VALUE else ""
+        left, _, right = value.partition(":=")
+        if word in {"-r", "--remap"} and right:
+            rule = {"__node": "name", "__name": "name", "__ns": "namespace"}.get(left)
+            found |= {rule: right} if rule else {}
+            remap += [] if rule else [(left, right)]
+        elif word in {"-p", "--param"} and right:
+            params.append({left: _yaml_value(right)})
+        elif word == "--params-file":
+            params.append(value)
+        elif word == "--log-level" and with_values(value) in _LEVELS:
+            keys["log_level"] = value
+        else:
+            kept += [word, value] if value else [word]
+    argv = (*own, "--ros-args", *kept) if kept else tuple(own)
+    namespace, name = found["namespace"], found["name"]
+    return replace(
+        program,
+        argv=argv,
+        params=tuple(params),
+        remap=tuple(remap),
+        name=name,
+        namespace=namespace,
+        keys=keys,
+    )
+
+
+_WITH_VALUE = frozenset(
+    {"-r", "--remap", "-p", "--param", "--params-file", "--log-level", "-e", "--enclave"}
+)
+_LEVELS = frozenset({"debug", "info", "warn", "error", "fatal"})
+
+
+def _yaml_value(text: str) -> Any:
+    """Return a parameter of the command line, which ROS reads as YAML."""
+    plain = {"true": True, "false": False}
+    if text.lower() in plain:
+        return plain[text.lower()]
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
+
+
+def _add_transform(draft: Draft, program: Program) -> None:
+    at = program.at
+    moved = dict(program.remap)
+    reader = program.reader or reader_of(program.argv)
+    try:
+        transform = static_transform(program.argv, reader)
+    except RefusedError as error:
+        draft.todo(
+            f"{PROGRAM} {' '.join(program.argv)}: {error}", at, advice="write the frame by hand"
+        )
+        return
+    notes = [where(at, transform.order)]
+    added = draft.frame(transform.parent, transform.child, transform.keys(), at, *notes)
+    entry = ("frames", transform.child)
+    if added and not isolated(draft, moved, program.namespace):
+        several = ", ".join(f"{old} → {new}" for old, new in moved.items())
+        draft.todo(
+            f"the publisher is remapped: {several}",
+            at,
+            entry,
+            advice="ros: {namespace: …, isolate: topics}",
+        )
+    for one in program.todo:
+        draft.todo(one, at, entry)
+
+
+def isolated(draft: Draft, moved: Mapping[str, str], namespace: str | None) -> bool:
+    """Return whether remappings leave TF where it is, or put it below the namespace, which the draft then says."""
+    new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
+    if any(name != topic.strip("/") for topic, name in new.items()):
+        return False
+    if new and namespace and namespace.strip("/"):
+        draft.sections["ros"] |= {"namespace": namespace.strip("/"), "isolate": "topics"}
+    return True
+
+
+def _add_joint_publisher(draft: Draft, program: Program) -> str:
+    """Add a stand-in for joint states: all joints at 0, as joint_state_publisher has them unless it is told."""
+    params: dict[str, Any] = {}
+    for one in program.params:
+        params |= one if isinstance(one, dict) else {}
+    zeros = {
+        name.partition(".")[2]: value
+        for name, value in params.items()
+        if name.startswith("zeros.")
+    }
+    rate = params.get("rate", _JOINTS_HZ)
+    rate = (
+        float(rate)
+        if isinstance(rate, (int, float)) and not isinstance(rate, bool)
+        else _JOINTS_HZ
+    )
+    simulate: dict[str, Any] = {"joints": zeros or "zero", "rate": _hertz(rate)}
+    notes = [where(program.at, f"in the place of {program.executable}")]
+    name = draft.process(
+        program.name or program.executable or "joints", {"simulate": simulate}, *notes
+    )
+    entry = ("processes", name)
+    if str(program.executable).endswith("_gui"):
+        draft.note(entry, "it has no sliders: tfcompose view has")
+    left = [
+        key
+        for key in params
+        if key != "rate" and not key.startswith("zeros.") and key != "use_sim_time"
+    ]
+    for key in left:
+        draft.todo(f"{program.executable}: the parameter {key}", program.at, entry)
+    for one in (
+        *program.todo,
+        *(f"parameters of {file}" for file in program.params if isinstance(file, str)),
+    ):
+        draft.todo(one, program.at, entry)
+    return name
+
+
+def _hertz(value: float) -> Any:
+    return Bare(f"{number(value)} Hz")
+
+
+def _add_process(draft: Draft, program: Program, target: Target) -> str:
+    at, todo, advice = program.at, list(program.todo), ""
+    if not program.name and program.package and (name := _named_in_files(program.params)):
+        program = replace(program, name=name)
+    usual = (
+        _usual_name(program.package)
+        if program.package and not program.name and not program.plugin
+        else None
+    )
+    wanted = (
+        (program.name and program.label)
+        or program.name
+        or usual
+        or program.label
+        or _plain(program)
+        or "process"
+    )
+    name = draft.free_name(wanted)
+    keys = _way(program)
+    notes = [where(at)]
+    is_node = program.package is not None and "launch" not in keys.get("run", ())
+    if program.name and program.name != name:
+        keys["node"] = program.name
+    elif is_node and not program.name and not usual:
+        notes.append(f"the source does not name the node: it is called {name} here")
+    if program.namespace and program.namespace.strip("/"):
+        keys["namespace"] = program.namespace.strip("/")
+    params, left = _params(program.params, target, program.name or name)
+    keys |= {"params": params} if params else {}
+    keys |= {"remap": remappings(program.remap)} if program.remap else {}
+    keys |= {"env": dict(program.env)} if program.env else {}
+    keys |= dict(program.keys)
+    section = "containers" if program.loads else "processes"
+    draft.process(name, keys, *(note for note in notes if note), section=section)
+    for word in _texts((*program.argv, *program.env.values())):
+        if PACKAGE in word:
+            todo.append(f"{word} is in a package that is not found here: write its path")
+            advice = "--package NAME=FOLDER, or source the workspace's setup file"
+    for one in (*todo, *left):
+        draft.todo(one, at, (section, name), advice)
+    if program.description is not None:
+        draft.todo("the parameter robot_description", at, (section, name), _FROM_TOPIC)
+    return name
+
+
+def remappings(rules: Sequence[tuple[str, str]]) -> dict[str, str]:
+    """Return remappings as a robot file has them: ROS takes the first of several rules for one name."""
+    return dict(reversed(list(dict(reversed(rules)).items())))
+
+
+def _way(program: Program) -> dict[str, Any]:
+    """Return the keys that say how the program runs."""
+    if program.plugin:
+        name = f"{program.package}/{program.plugin}"
+        return {"component": Bare(name) if _PLUGIN.fullmatch(name) else name, "container": ""}
+    if program.loads:
+        return _container_keys(program)
+    return {"run": _run(program)} | ({"shell": True} if program.shell else {})
+
+
+#: Containers of rclcpp_components, with the keys that name them.
+_CONTAINERS: dict[str, dict[str, Any]] = {
+    "component_container": {},
+    "component_container_mt": {"executor": "multi"},
+    "component_container_isolated": {"isolation": "isolated"},
+}
+_MULTI = "--use_multi_threaded_executor"
+
+
+def _container_keys(program: Program) -> dict[str, Any]:
+    """Return what a container is: by its isolation and executor if it is a stock one, else by its program."""
+    words = list(program.argv)
+    stock = _CONTAINERS.get(program.executable or "") if program.package == CONTAINERS else None
+    if stock is None:
+        keys: dict[str, Any] = (
+            {"package": program.package} if program.package != CONTAINERS else {}
+        )
+        return keys | {"executable": program.executable} | ({"args": words} if words else {})
+    keys = dict(stock)
+    if keys.get("isolation") and _MULTI in words:
+        words.remove(_MULTI)
+        keys["executor"] = "multi"
+    return keys | ({"args": words} if words else {})
+
+
+def _named_in_files(params: Sequence[Mapping[str, Any] | str]) -> str | None:
+    """Return the node that parameter files are written for, where that is one alone; None where none is named."""
+    keys = [key for file in params if isinstance(file, str) for key in _nodes_in(file) or ()]
+    names = {key.rpartition("/")[2] for key in keys if "*" not in key}
+    name = names.pop() if len(names) == 1 else ""
+    return name if _NODE.fullmatch(name) else None
+
+
+def _usual_name(package: str) -> str | None:
+    """Return how the node of a package calls itself, where that is known."""
+    names = {
+        preset.node
+        for one in node_preset_names()
+        if (preset := node_preset(one)).package == package
+    }
+    return names.pop() if len(names) == 1 else None
+
+
+def _texts(words: Sequence[Any]) -> list[str]:
+    return [word for word in words if isinstance(word, str)]
+
+
+def _run(program: Program) -> Any:
+    """Return what ``run`` says of the program."""
+    if program.shell:
+        return " ".join(program.argv)
+    if program.package is not None:
+        run: dict[str, Any] = {"package": program.package, "executable": program.executable}
+        return run | ({"args": list(program.argv)} if program.argv else {})
+    match program.argv:
+        case ("ros2", "launch", package, file, *words) if (
+            all(":=" in word for word in words)
+            and ":=" not in file
+            and not package.startswith("-")
+        ):
+            run = {"launch": f"{package}/{file}"}
+            return run | ({"args": dict(word.split(":=", 1) for word in words)} if words else {})
+    return list(program.argv)
+
+
+def _plain(program: Program) -> str:
+    """Return the name of what is started, without its folder and ending."""
+    match program.argv:
+        case ("ros2", "launch", _, file, *_) if program.package is None:
+            word = file
+        case ("ros2", verb, *_) if program.package is None:
+            word = f"ros2_{verb}"
+        case _ if program.plugin:
+            return _CAMEL.sub("_", program.plugin.rpartition("::")[2]).lower()
+        case _:
+            word = program.executable or (
+                program.argv[0].split()[0] if program.argv and program.argv[0] else ""
+            )
+    plain = posixpath.basename(word).partition(".")[0]
+    script = next((one for one in program.argv[1:] if one.endswith(".py")), "")
+    return (
+        posixpath.basename(script).removesuffix(".py")
+        if script and plain.startswith("python")
+        else plain
+    )
+
+
+def _params(
+    given: Sequence[Mapping[str, Any] | str], target: Target, node: str
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the parameters as a robot file has them, files first, and what cannot be said of them.
+
+    What a file lays over the parameters before it is left to the file.
+    """
+    files: list[str] = []
+    own: dict[str, Any] = {}
+    left = []
+    for one in given:
+        if not isinstance(one, str):
+            own |= one
+        elif one.startswith(PACKAGE):
+            left.append(f"the parameters of {one}: the package is not found here")
+        else:
+            files.append(path_from(target, one))
+            known = _parameters_in(one, node) if own else set()
+            if known is None:
+                left.append(
+                    f"{one} is laid over the parameters before it: here they are laid over the"
+                    " file"
+                )
+            own = {key: value for key, value in own.items() if key not in (known or ())}
+    named: dict[str, Any] = {"file": files[0] if len(files) == 1 else files} if files else {}
+    return named | {key: parameter(value) for key, value in own.items()}, left
+
+
+def _parameters_in(file: str, node: str) -> set[str] | None:
+    """Return the full names of a node's parameters in a file, or None where it cannot be read."""
+    data = _nodes_in(file)
+    if data is None:
+        return None
+    several = (
+        one["ros__parameters"]
+        for key, one in data.items()
+        if key.rpartition("/")[2] in {"*", "**", node}
+    )
+    return {name for params in several for name in _full_names(params, "")}
+
+
+def _full_names(params: Any, above: str) -> Iterator[str]:
+    for key, value in params.items() if isinstance(params, dict) else ():
+        if isinstance(value, dict):
+            yield from _full_names(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}"
+
+
+def _nodes_in(file: str) -> dict[str, Any] | None:
+    """Return what a parameter file has by its nodes' full names, or None where it is not there, or has none."""
+    try:
+        data = yaml.load(Path(file).read_text("utf-8"), Loader=yaml.CSafeLoader)
+        return dict(_nodes_below(data, "")) or None
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError):
+        return None
+
+
+def _nodes_below(data: Any, above: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    for key, one in data.items() if isinstance(data, dict) else ():
+        name = f"{above}/{str(key).strip('/')}"
+        if isinstance(one, dict) and "ros__parameters" in one:
+            yield name, one
+        else:
+            yield from _nodes_below(one, name)

@@ -1,0 +1,357 @@
+"""The text of the robot file of an imported robot.
+
+Its sections and keys are in the order of the language; what could not be imported is noted in
+comments, at its place.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.urdf.blocks import with_hardware
+from tfcompose.tools.importers.draft import robot_name
+from tfcompose.tools.importers.omitted import (
+    angles,
+    omitted,
+    with_material_names,
+    without_unused_blocks,
+)
+from tfcompose.tools.importers.sensors import recognised
+from tfcompose.tools.importers.values import Values, rotation
+from tfcompose.tools.importers.yaml_text import (
+    comment,
+    dedented,
+    entry,
+    section,
+    without_expressions,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.compiler.resolve import Library
+    from tfcompose.compiler.urdf.lint import Document
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.foundation.geometry import Quaternion, Vector
+    from tfcompose.model.files import Target
+    from tfcompose.model.robot import Edge, Robot
+    from tfcompose.model.robot.hardware import Hardware, Interface
+    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.omitted import Entry
+    from tfcompose.tools.importers.sensors import Recognised
+
+
+#: Who publishes planar and floating joints: a URDF does not say it.
+MOVER = "mover"
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """A robot on its way into a robot file.
+
+    ``name`` is its name there, ``target`` where that file will be. ``notes`` say of each entry
+    what of it is left out, and why. ``rpy`` has the angles (rad) by which the source has
+    rotations; ``packages`` are folders of packages, as the robot file is to name them; ``rules``
+    are the levels of findings that the source gives reason for.
+    """
+
+    robot: Robot
+    name: str
+    target: Target
+    sensors: tuple[Recognised, ...] = ()
+    notes: Mapping[Entry, Iterable[str]] = field(default_factory=dict)
+    rpy: Mapping[Quaternion, Vector] = field(default_factory=dict)
+    packages: Mapping[str, str] = field(default_factory=dict)
+    rules: Mapping[str, str] = field(default_factory=dict)
+
+
+def robot_file(imported: Imported, head: Iterable[str]) -> str:
+    """Return the robot file of an imported robot; ``head`` are comments above everything."""
+    return "\n".join([*_Writer(imported).lines(head), ""])
+
+
+def put_into(draft: Draft, imported: Imported) -> None:
+    """Put what was imported of a description into the draft of a robot that is more than that."""
+    writer = _Writer(imported)
+    for title, entries in writer.sections().items():
+        draft.sections[title].update(entries)
+    for at, notes in writer.notes.items():
+        draft.note(at, *notes)
+    draft.brought |= writer.brought
+    draft.base = draft.base or writer.base()
+
+
+class _Writer:
+    """Writes one robot; each section is a mapping, in the order of the source."""
+
+    def __init__(self, imported: Imported) -> None:
+        self.imported, self.robot = imported, imported.robot
+        self.values = Values(imported.rpy, imported.robot, imported.target)
+        self.notes: dict[Entry, list[str]] = {
+            at: list(notes) for at, notes in imported.notes.items()
+        }
+        self.brought = {edge.child for sensor in imported.sensors for edge in sensor.edges}
+        self.fixed = self._fixed()
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections in the order of the language; ``notes`` are complete then."""
+        imported, robot, links, joints = self.imported, self.robot, self._links(), self._joints()
+        return {
+            "packages": dict(imported.packages),
+            "links": links,
+            "joints": joints,
+            "ros2_control": {one.name: _hardware(one) for one in robot.hardware},
+            "xml": {block.name: dedented(block.text) for block in robot.blocks},
+            "frames": {
+                child: self._mount(edge)
+                for child, edge in self.fixed.items()
+                if not self._has_body(child)
+            },
+            "sensors": {sensor.name: self._sensor(sensor) for sensor in imported.sensors},
+            "processes": self._processes(),
+            "rules": dict(imported.rules),
+        }
+
+    def lines(self, head: Iterable[str]) -> list[str]:
+        imported, sections = self.imported, self.sections()
+        lines = [
+            *comment(head),
+            *entry("tfcompose", 1),
+            *comment(self._of("", "")),
+            *entry("robot", imported.name),
+        ]
+        base = self.base()
+        lines += entry("base", base) if base else []
+        sections, variables = without_expressions(sections)
+        lines += variables
+        lines += comment(self._homeless(sections))
+        for title, entries in sections.items():
+            lines += section(title, entries, {key: self._of(title, key) for key in entries})
+        return lines
+
+    def _of(self, title: str, name: str) -> list[str]:
+        return self.notes.get((title, name), [])
+
+    def _homeless(self, sections: dict[str, dict[str, Any]]) -> list[str]:
+        """Return the notes of what has no entry of its own; a frame with a body has its notes there."""
+        homeless = []
+        for (title, name), notes in list(self.notes.items()):
+            if title == "frames" and name not in sections["frames"] and name in sections["links"]:
+                self.notes["links", name] = self._of("links", name) + notes
+            elif title and name not in sections[title]:
+                homeless += [f"{name}: {note}" for note in notes]
+        return homeless
+
+    def _note(self, title: str, name: str, *notes: str) -> None:
+        if notes:
+            self.notes.setdefault((title, name), []).extend(notes)
+
+    def _fixed(self) -> dict[str, Edge]:
+        """Return the edges that do not move and are no sensor's, by child; of several to one child, the first."""
+        fixed: dict[str, Edge] = {}
+        for edge in self.robot.edges:
+            moves = edge.joint or edge.free
+            if not moves and edge.child not in self.brought and edge.child in self.robot.links:
+                fixed.setdefault(edge.child, edge)
+        return fixed
+
+    def _has_body(self, name: str) -> bool:
+        link = self.robot.links[name]
+        return bool(link.visuals or link.collisions or link.inertial)
+
+    def base(self) -> str | None:
+        """Return the base, if it is not what a robot file without one has."""
+        roots = self.robot.roots()
+        root = roots[0] if len(roots) == 1 else None
+        above = self.robot.parent_edge("base_link") if "base_link" in self.robot.frames else None
+        if root is None or above is None:
+            return None
+        usual = (
+            "base_footprint"
+            if above.kind == "static" and above.parent == "base_footprint"
+            else "base_link"
+        )
+        return None if root == usual else root
+
+    def _links(self) -> dict[str, Any]:
+        bodies_of_presets = {sensor.body for sensor in self.imported.sensors}
+        entries = {}
+        for name, link in self.robot.links.items():
+            edge, has_body = self.fixed.get(name), self._has_body(name)
+            is_frame = edge is not None and not has_body
+            if is_frame or (
+                name in self.brought and name not in bodies_of_presets and not has_body
+            ):
+                self._note(
+                    "frames" if is_frame else "links", name, *self.notes.pop(("links", name), ())
+                )
+                continue
+            entries[name] = (self._mount(edge, "links") if edge else {}) | self.values.link(link)
+        return entries
+
+    def _joints(self) -> dict[str, Any]:
+        return {
+            edge.joint_name: self.values.joint(edge, MOVER if edge.free else None)
+            for edge in self.robot.edges
+            if self.fixed.get(edge.child) is not edge and edge.child not in self.brought
+        }
+
+    def _mount(self, edge: Edge, title: str = "frames") -> dict[str, Any]:
+        """Return the keys of a fixed edge, which stand at its child."""
+        self._note(title, edge.child, *self.notes.pop(("joints", edge.joint_name), ()))
+        return {"parent": edge.parent, **self.values.pose(edge.pose), **_joint_name(edge)}
+
+    def _sensor(self, sensor: Recognised) -> dict[str, Any]:
+        for edge in sensor.edges:
+            self._note("sensors", sensor.name, *self.notes.pop(("joints", edge.joint_name), ()))
+            if not self._has_body(edge.child):
+                self._note("sensors", sensor.name, *self.notes.pop(("links", edge.child), ()))
+        return sensor_keys(sensor, self.values.pose(sensor.mount.pose), self.imported.rpy)
+
+    def _processes(self) -> dict[str, Any]:
+        free = [edge.joint_name for edge in self.robot.edges if edge.free]
+        if not free:
+            return {}
+        several = ", ".join(free)
+        self._note(
+            "processes",
+            MOVER,
+            f"the source does not say which process publishes {several}: name it here",
+        )
+        return {MOVER: {"external": True}}
+
+
+def sensor_keys(
+    sensor: Recognised, pose: Mapping[str, Any], rpy: Mapping[Quaternion, Vector], driver: str = ""
+) -> dict[str, Any]:
+    """Return the keys of a sensor; ``pose`` are those of its mount, ``rpy`` the angles of rotations in the source.
+
+    ``driver`` is the process that publishes the frames inside of it, empty where tfcompose does.
+    """
+    frames: dict[str, Any] = {}
+    mount = sensor.mount.child
+    if mount in sensor.names:
+        frames[sensor.names[mount]] = {"name": mount}
+    for edge in sensor.inside:
+        values: dict[str, Any] = {"name": edge.child} if edge.child in sensor.names else {}
+        if edge.child in sensor.own_xyz:
+            values["xyz"] = list(edge.pose.xyz)
+        if edge.child in sensor.own_rotation:
+            quat_xyzw = edge.pose.quat_xyzw
+            values["rpy"] = rotation(quat_xyzw, rpy.get(quat_xyzw)) or [0, 0, 0]
+        values |= _joint_name(edge)
+        if values:
+            frames[sensor.names.get(edge.child, edge.child)] = values
+    keys: dict[str, Any] = {"preset": sensor.preset, "parent": sensor.mount.parent}
+    keys |= {**pose, **_joint_name(sensor.mount)}
+    keys |= {"options": sensor.options} if sensor.options else {}
+    without = {"driver": "none"} if sensor.driven else {}
+    return (
+        keys
+        | ({"tf": "driver", "driver": driver} if driver else without)
+        | ({"frames": frames} if frames else {})
+    )
+
+
+def _joint_name(edge: Edge) -> dict[str, str]:
+    """Return the name of the joint that a fixed edge is, where it is not what ``build`` calls it."""
+    return (
+        {"joint": edge.joint_name}
+        if edge.joint_name not in {"", f"{edge.parent}_to_{edge.child}"}
+        else {}
+    )
+
+
+def _hardware(hardware: Hardware) -> dict[str, Any]:
+    keys: dict[str, Any] = {"plugin": hardware.plugin}
+    keys |= {"type": hardware.type} if hardware.type != "system" else {}
+    keys |= {"params": _params(hardware.params)} if hardware.params else {}
+    keys |= {"rw_rate": hardware.rw_rate} if hardware.rw_rate is not None else {}
+    keys |= {"is_async": hardware.is_async} if hardware.is_async is not None else {}
+    for kind in ("joint", "sensor", "gpio"):
+        components = {}
+        for one in hardware.components:
+            if one.kind == kind:
+                values = {"command": _interfaces(one.command), "state": _interfaces(one.state)}
+                values["params"] = _params(one.params)
+                components[one.name] = {key: value for key, value in values.items() if value}
+        keys |= {f"{kind}s": components} if components else {}
+    return keys
+
+
+def _interfaces(several: tuple[Interface, ...]) -> Any:
+    if any(one.params for one in several):
+        return {one.name: _params(one.params) for one in several}
+    return [one.name for one in several]
+
+
+def _params(params: dict[str, str]) -> dict[str, Any]:
+    return {name: _value(text) for name, text in params.items()}
+
+
+def _value(text: str) -> Any:
+    """Return the text as a number or a truth where that comes out as the same text again."""
+    if text in {"true", "false"}:
+        return text == "true"
+    if re.fullmatch(r"-?(0|[1-9][0-9]{0,14})(\.[0-9]*[1-9])?", text) and text != "-0":
+        value = float(text)
+        return value if (str(int(value)) if value.is_integer() else repr(value)) == text else text
+    return text
+
+
+def imported(
+    document: Document,
+    target: Target,
+    name: str,
+    packages: Mapping[str, str],
+    library: Library | None,
+) -> Imported:
+    """Return what a robot file at the target holds of the document.
+
+    An empty ``name`` is the source's; ``packages`` are the folders of packages that are not
+    installed. Sensors are looked for in the ``library``, if there is one.
+    """
+    robot, unused = without_unused_blocks(with_hardware(document.robot))
+    robot, renamed = with_material_names(robot)
+    sensors, undecided = recognised(robot, library) if library else ([], {})
+    notes = omitted(document)
+    for mount, note in undecided.items():
+        notes.setdefault(("frames", mount), []).append(note)
+    name = name or robot_name(robot.name)
+    other_name = [f"called {robot.name} in the source"] if name != robot.name else []
+    notes.setdefault(("", ""), []).extend([*renamed, *unused, *other_name])
+    folders = {package: target.from_folder(folder) for package, folder in packages.items()}
+    return Imported(robot, name, target, tuple(sensors), notes, angles(document.root), folders)
+
+
+def with_findings(
+    robot: Imported, source: str, lint: Callable[[str], Compiled]
+) -> tuple[str, list[Finding]]:
+    """Return the robot file with what ``lint`` finds in it as comments, and the errors that only a robot file has.
+
+    ``source`` is the file that the robot was imported from. Names that the source has are no
+    errors.
+    """
+    head = [f"imported from {posixpath.basename(source)} by tfcompose"]
+    compiled = lint(robot_file(robot, head))
+    errors = [one for one in compiled.errors if one.code != "TF501"]
+    if errors != list(compiled.errors):
+        notes = {**robot.notes, ("rules", "TF501"): ("the names are those of the source",)}
+        robot = replace(robot, rules={"TF501": "warning"}, notes=notes)
+    return robot_file(robot, [*head, *_faults(compiled)]), errors
+
+
+def _faults(compiled: Compiled) -> Iterable[str]:
+    """Yield what lint finds in the result, each rule once: these are faults of the source."""
+    several: dict[str, list[Finding]] = {}
+    for one in compiled.found:
+        several.setdefault(one.code, []).append(one)
+    if several:
+        yield "findings of lint, which the source has too:"
+    for code, found in several.items():
+        more = f" (and {len(found) - 1} more)" if found[1:] else ""
+        yield f"{code}: {found[0].message}{more}"

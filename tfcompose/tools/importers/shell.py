@@ -1,0 +1,407 @@
+"""Commands in a shell script, or in lines of a terminal: what they start, as far as no shell has to run for it.
+
+Words are split as a POSIX shell does; variables that the script sets to plain texts are filled in.
+What only a shell can know, as ``$(…)`` and arithmetic, is not guessed.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.tools.importers.programs import BEFORE, Program, add_program, is_setting, one_clock
+from tfcompose.tools.importers.static_transforms import PROGRAM
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model.files import Target
+    from tfcompose.tools.importers.draft import Draft
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_ASSIGNMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)=(.*)", re.DOTALL)
+#: What prepares a shell or shows something, and starts nothing of a robot.
+_OF_SHELL = frozenset({
+    "source", ".", "set", "echo", "printf", "wait", "trap", "exit", "true", ":", "shopt", "alias", "clear", "unset",
+    "ls", "cat", "less", "head", "tail", "grep", "find", "pwd", "which", "man", "date", "history", "tfcompose",
+})  # fmt: skip
+#: What changes files or ends processes; whether the robot needs it is for its owner to say.
+_ONCE = frozenset(
+    {"mkdir", "cp", "mv", "rm", "ln", "touch", "chmod", "chown", "kill", "pkill", "killall", "git"}
+)
+#: What stands before a command in a terminal: a prompt, ``me@host:~$``, and the number and the
+#: time of ``history``.
+_PROMPT = re.compile(r"[$%>]|[^\s@=]+@[^\s=]*[$#%>]")
+_NUMBER = re.compile(r"\d+\*?")
+_TIME = re.compile(r"\d{1,4}[-/.]\d\d?[-/.]\d{1,4}|\d\d?:\d\d(:\d\d)?")
+#: What of lines shows that they are of ROS.
+_OF_ROS = re.compile(
+    r"\b(ros2|rosrun|roslaunch|static_transform_publisher|robot_state_publisher|roscore)\b"
+)
+#: Programs that start another one, which is all that counts here: its output is in its log.
+_TERMINALS = frozenset({
+    "xterm", "gnome-terminal", "x-terminal-emulator", "konsole", "terminator", "xfce4-terminal", "lxterminal",
+})  # fmt: skip
+_SHELLS = frozenset({"bash", "sh", "zsh", "dash"})
+#: Programs that start another one in some way, which ``prefix`` keeps.
+_PREFIXES = frozenset(
+    {
+        "nice",
+        "ionice",
+        "taskset",
+        "chrt",
+        "gdb",
+        "valgrind",
+        "strace",
+        "perf",
+        "timeout",
+        "numactl",
+    }
+)
+#: What a shell in a terminal does at last so that the terminal stays open.
+_STAYS_OPEN = frozenset({("exec", "bash"), ("bash",), ("read",), ("exec", "$SHELL"), ("$SHELL",)})
+_CONTROL = frozenset({
+    "if", "then", "else", "elif", "fi", "for", "while", "until", "do", "done", "case", "esac", "function", "{", "}",
+    "(", ")", "select", "cd", "sleep", "eval", "return", "local", "break", "continue", "((", "[[", "[", "test",
+})  # fmt: skip
+#: Words that end what another one begins.
+_ENDS = frozenset({"fi", "done", "esac", "}", ")"})
+#: Words that control the flow and have a command behind them.
+_LEADING = frozenset({"then", "else", "do", "{", "(", "!"})
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A simple command: its words with quotes removed, its text as it stands, and its line.
+
+    ``unknown`` holds what of the words only a shell can know. ``piped`` is whether it is one of
+    several in a pipe.
+    """
+
+    words: tuple[str, ...]
+    text: str
+    line: int
+    unknown: tuple[str, ...] = ()
+    piped: bool = False
+
+
+class _Reader:
+    """Splits a text into commands."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text.replace("\r\n", "\n")
+        self.at, self.line = 0, 1
+        self.variables: dict[str, str] = {}
+
+    def commands(self) -> Iterator[Command]:
+        """Yield the commands in order; variables are as they are where each one stands."""
+        piped = False
+        while self.at < len(self.text):
+            begin, line = self.at, self.line
+            words, unknown, ended = self._words()
+            body = " ".join(self.text[begin : self.at].rstrip(";&|\n ").split())
+            is_piped = piped or ended == "|"
+            piped = ended == "|"
+            if words:
+                line += self.text[begin : self.at].count(
+                    "\n", 0, _first_word(self.text[begin : self.at])
+                )
+                yield Command(
+                    tuple(words), body.replace("\\ ", ""), line, tuple(unknown), is_piped
+                )
+
+    def _words(self) -> tuple[list[str], list[str], str]:
+        """Return the words until a command ends, what is unknown of them, and what ended it."""
+        words: list[str] = []
+        unknown: list[str] = []
+        word: str | None = None
+        while self.at < len(self.text):
+            char = self.text[self.at]
+            if char == "\\" and self.text[self.at + 1 : self.at + 2] == "\n":
+                self._step(2)
+            elif char in " \t":
+                words += [word] if word is not None else []
+                word = None
+                self._step()
+            elif char == "#" and word is None:
+                end = self.text.find("\n", self.at)
+                self._step((end if end >= 0 else len(self.text)) - self.at)
+            elif char in "\n;&|" and not self._is_redirection():
+                self._step()
+                double = self.at < len(self.text) and self.text[self.at] == char and char in "&|;"
+                self._step(1 if double else 0)
+                return (
+                    [*words, *([word] if word is not None else [])],
+                    unknown,
+                    "||" if double else char,
+                )
+            elif char in "()" and word is None:
+                self._step()
+                words.append(char)
+            else:
+                word = (word or "") + self._piece(unknown)
+        return [*words, *([word] if word is not None else [])], unknown, ""
+
+    def _is_redirection(self) -> bool:
+        """Return whether a & belongs to ``2>&1`` or ``&>``."""
+        before, behind = self.text[self.at - 1 : self.at], self.text[self.at + 1 : self.at + 2]
+        return self.text[self.at] == "&" and (before in {">", "<"} or behind == ">")
+
+    def _piece(self, unknown: list[str]) -> str:
+        """Return the next piece of a word: a quoted text, a variable, or a character."""
+        char = self.text[self.at]
+        if char == "'":
+            end = self.text.find("'", self.at + 1)
+            end = end if end >= 0 else len(self.text)
+            piece = self.text[self.at + 1 : end]
+            self._step(end + 1 - self.at)
+            return piece
+        if char == '"':
+            self._step()
+            pieces = []
+            while self.at < len(self.text) and self.text[self.at] != '"':
+                if self.text[self.at] == "\\" and self.text[self.at + 1 : self.at + 2] in {
+                    '"',
+                    "\\",
+                    "$",
+                    "`",
+                    "\n",
+                }:
+                    escaped = self.text[self.at + 1]
+                    pieces.append("" if escaped == "\n" else escaped)
+                    self._step(2)
+                elif self.text[self.at] in "$`":
+                    pieces.append(self._expansion(unknown))
+                else:
+                    pieces.append(self.text[self.at])
+                    self._step()
+            self._step()
+            return "".join(pieces)
+        if char == "\\":
+            piece = self.text[self.at + 1 : self.at + 2]
+            self._step(2)
+            return piece
+        if char in "$`":
+            return self._expansion(unknown)
+        self._step()
+        return char
+
+    def _expansion(self, unknown: list[str]) -> str:
+        rest = self.text[self.at :]
+        if rest[0] == "`":
+            end = rest.find("`", 1)
+            return self._unknown(end + 1 if end > 0 else len(rest), unknown)
+        if rest.startswith("$("):
+            return self._unknown(_closing(rest), unknown)
+        braced = re.match(r"\$\{([A-Za-z_][A-Za-z0-9_]*)(?::?-([^}${]*))?\}", rest)
+        plain = re.match(r"\$([A-Za-z_][A-Za-z0-9_]*|[0-9@*#?$!])", rest)
+        found = braced or plain
+        if found is None:
+            if rest.startswith("${"):
+                end = rest.find("}")
+                return self._unknown(end + 1 if end > 0 else len(rest), unknown)
+            self._step()
+            return "$"
+        value = self.variables.get(found[1], braced[2] if braced else None)
+        if value is None:
+            return self._unknown(found.end(), unknown)
+        self._step(found.end())
+        return value
+
+    def _unknown(self, length: int, unknown: list[str]) -> str:
+        piece = self.text[self.at : self.at + length]
+        self._step(length)
+        unknown.append(piece)
+        return piece
+
+    def _step(self, count: int = 1) -> None:
+        self.line += self.text.count("\n", self.at, self.at + count)
+        self.at += count
+
+
+def _first_word(text: str) -> int:
+    """Return where the first word begins, behind blank lines and comments."""
+    found = re.match(r"(?:\s|#[^\n]*\n|\\\n)*", text)
+    return found.end() if found else 0
+
+
+def _closing(text: str) -> int:
+    """Return the length of ``$(…)`` at the beginning of a text."""
+    depth = 0
+    for index, char in enumerate(text):
+        depth += (char == "(") - (char == ")")
+        if char == ")" and depth == 0:
+            return index + 1
+    return len(text)
+
+
+@dataclass(slots=True)
+class _Script:
+    draft: Draft
+    target: Target
+    file: str
+    environment: dict[str, str] = field(default_factory=dict)
+
+    def add(self, text: str) -> None:
+        reader = _Reader(text)
+        for command in reader.commands():
+            self._command(command, reader.variables)
+
+    def _todo(self, command: Command, why: str) -> None:
+        self.draft.todo(
+            f"{command.text}: {why}" if why else command.text, Span(self.file, command.line)
+        )
+
+    def _command(self, command: Command, variables: dict[str, str]) -> None:
+        words = _without_prompt(list(command.words))
+        while words and words[0] in _LEADING:
+            words.pop(0)
+        if words[:1] == ["export"]:
+            self._export(command, words[1:], variables)
+            return
+        given, words = _assignments(words)
+        if words[:1] == ["env"]:
+            more, words = _assignments(words[1:])
+            given |= more
+        if not words:
+            self._assign(given, command, variables)
+        elif words[0] in _CONTROL:
+            if words[0] not in _ENDS:
+                self._todo(command, "only a shell can do that")
+        elif words[0] in _ONCE:
+            self._todo(command, f"{words[0]} runs once, and starts nothing")
+        elif words[0] not in _OF_SHELL:
+            self._start(command, words, given)
+
+    def _start(self, command: Command, words: list[str], given: dict[str, str]) -> None:
+        if tuple(words) in _STAYS_OPEN:
+            return
+        if command.unknown:
+            self._todo(command, f"only a shell knows {', '.join(dict.fromkeys(command.unknown))}")
+        elif command.piped:
+            self._todo(command, "a pipe")
+        else:
+            self._add(command, _without_redirections(words), given)
+
+    def _add(self, command: Command, words: list[str], given: dict[str, str]) -> None:
+        """Add a command, or what it starts in a shell, in a terminal or behind a prefix."""
+        if words[0] in _TERMINALS | _SHELLS and "-c" in words[:-1]:
+            text = words[words.index("-c") + 1]
+            if _OF_ROS.search(text):
+                for inner in _Reader(text).commands():
+                    self._command(replace(inner, line=command.line), {})
+                return
+        begin = _program_at(words)
+        before, rest = words[:begin], words[begin:]
+        while before and before[0] in BEFORE:
+            before.pop(0)
+        if before and before[0] in _TERMINALS:
+            before = []
+        starts_publisher = (
+            not begin and words[0] not in {"ros2", "rosrun"} and PROGRAM in " ".join(words[1:])
+        )
+        if starts_publisher or (before and before[0] not in _PREFIXES):
+            self._todo(command, f"what {words[0]} starts is not known here")
+            return
+        keys = {"prefix": before} if before else {}
+        env = {
+            name: value
+            for name, value in self.environment.items()
+            if not is_setting(self.draft, name, value)
+        }
+        program = Program(
+            Span(self.file, command.line), argv=tuple(rest), env=env | given, keys=keys
+        )
+        add_program(self.draft, program, self.target)
+
+    def _assign(self, given: dict[str, str], command: Command, variables: dict[str, str]) -> None:
+        for name, value in given.items():
+            if command.unknown:
+                variables.pop(name, None)
+            else:
+                variables[name] = value
+
+    def _export(self, command: Command, words: list[str], variables: dict[str, str]) -> None:
+        for word in words:
+            found = _ASSIGNMENT.fullmatch(word)
+            if found and not command.unknown:
+                variables[found[1]] = self.environment[found[1]] = found[2]
+            elif found:
+                self._todo(command, "only a shell knows the value")
+            elif _NAME.fullmatch(word) and word in variables:
+                self.environment[word] = variables[word]
+
+
+def _without_prompt(words: list[str]) -> list[str]:
+    """Return the words of a command without what a terminal, or ``history``, puts in front of them."""
+    if len(words) > 1 and _NUMBER.fullmatch(words[0]):
+        words = words[1:]
+        while len(words) > 1 and _TIME.fullmatch(words[0]):
+            words = words[1:]
+    while words and _PROMPT.fullmatch(words[0]):
+        words = words[1:]
+    return words
+
+
+def _program_at(words: list[str]) -> int:
+    """Return where in a command the program of ROS begins that it starts, 0 for any other command."""
+    for index, word in enumerate(words):
+        if word in {"rosrun", "roslaunch"} or (
+            word == "ros2" and words[index + 1 : index + 2] in (["run"], ["launch"])
+        ):
+            return index
+        if posixpath.basename(word) == PROGRAM:
+            return index if "/" in word or index == 0 else 0
+    return 0
+
+
+def _assignments(words: list[str]) -> tuple[dict[str, str], list[str]]:
+    """Return the variables that are set in front of a command, and the command."""
+    given: dict[str, str] = {}
+    for index, word in enumerate(words):
+        found = _ASSIGNMENT.fullmatch(word)
+        if found is None:
+            return given, words[index:]
+        given[found[1]] = found[2]
+    return given, []
+
+
+def _without_redirections(words: list[str]) -> list[str]:
+    """Return the words without ``> file``, ``2>&1`` and ``< file``."""
+    kept = []
+    rest = iter(words)
+    for word in rest:
+        if re.fullmatch(r"[0-9&]*(>>?|<)&?[^\s]*", word):
+            if re.fullmatch(r"[0-9&]*(>>?|<)&?", word):
+                next(rest, None)
+        else:
+            kept.append(word)
+    return kept
+
+
+def add_script(draft: Draft, text: str, file: str, target: Target) -> None:
+    """Add what the commands of a script start to the draft.
+
+    Raises:
+        RejectedError: if it is no script by its name or first line, and nothing of ROS stands in
+        it.
+    """
+    if not (
+        file.endswith((".sh", ".bash"))
+        or text.startswith("#!")
+        or not text.strip()
+        or _OF_ROS.search(text)
+    ):
+        advice = "commands of a terminal: ros2 run …, ros2 launch …, static_transform_publisher …"
+        raise RejectedError(
+            [
+                finding(
+                    "TF002", "no shell script, and nothing of ROS in it", Span(file), help=advice
+                )
+            ]
+        )
+    _Script(draft, target, file).add(text)
+    one_clock(draft)

@@ -1,0 +1,224 @@
+"""What a ``static_transform_publisher`` is told by its arguments: of ROS 2 by name or in order, of ROS 1 in order.
+
+Read in geometry2 (``static_transform_broadcaster_program.cpp``) and in ROS 1's ``tf`` and
+``tf2_ros``: all orders have yaw first, all angles are radians about fixed axes, and nothing is
+normalised.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.foundation.geometry import Pose, norm, quat_from_rpy
+from tfcompose.tools.importers.draft import pose_keys
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.foundation.geometry import Vector
+
+PROGRAM = "static_transform_publisher"
+#: The same as a component, which has the values as parameters.
+PLUGIN = "tf2_ros::StaticTransformBroadcasterNode"
+_PARAMETERS = {
+    **{f"translation.{axis}": f"--{axis}" for axis in "xyz"}, **{f"rotation.{axis}": f"--q{axis}" for axis in "xyzw"},
+    "frame_id": "--frame-id", "child_frame_id": "--child-frame-id",
+}  # fmt: skip
+
+#: Who reads the arguments: the program of ROS 2, that of ROS 1's tf, or that of ROS 1's tf2_ros.
+Reader = Literal["ros2", "tf", "tf2_ros"]
+
+_POSITION = ("--x", "--y", "--z")
+_QUATERNION = ("--qx", "--qy", "--qz", "--qw")
+_ANGLES = ("--roll", "--pitch", "--yaw")
+_FRAMES = ("--frame-id", "--child-frame-id")
+_FLAGS = frozenset({*_POSITION, *_QUATERNION, *_ANGLES, *_FRAMES})
+#: Numbers and frames of the orders with angles and with a quaternion.
+_WITH_ANGLES, _WITH_QUATERNION = 8, 9
+#: As far as tf2 lets the square of a quaternion's length be from 1.
+_UNIT = 0.01
+_LARGEST_RAD = 1e9
+
+
+class RefusedError(ValueError):
+    """The program would refuse these arguments, or every listener what it then sends."""
+
+
+@dataclass(frozen=True, slots=True)
+class StaticTransform:
+    """A fixed edge as its publisher is told it. ``rpy`` (rad) is None where it is told a quaternion.
+
+    ``order`` says in which order the arguments stand, empty where they have names.
+    """
+
+    parent: str
+    child: str
+    pose: Pose
+    rpy: Vector | None
+    order: str
+
+    def keys(self) -> dict[str, Any]:
+        """Return the keys of its pose in a robot file."""
+        return pose_keys(self.pose, self.rpy, quaternion=self.rpy is None)
+
+
+def static_transform(words: Sequence[str], reader: Reader = "ros2") -> StaticTransform:
+    """Return what the program's own arguments say, without those behind ``--ros-args``.
+
+    Raises:
+        RefusedError: if it would refuse them.
+    """
+    own = _without_ros_arguments(words)
+    if reader != "ros2":
+        return _in_order(own, reader)
+    given: dict[str, str] = {}
+    loose: list[str] = []
+    rest = iter(own)
+    for word in rest:
+        if word in _FLAGS:
+            value = next(rest, None)
+            if value is None:
+                raise RefusedError(f"{word} has no value")
+            given[word] = value
+        else:
+            loose.append(word)
+    if not loose:
+        return _by_name(given)
+    if given:
+        raise RefusedError(
+            f"{loose[0]} stands beside {next(iter(given))}: arguments are by name or in order"
+        )
+    return _in_order(loose, reader)
+
+
+def static_words(params: Sequence[Any]) -> list[str]:
+    """Return the arguments that say what the component is told by parameters."""
+    given: dict[str, Any] = {}
+    for one in params:
+        given |= one if isinstance(one, dict) else {}
+    return [
+        word
+        for name, flag in _PARAMETERS.items()
+        if name in given
+        for word in (flag, str(given[name]))
+    ]
+
+
+def _without_ros_arguments(words: Sequence[str]) -> list[str]:
+    """Return the words outside ``--ros-args … --``; those of ROS 1, as in ``__name:=a``, are left out too."""
+    own, inside = [], False
+    for word in words:
+        if word == "--ros-args":
+            inside = True
+        elif word == "--" and inside:
+            inside = False
+        elif not inside and ":=" not in word:
+            own.append(word)
+    return own
+
+
+def _by_name(given: dict[str, str]) -> StaticTransform:
+    numbers = {key: _number(value, key) for key, value in given.items() if key not in _FRAMES}
+    x, y, z = (numbers.get(key, 0.0) for key in _POSITION)
+    has_angles = any(key in numbers for key in _ANGLES)
+    if has_angles and any(key in numbers for key in _QUATERNION):
+        raise RefusedError("angles and a quaternion at once")
+    parent, child = (given.get(key, "") for key in _FRAMES)
+    if any(key in numbers for key in _QUATERNION):
+        usual = (0.0, 0.0, 0.0, 1.0)
+        qx, qy, qz, qw = (
+            numbers.get(key, value) for key, value in zip(_QUATERNION, usual, strict=True)
+        )
+        return _of(parent, child, (x, y, z), (qx, qy, qz, qw), "")
+    roll, pitch, yaw = (numbers.get(key, 0.0) for key in _ANGLES)
+    return _of(parent, child, (x, y, z), (roll, pitch, yaw), "")
+
+
+def _in_order(words: list[str], reader: Reader) -> StaticTransform:
+    kept, period = list(words), ""
+    if reader == "tf":
+        if len(kept) not in {_WITH_ANGLES + 1, _WITH_QUATERNION + 1}:
+            raise RefusedError(
+                f"{len(kept)} arguments; tf's takes 9 or 10, of which the last is the period in ms"
+            )
+        period = kept.pop()
+        _number(period, "the period")
+    if (
+        not period
+        and len(kept) > _WITH_ANGLES
+        and _is_number(kept[-1])
+        and not _is_number(kept[-3])
+    ):
+        raise RefusedError(
+            f"{kept[-1]} behind the frames is the period of ROS 1's tf, which this program does"
+            " not take"
+        )
+    if len(kept) not in {_WITH_ANGLES, _WITH_QUATERNION}:
+        raise RefusedError(f"{len(kept)} arguments; it takes 8, or 9 with a quaternion")
+    parent, child = kept[-2:]
+    numbers = [_number(word, f"argument {place}") for place, word in enumerate(kept[:-2], start=1)]
+    x, y, z, *rest = numbers
+    tail = " frame child period" if period else " frame child"
+    if len(kept) == _WITH_ANGLES:
+        yaw, pitch, roll = rest
+        return _of(
+            parent,
+            child,
+            (x, y, z),
+            (roll, pitch, yaw),
+            f"in the order x y z yaw pitch roll{tail}",
+        )
+    qx, qy, qz, qw = rest
+    return _of(parent, child, (x, y, z), (qx, qy, qz, qw), f"in the order x y z qx qy qz qw{tail}")
+
+
+def _of(
+    parent: str, child: str, xyz: Vector, rotation: tuple[float, ...], order: str
+) -> StaticTransform:
+    parent, child = parent.removeprefix("/"), child.removeprefix("/")  # tf2 strips it
+    if not parent or not child:
+        raise RefusedError(f"the {'child' if parent else 'parent'} frame has no name")
+    if parent == child:
+        raise RefusedError(f"{child} is its own parent")
+    if len(rotation) == len(_ANGLES):
+        roll, pitch, yaw = rotation
+        return StaticTransform(
+            parent, child, Pose(xyz, quat_from_rpy(roll, pitch, yaw)), (roll, pitch, yaw), order
+        )
+    qx, qy, qz, qw = rotation
+    length = norm(rotation)
+    if abs(length**2 - 1) >= _UNIT:
+        raise RefusedError(
+            f"the quaternion has length {length:.6g}, and every listener drops the transform"
+        )
+    return StaticTransform(parent, child, Pose(xyz, (qx, qy, qz, qw)), None, order)
+
+
+def _number(word: str, what: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        raise RefusedError(f"{what} is {word!r}, not a number") from None
+    if not math.isfinite(value) or abs(value) > _LARGEST_RAD:
+        raise RefusedError(f"{what} is {word}")
+    return value
+
+
+def reader_of(words: Sequence[str]) -> Reader:
+    """Return who reads the arguments of a program whose package is not given: tf's have a period behind two frames."""
+    own = _without_ros_arguments(words)
+    return (
+        "tf"
+        if len(own) > _WITH_ANGLES and _is_number(own[-1]) and not _is_number(own[-3])
+        else "ros2"
+    )
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

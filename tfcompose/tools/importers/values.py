@@ -1,0 +1,194 @@
+"""Bodies, joints and poses in the words of the robot file, as plain data; what is the default is left out.
+
+Angles are in degrees where that is exact, and else in radians with all digits.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.urdf.schema import MOMENTS
+from tfcompose.foundation.geometry import Pose, angle_between, quat_from_rpy
+from tfcompose.foundation.numbers import clean_rpy, number
+from tfcompose.model.robot import BOUNDED, materials
+from tfcompose.tools.importers.yaml_text import Bare
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.foundation.geometry import Quaternion, Vector
+    from tfcompose.model.files import Target
+    from tfcompose.model.robot import Edge, Inertial, Joint, Link, Material, Robot, Shape
+
+#: A whole number of degrees, or one of few decimals, is what was meant if the angle (rad) is so
+#: near.
+_MEANT_RAD = 5e-13
+_DECIMALS = 4
+#: And a rotation is the one of the source if it is so near; half an angle's error remains in a
+#: quaternion.
+_SAME_RAD = 1e-12
+
+_SOFT_LIMITS = ("soft_lower_limit", "soft_upper_limit")
+_DIAGONAL = ("ixx", "iyy", "izz")
+
+
+class Values:
+    """The values of one robot; a colour that has been described once is later its name alone.
+
+    ``rpy`` are the angles by which the source has rotations; ``target`` says how files are
+    addressed.
+    """
+
+    def __init__(self, rpy: Mapping[Quaternion, Vector], robot: Robot, target: Target) -> None:
+        self.rpy, self.target = rpy, target
+        self.described: set[str] = set()
+        self.clashing = _clashing(robot)
+
+    def pose(self, pose: Pose) -> dict[str, Any]:
+        """Return the keys of a pose."""
+        rpy = rotation(pose.quat_xyzw, self.rpy.get(pose.quat_xyzw))
+        return ({"xyz": list(pose.xyz)} if any(pose.xyz) else {}) | ({"rpy": rpy} if rpy else {})
+
+    def link(self, link: Link) -> dict[str, Any]:
+        """Return the body."""
+        visuals = [self.shape(shape) for shape in link.visuals]
+        collisions = [self.shape(shape, plain=True) for shape in link.collisions]
+        body: dict[str, Any] = (
+            {"visual": visuals[0] if len(visuals) == 1 else visuals} if visuals else {}
+        )
+        if collisions and collisions == [self.shape(shape, plain=True) for shape in link.visuals]:
+            body["collision"] = "same"
+        elif collisions:
+            body["collision"] = collisions[0] if len(collisions) == 1 else collisions
+        return body | ({"inertial": self.inertial(link.inertial)} if link.inertial else {})
+
+    def shape(self, shape: Shape, *, plain: bool = False) -> dict[str, Any]:
+        """Return the shape; ``plain``, without its colour."""
+        values = self.pose(shape.pose) | {shape.kind: self.size(shape)}
+        return (
+            values
+            if plain or shape.material is None
+            else values | {"material": self.material(shape.material)}
+        )
+
+    def material(self, material: Material) -> dict[str, Any]:
+        """Return the colour or texture, and its name."""
+        values: dict[str, Any] = {"name": material.name}
+        if material.name in self.described and material.name not in self.clashing:
+            return values
+        self.described.add(material.name)
+        values |= {"rgba": list(material.rgba)} if material.rgba else {}
+        return values | (
+            {"texture": self.target.address(material.texture)} if material.texture else {}
+        )
+
+    def size(self, shape: Shape) -> Any:
+        """Return the shape's size, or its file."""
+        if shape.kind == "box":
+            return list(shape.size)
+        if shape.mesh is None:
+            return dict(zip(("radius", "length"), shape.size, strict=False))
+        uri, (x, y, z) = self.target.address(shape.mesh), shape.size
+        return (
+            uri
+            if (x, y, z) == (1, 1, 1)
+            else {"uri": uri, "scale": x if x == y == z else [x, y, z]}
+        )
+
+    def inertial(self, inertial: Inertial) -> dict[str, Any]:
+        """Return mass and tensor."""
+        tensor = dict(zip(MOMENTS, inertial.tensor, strict=True))
+        moments = {key: tensor[key] for key in _DIAGONAL} | {
+            key: value for key, value in tensor.items() if value
+        }
+        return self.pose(inertial.pose) | {"mass": inertial.mass, "inertia": moments}
+
+    def joint(self, edge: Edge, owner: str | None) -> dict[str, Any]:
+        """Return the joint with its edge."""
+        joint = edge.joint or edge.free
+        values = {
+            "type": joint.type if joint else "fixed",
+            "parent": edge.parent,
+            "child": edge.child,
+        }
+        values |= self.pose(edge.pose) | ({"owner": owner} if owner else {})
+        if joint is None:
+            return values
+        return (
+            values
+            | ({"axis": _axis(joint)} if joint.axis != (1.0, 0.0, 0.0) else {})
+            | _motion(joint)
+        )
+
+
+def angle(value: float) -> Bare | float:
+    """Return the angle (rad) as the robot file has it: ``-90 deg``, or radians."""
+    degrees = round(math.degrees(value), _DECIMALS) + 0.0
+    if abs(math.radians(degrees) - value) > _MEANT_RAD:
+        return value
+    return Bare(f"{number(degrees)} deg") if degrees else 0.0
+
+
+def rotation(quat_xyzw: Quaternion, source_rpy: Vector | None = None) -> list[Bare | float] | None:
+    """Return roll, pitch and yaw as the robot file has them, or None for no rotation."""
+    if quat_xyzw == Pose().quat_xyzw:
+        return None
+    rpy = source_rpy or clean_rpy(quat_xyzw)
+    angles = [angle(value) for value in rpy]
+    roll, pitch, yaw = map(_radians, angles)
+    if angle_between(quat_from_rpy(roll, pitch, yaw), quat_xyzw) > _SAME_RAD:
+        return list(rpy)
+    return angles if any(angles) else None
+
+
+def _radians(value: Bare | float) -> float:
+    return math.radians(float(value.removesuffix(" deg"))) if isinstance(value, Bare) else value
+
+
+def _clashing(robot: Robot) -> frozenset[str]:
+    """Return the names under which the robot has different colours."""
+    known: dict[str, set[Any]] = {}
+    for material in materials(robot.links):
+        known.setdefault(material.name, set()).add((material.rgba, material.texture))
+    return frozenset(name for name, several in known.items() if len(several) > 1)
+
+
+def _axis(joint: Joint) -> list[float]:
+    """Return the axis at the length that it has in the source, if that is nearly 1: its digits are fewer."""
+    near = 0.98 < joint.axis_length < 1.02  # noqa: PLR2004 (another length is a finding of its own)
+    return [float(f"{part * joint.axis_length:.15g}") if near else part for part in joint.axis]
+
+
+def _motion(joint: Joint) -> dict[str, Any]:
+    position: Callable[[float], Any] = angle if joint.type in {"revolute", "continuous"} else float
+    values: dict[str, Any] = {}
+    limit, reference = joint.limit, joint.reference
+    if limit:
+        ends = {"lower": limit.lower, "upper": limit.upper}
+        if joint.type in BOUNDED:  # of these URDF takes 0 for an end that is left out
+            ends = {key: value or 0.0 for key, value in ends.items()}
+        limits = {key: position(value) for key, value in ends.items() if value is not None}
+        rates = {"effort": limit.effort, "velocity": limit.velocity}
+        values["limit"] = limits | {
+            key: value for key, value in rates.items() if value is not None
+        }
+    if joint.mimic is not None:
+        values["mimic"] = {"joint": joint.mimic} | (
+            {"multiplier": joint.multiplier} if joint.multiplier != 1 else {}
+        )
+        values["mimic"] |= {"offset": position(joint.offset)} if joint.offset else {}
+    if joint.dynamics:
+        values["dynamics"] = asdict(joint.dynamics)
+    if joint.safety:
+        values["safety_controller"] = {
+            key: position(value) if key in _SOFT_LIMITS else value
+            for key, value in asdict(joint.safety).items()
+        }
+    if reference:
+        ends = {"rising": reference.rising, "falling": reference.falling}
+        values["calibration"] = {
+            key: position(value) for key, value in ends.items() if value is not None
+        }
+    return values

@@ -1,0 +1,437 @@
+"""From a new pose of a mount to the edits of the robot file that give it that pose, and leave every other byte.
+
+The number is changed where it stands, in the unit in which it stands, through ``place`` and
+``relative_to``. A value that is not a mount's own (a variable's, an included file's, a
+calibration's, one that others share) is left alone: then an overlay can replace it.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Edit
+from tfcompose.foundation.geometry import (
+    OPTICAL_XYZW,
+    Pose,
+    angle_between,
+    multiply,
+    norm,
+    quat_from_rpy,
+)
+from tfcompose.foundation.numbers import number
+from tfcompose.foundation.units import UnitError, quantity
+from tfcompose.model.robot import JOINTS, STATIC, is_optical
+from tfcompose.spec.language import DIRECTIONS
+from tfcompose.spec.load import load
+from tfcompose.tools.view.kinematics import poses_in_roots
+from tfcompose.tools.view.rotations import FORMS
+from tfcompose.tools.view.yaml_text import Keys, text_at, with_value
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.foundation.geometry import Quaternion
+    from tfcompose.model.robot import Edge, Robot
+    from tfcompose.spec.load import Path, Place, Source
+    from tfcompose.tools.view.rotations import Numbers
+
+#: What a new number may be off, in metres or radians, for the sake of a short text; at a lever it
+#: is less.
+ROUNDING = 1e-7
+#: What stands before a scalar: an anchor, a tag.
+_PROPERTIES = re.compile(r"(?:[&!]\S*\s+)+")
+#: A number with a unit; between them may be a space.
+_NUMBER = re.compile(r"([-+.0-9eE]+?)(\s*)([A-Za-z][A-Za-z/]*)?\s*")
+
+
+class ImmovableError(Exception):
+    """No file says where the frame is, so none can be edited."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Edits that move one mount; they belong together."""
+
+    edits: tuple[Edit, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Elsewhere:
+    """Why the pose is not edited where it stands, where that is, and the values that an overlay can give instead.
+
+    ``entry`` leads to the mapping that they belong to; it is empty where no overlay reaches. None
+    removes a key.
+    """
+
+    reason: str
+    at: Span
+    entry: Path
+    values: Mapping[str, str | None]
+
+    def overlay(self, text: str, file: str) -> str:
+        """Return the text of an overlay, which may be empty, with these values in it."""
+        return with_value(text, file, self.entry, self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """The pose that a file gives for one edge: that of a frame, the ``place``, in a frame it is ``relative_to``.
+
+    ``parent_from_base`` is the pose of the latter in the edge's parent, ``child_from_place`` that
+    of the former in the edge's child.
+    """
+
+    edge: Edge
+    entry: Path
+    data: Mapping[str, Any]
+    place: str
+    relative_to: str
+    parent_from_base: Pose
+    child_from_place: Pose
+
+    @property
+    def is_optical(self) -> bool:
+        """Whether the frame whose pose is given has z as its viewing direction."""
+        name = str(self.entry[-1]) if self.entry[2:3] == ("frames",) else self.place
+        return is_optical(name)
+
+    def given(self, parent_from_child: Pose) -> Pose:
+        """Return the pose that the file has to give for the edge to have this one."""
+        return self.parent_from_base.inverse() @ parent_from_child @ self.child_from_place
+
+    def of_edge(self, given: Pose) -> Pose:
+        """Return the pose of the edge when the file gives this one."""
+        return self.parent_from_base @ given @ self.child_from_place.inverse()
+
+
+def mount_of(robot: Robot, source: Source, child: str) -> Mount:
+    """Return what the file has of the edge above a frame.
+
+    Raises:
+        ImmovableError: if the edge is not one that a robot file places.
+    """
+    edge = robot.parent_edge(child)
+    if edge is None:
+        raise ImmovableError(f"{child} is a root: it has no pose in another frame")
+    if not edge.pose_known:
+        raise ImmovableError(f"only {edge.owner} knows where {child} is in {edge.parent}")
+    if edge.joint is None and edge.owner.rpartition("/")[2] not in {STATIC, JOINTS}:
+        raise ImmovableError(f"{edge.owner} publishes where {child} is in {edge.parent}")
+    data: Any = source.data
+    for step in edge.entry:
+        data = data.get(step) if isinstance(data, dict) else None
+    data = data if isinstance(data, dict) else {}
+    place, base = (data.get(key) for key in ("place", "relative_to"))
+    place = place if isinstance(place, str) else child
+    base = base if isinstance(base, str) else edge.parent
+    if base not in robot.frames or place not in robot.frames:
+        raise ImmovableError(f"the pose of {child} is given by frames that are not there")
+    poses = poses_in_roots(robot, {})
+    parent_from_base = poses[edge.parent].inverse() @ poses[base]
+    child_from_place = poses[child].inverse() @ poses[place]
+    return Mount(edge, edge.entry, data, place, base, parent_from_base, child_from_place)
+
+
+def change_of(
+    robot: Robot, source: Source, texts: Mapping[str, str], child: str, parent_from_child: Pose
+) -> Change | Elsewhere:
+    """Return the edits after which the frame has this pose in its parent, or where the value is that forbids them.
+
+    ``source`` is what the robot was made from, overlays merged over it; ``texts`` are the files
+    that may be edited, by the names that spans have.
+
+    Raises:
+        ImmovableError: if no robot file says where the frame is.
+    """
+    mount = mount_of(robot, source, child)
+    tolerance = ROUNDING / max(1.0, norm(mount.child_from_place.xyz))
+    computed = {one.path: one.numbers for one in robot.source_numbers if not one.in_part}
+    return _Change(mount, source, texts, tolerance, computed).of(mount.given(parent_from_child))
+
+
+class _ElsewhereError(Exception):
+    """A number is not the mount's own; it stands at ``at``."""
+
+    def __init__(self, reason: str, at: Span) -> None:
+        self.reason = reason
+        self.at = at
+        super().__init__(reason)
+
+
+@dataclass(slots=True)
+class _Change:
+    mount: Mount
+    source: Source
+    texts: Mapping[str, str]
+    tolerance: float
+    computed: Mapping[Path, tuple[float, ...]]
+    _raw: dict[str, Place] = field(default_factory=dict)
+
+    def of(self, new: Pose) -> Change | Elsewhere:
+        """Return how the given pose becomes the new one."""
+        mount = self.mount
+        old = mount.given(mount.edge.pose)
+        moves = any(abs(a - b) > self.tolerance for a, b in zip(new.xyz, old.xyz, strict=True))
+        rotates = angle_between(new.quat_xyzw, old.quat_xyzw) > self.tolerance
+        if not moves and not rotates:
+            return Change(())
+        try:
+            self._refuse_other_files()
+            edits = self._moved(old, new) if moves else []
+            edits += self._rotated(old.quat_xyzw, new.quat_xyzw) if rotates else []
+        except _ElsewhereError as error:
+            return self._elsewhere(error, new, moves=moves, rotates=rotates)
+        return Change(tuple(_joined(edits)))
+
+    def _elsewhere(
+        self, error: _ElsewhereError, new: Pose, *, moves: bool, rotates: bool
+    ) -> Elsewhere:
+        entry, measured = self.mount.entry, self.mount.edge.calibration is not None
+        if self._is_in_part():
+            return Elsewhere(error.reason, error.at, (), {})
+        values: dict[str, str | None] = {"calibration": None} if measured else {}
+        if moves or measured:
+            values["xyz"] = self._xyz(new)
+        if rotates or measured:
+            values["rpy"] = self._rpy(new.quat_xyzw)
+        return Elsewhere(error.reason, error.at, entry, values)
+
+    def _is_in_part(self) -> bool:
+        return self.mount.entry[:1] == ("parts",) and len(self.mount.entry) > _PART
+
+    def _refuse_other_files(self) -> None:
+        """Refuse what no robot file gives, or another one than these."""
+        edge, measured = self.mount.edge, self.mount.edge.calibration
+        if measured is not None:
+            raise _ElsewhereError(
+                f"the pose is measured, in the calibration {measured.at.file}", measured.at
+            )
+        if self._is_in_part():
+            reason = f"the pose is given in the part {self.mount.entry[1]}"
+            if edge.at.file.endswith((".yaml", ".yml")):
+                reason += (
+                    f"; tfcompose view {shlex.quote(edge.at.file)} --edit changes it for all that"
+                    " use the file"
+                )
+            raise _ElsewhereError(reason, edge.at)
+        if not self.mount.data:
+            raise _ElsewhereError(f"the pose is that of the preset of {edge.sensor}", edge.at)
+
+    def _moved(self, old: Pose, new: Pose) -> list[Edit]:
+        if "xyz" not in self.mount.data:
+            return [self._inserted({"xyz": self._xyz(new)}, ("parent",))]
+        before: Numbers = {(index,): value for index, value in enumerate(old.xyz)}
+        after: Numbers = {(index,): value for index, value in enumerate(new.xyz)}
+        return self._or_inserted("xyz", self._xyz(new), before, after)
+
+    def _rotated(self, old: Quaternion, new: Quaternion) -> list[Edit]:
+        key = next((name for name in FORMS if name in self.mount.data), None)
+        if key is None:
+            return [
+                self._inserted({"rpy": self._rpy(new)}, ("parent", "xyz", "place", "relative_to"))
+            ]
+        if key == "look" and self.mount.is_optical:
+            x, y, z, w = OPTICAL_XYZW
+            old, new = multiply(old, (-x, -y, -z, w)), multiply(new, (-x, -y, -z, w))
+        if key == "look" and not isinstance(self.mount.data[key], dict):
+            return [self._direction(new)]
+        before = self._numbers(key)
+        after: Numbers = FORMS[key](new, before, self.tolerance)
+        return self._or_inserted(key, self._complete(key, new, after), before, after)
+
+    def _or_inserted(
+        self, key: str, complete: str | None, before: Numbers, after: Numbers
+    ) -> list[Edit]:
+        """Return the edits of a key's numbers; where the entry has the key through ``<<``, it gets one of its own."""
+        try:
+            return list(self._renumbered(key, before, after))
+        except _SharedError:
+            entry = self._place_in_text(self.mount.entry)
+            if complete is None or key in Keys(self.texts[entry.span.file], entry).own:
+                raise
+            return [self._inserted({key: complete}, ("parent", "xyz"))]
+
+    def _complete(self, key: str, rotation: Quaternion, numbers: Numbers) -> str | None:
+        """Return the YAML of a rotation under a key of its own, or None where it has no short form."""
+        if key == "rpy":
+            return self._rpy(rotation)
+        if key == "look":
+            return self._angles(numbers)
+        return (
+            _list(self._short(value, "") for value in numbers.values())
+            if key == "quat_xyzw"
+            else None
+        )
+
+    def _direction(self, rotation: Quaternion) -> Edit:
+        """Return the edit of ``look: down``: another direction, or angles."""
+        at = self._own(("look",))
+        for name, rpy in DIRECTIONS.items():
+            if angle_between(quat_from_rpy(*rpy), rotation) <= self.tolerance:
+                return Edit(at, name)
+        return Edit(at, self._angles(FORMS["look"](rotation, {}, self.tolerance)))
+
+    def _angles(self, numbers: Numbers) -> str:
+        return f"{{{', '.join(f'{step}: {self._new_angle(value)}' for (step,), value in numbers.items())}}}"
+
+    def _numbers(self, key: str) -> Numbers:
+        """Return the numbers below the key, in SI, those that variables make among them."""
+        data = self.mount.data[key]
+        found: Numbers = dict(_leaves(data))
+        numbers = self.computed.get((*self.mount.entry, key), ())
+        steps: list[str | int] = [step for step in _IN_ORDER.get(key, ()) if step in data] or [
+            0,
+            1,
+            2,
+            3,
+        ]
+        if key != "matrix":
+            found |= {(step,): value for step, value in zip(steps, numbers, strict=False)}
+        unknown = [path for path in _scalars(data) if path not in found]
+        if unknown:
+            path = (key, *unknown[0])
+            raise _ElsewhereError(
+                f"{_dotted(path)} is computed", self.source.at((*self.mount.entry, *path))
+            )
+        return found
+
+    def _renumbered(self, key: str, before: Numbers, after: Numbers) -> Iterator[Edit]:
+        """Yield an edit for each number that changes, and one for those that are not there yet."""
+        missing = {
+            str(path[0]): self._new_angle(value)
+            for path, value in after.items()
+            if path not in before
+        }
+        for path, value in after.items():
+            if path in before and abs(value - before[path]) > self.tolerance:
+                yield self._number((key, *path), value)
+        if missing:
+            self._own((key,))
+            place = self._place_in_text((*self.mount.entry, key))
+            yield Keys(self.texts[place.span.file], place).insertion(missing)
+
+    def _number(self, path: Path, value: float) -> Edit:
+        span = self._own(path)
+        scalar = text_at(self.texts[span.file], span).strip("\"'")
+        if "${" in scalar:
+            raise _ElsewhereError(f"{_dotted(path)} is computed: {scalar}", span)
+        found = _NUMBER.fullmatch(scalar)
+        if found is None or _value(scalar) is None:
+            raise _ElsewhereError(f"{_dotted(path)} is {scalar}", span)
+        return Edit(span, self._short(value, found[3] or "", found[2]))
+
+    def _own(self, path: Path) -> Span:
+        """Return the span of a value below the entry, without an anchor or a tag; it belongs to this entry alone."""
+        at = (*self.mount.entry, *path)
+        span = self.source.exactly_at(at)
+        if span is None:
+            raise _ElsewhereError(f"{_dotted(path)} is not there", self.source.at(at))
+        if span.file not in self.texts:
+            raise _ElsewhereError(f"{_dotted(path) or 'the pose'} is given in {span.file}", span)
+        sharing = [other for other, place in self._places(span.file).walk() if place.span == span]
+        if len(sharing) > 1:
+            other = next(other for other in sharing if other != at)
+            raise _SharedError(str(path[0]) if path else "the entry", _dotted(other), span)
+        found = _PROPERTIES.match(text_at(self.texts[span.file], span))
+        return (
+            span._replace(column=span.column + found.end())
+            if found and "\n" not in found[0]
+            else span
+        )
+
+    def _places(self, file: str) -> Place:
+        if file not in self._raw:
+            self._raw[file] = load(self.texts[file], file).places
+        return self._raw[file]
+
+    def _place_in_text(self, path: Path) -> Place:
+        """Return the place of a mapping as it stands in its file, before anything was merged over it."""
+        span = self.source.at(path)
+        return next(place for _, place in self._places(span.file).walk() if place.span == span)
+
+    def _inserted(self, values: Mapping[str, str], after: tuple[str, ...]) -> Edit:
+        """Return the edit that writes keys into the entry."""
+        self._own(())
+        place = self._place_in_text(self.mount.entry)
+        return Keys(self.texts[place.span.file], place).insertion(values, after)
+
+    def _xyz(self, pose: Pose) -> str:
+        return _list(self._short(value, "") for value in pose.xyz)
+
+    def _rpy(self, rotation: Quaternion) -> str:
+        angles: Numbers = FORMS["rpy"](rotation, {(0,): 0.0, (1,): 0.0, (2,): 0.0}, self.tolerance)
+        return _list(self._new_angle(value) for value in angles.values())
+
+    def _new_angle(self, value: float) -> str:
+        return self._short(value, "deg") if abs(value) > self.tolerance else "0"
+
+    def _short(self, value: float, unit: str, space: str = " ") -> str:
+        """Return the number in a unit with the fewest decimals that come near enough."""
+        size = quantity(f"1 {unit}").value if unit else 1.0
+        decimals = next(
+            n for n in range(400) if abs(round(value / size, n) * size - value) <= self.tolerance
+        )
+        rounded = round(value / size, decimals)
+        text = f"{rounded:.{decimals}f}" if "e" in number(rounded) else number(rounded)
+        return f"{text}{space}{unit}" if unit else text
+
+
+#: The steps of the path to a part.
+_PART = 2
+
+
+class _SharedError(_ElsewhereError):
+    def __init__(self, what: str, other: str, at: Span) -> None:
+        super().__init__(f"{what} is shared with {other}", at)
+
+
+#: Mappings of numbers: their keys, in the order of ``Robot.source_numbers``.
+_IN_ORDER: dict[str, tuple[str, ...]] = {
+    "axis_angle": ("angle",),
+    "look": ("up", "down", "left", "right", "roll"),
+}
+
+
+def _list(values: Iterable[str]) -> str:
+    return f"[{', '.join(values)}]"
+
+
+def _dotted(path: Path) -> str:
+    return ".".join(map(str, path))
+
+
+def _joined(edits: list[Edit]) -> Iterator[Edit]:
+    """Yield the edits, those that insert at the same point as one."""
+    texts: dict[Span, str] = {}
+    for edit in edits:
+        texts[edit.span] = texts.get(edit.span, "") + edit.text
+    return (Edit(span, text) for span, text in texts.items())
+
+
+def _scalars(value: Any, path: Path = ()) -> dict[Path, Any]:
+    """Return the values in a value that hold none themselves, with their paths."""
+    if not isinstance(value, (dict, list)):
+        return {path: value}
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    return {at: one for step, item in items for at, one in _scalars(item, (*path, step)).items()}
+
+
+def _value(text: str) -> float | None:
+    """Return the quantity in SI, or None where the text is none."""
+    try:
+        return quantity(text).value
+    except UnitError:
+        return None
+
+
+def _leaves(value: Any) -> Iterator[tuple[Path, float]]:
+    """Yield the numbers in a value with their paths; one that is computed is not among them."""
+    for path, item in _scalars(value).items():
+        if isinstance(item, str) and (number_in := _value(item)) is not None:
+            yield path, number_in
+        elif isinstance(item, (int, float)) and not isinstance(item, bool):
+            yield path, float(item)

@@ -1,0 +1,32 @@
+"""What is known of a frame of a robot, as lines that people read."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.provenance import values_of
+from tfcompose.foundation.numbers import clean_rpy
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.model.robot import Robot
+    from tfcompose.spec.load import Source
+
+
+def numbers(pose: Pose) -> str:
+    """Return a pose as people read it, in mm and degrees."""
+    x, y, z = (f"{value * 1000:.4g}" for value in pose.xyz)
+    roll, pitch, yaw = (f"{math.degrees(angle):.4g}" for angle in clean_rpy(pose.quat_xyzw))
+    return f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg"
+
+
+def facts_of(robot: Robot, sources: Sequence[Source], frame: str) -> list[str]:
+    """Return where a frame hangs and whose it is, its pose there, and where in the files its values stand."""
+    edge = robot.parent_edge(frame)
+    if edge is None:
+        return [f"{frame} is a root ({robot.frames[frame]})"]
+    values = values_of(edge, sources) or [str(edge.at)]
+    return [f"{frame} in {edge.parent}, {edge.kind}, by {edge.owner}", numbers(edge.pose), *values]

@@ -1,0 +1,73 @@
+"""Findings, and what a save did, as HTML: names in them come from files, and from whoever publishes."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.tools.view.session import Saved
+
+#: So many are shown.
+MOST = 40
+_ADDED, _REMOVED = "rgb(20, 130, 50)", "rgb(200, 40, 40)"
+_COLOURS = {"error": "rgb(220, 30, 30)", "warning": "rgb(200, 120, 20)"}
+
+
+def findings_html(found: Sequence[Finding], none: str = "") -> str:
+    """Return findings as lines of HTML, the codes of errors in red; ``none`` is what to say where there are none."""
+    lines = [_line(one) for one in found[:MOST]] or [escape(none)]
+    return paragraphs([*lines, *([f"and {len(found) - MOST} more"] if len(found) > MOST else [])])
+
+
+def _line(one: Finding) -> str:
+    place = f" ({escape(str(one.span))})" if one.span else ""
+    colour = _COLOURS.get(one.severity, "inherit")
+    return f'<span style="color: {colour}">{escape(one.code)}</span> {escape(one.message)}{place}'
+
+
+def paragraphs(lines: Sequence[str]) -> str:
+    """Return lines of HTML one below the other, as wide as the panel."""
+    return (
+        '<div style="padding: 0 0.7em; font-size: 0.85em; overflow-wrap:'
+        f' anywhere">{"<br>".join(lines)}</div>'
+    )
+
+
+def saved_html(saved: Saved) -> str:
+    """Return what a save did as HTML: the diff, what is found in the result, and what no edit can give."""
+    if saved.refused:
+        return paragraphs(["not saved, there would be errors:"]) + findings_html(saved.refused)
+    text = paragraphs(["saved:" if saved.diff else "nothing to save"])
+    if saved.diff:
+        text += _code([_diff_line(line) for line in saved.diff.splitlines()]) + findings_html(
+            saved.found
+        )
+    for one in saved.elsewhere:
+        offer = _code(map(escape, one.overlay("", "").splitlines())) if one.entry else ""
+        text += (
+            paragraphs(
+                [
+                    f"{escape(one.reason)} ({escape(str(one.at))})"
+                    + "; in an overlay:" * bool(offer)
+                ]
+            )
+            + offer
+        )
+    return text
+
+
+def _diff_line(line: str) -> str:
+    colour = {"+": _ADDED, "-": _REMOVED}.get(line[:1], "inherit")
+    return f'<span style="color: {colour}">{escape(line)}</span>'
+
+
+def _code(lines: Iterable[str]) -> str:
+    """Return lines of HTML as they stand in a file; those wider than the panel go on below."""
+    style = (
+        "margin: 0.3em 0.7em; font-size: 0.75em; white-space: pre-wrap; overflow-wrap: anywhere"
+    )
+    return f'<pre style="{style}">{chr(10).join(lines)}</pre>'

@@ -1,0 +1,107 @@
+"""The frames of a robot as the rows of a tree, of which some are closed, and some hidden with all below them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.tree import below, children_of, loop_closed_by, way_up
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.model.robot import Robot
+
+#: How far rows are indented by a level, in em; deeper levels than these stay in their column.
+_INDENT_EM, _DEEPEST = 0.85, 14
+#: So many rows are open at first: whole levels of the tree, two at least.
+_OPEN_ROWS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of the tree; the root is at depth 0. ``is_open`` is None where nothing is below the frame."""
+
+    frame: str
+    depth: int
+    is_open: bool | None
+
+    @property
+    def style(self) -> str:
+        """How a page indents it."""
+        return f"padding-left: {min(self.depth, _DEEPEST) * _INDENT_EM:.2f}em"
+
+
+class FrameTree:
+    """The frames of a robot from top to bottom, each below its first parent that closes no loop."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._parents: dict[str, str] = {}
+        for edge in robot.edges:
+            is_known = (
+                edge.parent in robot.frames
+                and edge.child in robot.frames
+                and edge.child not in self._parents
+            )
+            if is_known and not loop_closed_by((edge.parent, edge.child), self._parents.get):
+                self._parents[edge.child] = edge.parent
+        self._children = children_of((parent, child) for child, parent in self._parents.items())
+        self._depths: dict[str, int] = {}
+        waiting = [(frame, 0) for frame in reversed(robot.frames) if frame not in self._parents]
+        while waiting:
+            frame, depth = waiting.pop()
+            self._depths[frame] = depth
+            waiting += [(child, depth + 1) for child in reversed(self._children.get(frame, ()))]
+        self.frames = tuple(self._depths)
+        levels = list(self._depths.values())
+        self._open_levels = 1
+        while (
+            levels.count(self._open_levels + 1)
+            and sum(one <= self._open_levels + 1 for one in levels) <= _OPEN_ROWS
+        ):
+            self._open_levels += 1
+
+    def is_open(self, frame: str, chosen: Mapping[str, bool]) -> bool:
+        """Return whether the tree is open below a frame: as chosen, or by its level."""
+        return chosen.get(frame, self._depths[frame] < self._open_levels)
+
+    def opened(self, frame: str) -> dict[str, bool]:
+        """Return what to choose so that a frame is among the rows: what is above it is open."""
+        return dict.fromkeys(way_up(frame, self._parents.get)[1:], True)
+
+    def matches(self, search: str) -> set[str]:
+        """Return the frames whose names have each word of the search in them, in any case of letters."""
+        words = search.lower().split()
+        return {frame for frame in self.frames if all(word in frame.lower() for word in words)}
+
+    def rows(self, chosen: Mapping[str, bool], search: str = "") -> Iterator[Row]:
+        """Yield the rows from top to bottom: below frames that are open, or what a search finds and all above that."""
+        searches = bool(search.strip())
+        found = self.matches(search)
+        wanted = (
+            {above for frame in found for above in way_up(frame, self._parents.get)}
+            if searches
+            else found
+        )
+        closed_below = -1
+        for frame, depth in self._depths.items():
+            if frame not in wanted or 0 <= closed_below < depth:
+                continue
+            is_open = searches or self.is_open(frame, chosen)
+            closed_below = -1 if is_open else depth
+            has_more = any(child in wanted for child in self._children.get(frame, ()))
+            yield Row(frame, depth, is_open if has_more else None)
+
+    def hidden(self, chosen: Mapping[str, bool]) -> set[str]:
+        """Return the frames that are not shown: the nearest one above, or the frame itself, was chosen to be hidden."""
+        is_shown: dict[str, bool] = {}
+        for frame in self._depths:  # parents come first
+            is_shown[frame] = chosen.get(frame, is_shown.get(self._parents.get(frame, ""), True))
+        return {frame for frame, shown in is_shown.items() if not shown}
+
+    def show(self, frame: str, chosen: Mapping[str, bool], *, shown: bool) -> dict[str, bool]:
+        """Return what is chosen when a frame, with all below it, is shown or hidden."""
+        others = below(self._children, frame)
+        rest = {one: value for one, value in chosen.items() if one not in others}
+        is_so_above = (frame in self.hidden(rest)) != shown
+        return rest if is_so_above else {**rest, frame: shown}

@@ -1,0 +1,123 @@
+"""Sends joint states from sliders, in place of joint_state_publisher_gui, and only where nobody else sends them."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, Protocol
+
+from tfcompose.foundation.text import listed
+from tfcompose.tools.view.kinematics import joint_positions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from tfcompose.model.plan import Plan
+    from tfcompose.model.robot import Robot
+
+#: Who publishes already is found within this time, or almost always; then the graph is asked so
+#: often. Seconds.
+FOUND_S = 2.0
+_ASK_EVERY_S = 0.25
+#: How often positions are sent, in seconds; what they move is seen as often.
+_SEND_EVERY_S = 0.05
+
+
+class Publisher(Protocol):
+    """Publishes positions (rad or m) in the order of the names that it was made with."""
+
+    def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
+        """Publish them with this time."""
+
+    def close(self) -> None:
+        """Leave the topic."""
+
+
+def joint_topics(robot: Robot, plan: Plan) -> dict[str, dict[str, str]]:
+    """Return the topics from which the plan's processes take joint states: the joints by their names there.
+
+    In the robot a joint of a part may have the part's prefix.
+    """
+    found: dict[str, dict[str, str]] = {}
+    joints = {robot.final(edge.child): edge.joint.name for edge in robot.edges if edge.joint}
+    for edge in plan.edges:
+        if edge.kind == "joint" and edge.joint and edge.child in joints:
+            topic = posixpath.join(posixpath.dirname(edge.node), "joint_states")
+            found.setdefault(topic, {})[edge.joint.name] = joints[edge.child]
+    return found
+
+
+@dataclass(slots=True)
+class JointSender:
+    """Sends the states of joints on one topic.
+
+    It listens first, refuses if somebody else publishes there, and stops for good once somebody
+    does.
+
+    Attributes:
+        topic: the topic.
+        names: the joints of the robot, by their names in messages.
+        make: makes the publisher.
+        others: who else publishes on the topic: the nodes' names.
+        others_found: who did when it refused, or stopped.
+    """
+
+    topic: str
+    names: Mapping[str, str]
+    make: Callable[[], Publisher]
+    others: Callable[[], Sequence[str]]
+    state: Literal["waiting", "sending", "refused", "stopped"] = "waiting"
+    others_found: tuple[str, ...] = ()
+    _begun: float | None = None
+    _ask_at: float = 0.0
+    _send_at: float = 0.0
+    _publisher: Publisher | None = field(default=None, repr=False)
+
+    @property
+    def text(self) -> str:
+        """What it does, as people read it."""
+        them = listed(self.others_found)
+        return {
+            "waiting": f"looking whether anybody publishes {self.topic}",
+            "sending": f"the sliders publish {self.topic}",
+            "refused": f"the sliders do not publish: {them} publishes {self.topic}",
+            "stopped": f"the sliders stopped publishing, as {them} publishes {self.topic}",
+        }[self.state]
+
+    def step(
+        self, now: float, stamp_ns: int | None, robot: Robot, positions: Mapping[str, float]
+    ) -> None:
+        """Do what is due at ``now``, seconds of any clock: look for others, or send positions with this stamp.
+
+        ``positions`` are those of sliders, in rad or m; joints that mimic others follow.
+        """
+        self._begun = now if self._begun is None else self._begun
+        if now >= self._ask_at:
+            self._ask_at = now + _ASK_EVERY_S
+            self._give_way(self.others())
+        if self.state in {"refused", "stopped"}:
+            return
+        if self.state == "waiting" and now < self._begun + FOUND_S:
+            return
+        if self._publisher is None:
+            self._publisher = self.make()
+            self.state = "sending"
+        if stamp_ns is not None and now >= self._send_at:
+            self._send_at = now + _SEND_EVERY_S
+            where = joint_positions(robot, positions)
+            self._publisher.publish(stamp_ns, [where[name] for name in self.names.values()])
+
+    def _give_way(self, others: Sequence[str]) -> None:
+        """Leave the topic to others; a node that has just come may have no name yet."""
+        if not others:
+            return
+        self.others_found = tuple(others)
+        if self.state in {"waiting", "sending"}:
+            self.state = "refused" if self.state == "waiting" else "stopped"
+            self.close()
+
+    def close(self) -> None:
+        """Leave the topic."""
+        if self._publisher is not None:
+            self._publisher.close()
+            self._publisher = None

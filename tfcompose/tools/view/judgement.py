@@ -1,0 +1,135 @@
+"""What is wrong with a tree that was observed: the verdicts of ``verify``, by the frames of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.geometry import offset_of
+from tfcompose.foundation.text import listed
+from tfcompose.guard.verdict.publishers import flooded
+from tfcompose.guard.verdict.tree import rejected_transforms
+from tfcompose.guard.verdict.verify import differences, group_finding, grouped
+from tfcompose.model.plan.topics import parts_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from tfcompose.foundation.findings import Finding, Span
+    from tfcompose.foundation.geometry import Offset
+    from tfcompose.guard.verdict.verify import Difference
+    from tfcompose.model.plan import Plan
+    from tfcompose.model.robot import Robot
+    from tfcompose.tf.live.edges import EdgeState
+    from tfcompose.tf.live.state import TreeState
+
+    Topics = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What is wrong: all findings, those of each frame, and how far frames are from where the robot has them."""
+
+    found: tuple[Finding, ...] = ()
+    of_frame: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
+    off: Mapping[str, Offset] = field(default_factory=dict)
+
+    @property
+    def wrong(self) -> frozenset[str]:
+        """The frames whose edges have an error."""
+        return frozenset(
+            frame
+            for frame, found in self.of_frame.items()
+            if any(one.severity == "error" for one in found)
+        )
+
+    @property
+    def summary(self) -> str:
+        """What there is to say where nothing is found."""
+        return (
+            f"elsewhere than declared: {listed(sorted(self.off))}"
+            if self.off
+            else "all edges as expected"
+        )
+
+    def about(self, frame: str) -> list[str]:
+        """Return a line for each thing that is wrong with the edge above a frame."""
+        off = [f"off by {self.off[frame].text}"] if frame in self.off else []
+        return off + [f"{one.code} {one.message}" for one in self.of_frame.get(frame, ())]
+
+
+class Judge:
+    """Judges a robot by its plan; poses may be off by the tolerance. Frames have the names of the robot's file."""
+
+    def __init__(self, robot: Robot, plan: Plan, tolerance: Offset) -> None:
+        self._plan = plan
+        self._parts = parts_of(plan)
+        self._tolerance = tolerance
+        self._names = {robot.final(frame): frame for frame in robot.frames}
+        self._places: dict[str, Span] = {robot.final(edge.child): edge.at for edge in robot.edges}
+
+    def judge(
+        self,
+        states: Mapping[Topics, TreeState],
+        counts: Callable[[Difference], bool],
+        holds: Callable[[EdgeState], bool] = lambda _: False,
+    ) -> Judgement:
+        """Return what is wrong with the states on the plan's topics, of the differences that count.
+
+        Frames are also off where those are that do not count, if what was sent ``holds``: nothing
+        came after it.
+        """
+        found: list[Finding] = []
+        of_frame: dict[str, list[Finding]] = {}
+        off: dict[str, Offset] = {}
+        for topics, part in self._parts.items():
+            state = states[topics]
+            different = differences(state, part, self._tolerance)
+            kept = [one for one in different if counts(one)]
+            about = [
+                ([edge.child], rejected)
+                for edge in state.edges
+                if edge.stream.rejected is not None
+                for rejected in rejected_transforms(edge)
+            ]
+            about += [
+                (list(_children(group)), self._finding(group, state)) for group in grouped(kept)
+            ]
+            about += [([], one) for one in flooded(state)]
+            for children, finding in about:
+                found.append(finding)
+                for child in dict.fromkeys(children):
+                    of_frame.setdefault(self._names.get(child, child), []).append(finding)
+            left = [one for one in different if one.live is not None and holds(one.live)]
+            off |= {
+                self._names.get(child, child): far
+                for one in (*kept, *left)
+                for child, far in _off(one)
+            }
+        return Judgement(
+            tuple(found), {frame: tuple(some) for frame, some in of_frame.items()}, off
+        )
+
+    def _finding(self, group: Sequence[Difference], state: TreeState) -> Finding:
+        edge = group[0].edge
+        return group_finding(
+            group, state, self._plan, self._places.get(edge.child) if edge else None
+        )
+
+
+def _children(group: Sequence[Difference]) -> Iterator[str]:
+    for one in group:
+        if one.edge is not None:
+            yield one.edge.child
+        elif one.live is not None:
+            yield one.live.child
+
+
+def _off(one: Difference) -> Iterator[tuple[str, Offset]]:
+    """Yield the frame that is not where the robot has it, and how far it is off."""
+    if one.edge is None or one.live is None:
+        return
+    if one.off is not None:
+        yield one.edge.child, one.off
+    elif one.driver is not None:
+        yield one.edge.child, offset_of(one.edge.pose, one.live.stream.pose)

@@ -1,0 +1,113 @@
+"""A running tree as it is shown: where its frames are, which edges are wrong, and who publishes them.
+
+A ``LiveTree`` is given observers, which somebody feeds, and returns data for a scene and a panel;
+it reads no clock, no topic and knows no browser. Frames have the names of the robot file; on the
+tree they may have a prefix.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.text import duration
+from tfcompose.guard.verdict.verify import state_of
+from tfcompose.tf.live.state import who
+from tfcompose.tools.view.judgement import Judge, Judgement
+from tfcompose.tools.view.picture import ShownTree
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.foundation.geometry import Offset
+    from tfcompose.guard.verdict.verify import Difference
+    from tfcompose.model.plan import Plan
+    from tfcompose.model.robot import Robot
+    from tfcompose.tf.live.edges import EdgeState, EdgeStream, TreeObserver
+    from tfcompose.tf.ros.tf_codec import Row
+
+    Topics = tuple[str, str]
+
+#: Publishers that were there before are found within this time; until then nothing is missing.
+FOUND_S = 2.5
+_MISSING = frozenset({"TF804", "TF811"})
+
+
+class LiveTree(ShownTree):
+    """Follows a running robot.
+
+    Args:
+        robot: as it is in the file.
+        plan: what its processes publish.
+        observers: by topics (moving, fixed): those of the plan.
+        tolerance: how far a pose may be off.
+    """
+
+    def __init__(
+        self, robot: Robot, plan: Plan, observers: Mapping[Topics, TreeObserver], tolerance: Offset
+    ) -> None:
+        super().__init__(robot)
+        self.judgement = Judgement()
+        self._observers = observers
+        self._judge = Judge(robot, plan, tolerance)
+        self._states: dict[str, list[EdgeState]] = {}
+
+    def _newest(self) -> dict[str, Row]:
+        return {child: stream.row for child, stream in self._streams().items()}
+
+    def _streams(self) -> dict[str, EdgeStream]:
+        """Return the stream from which came what is newest of each frame, as tf2 has it: without what it refuses."""
+        newest: dict[str, EdgeStream] = {}
+        for observer in self._observers.values():
+            for stream in observer.streams:
+                if stream.rejected_row is stream.row:
+                    continue
+                other = newest.get(stream.child)
+                if other is None or stream.arrivals.last_ns >= other.arrivals.last_ns:
+                    newest[stream.child] = stream
+        return {self._pictures.name(child): stream for child, stream in newest.items()}
+
+    def judge(self, listened_s: float) -> Judgement:
+        """Judge what came, after so many seconds of listening, and return what is wrong."""
+        states = {
+            topics: state_of(observer, topics) for topics, observer in self._observers.items()
+        }
+        self._states = {}
+        for state in states.values():
+            for edge in state.edges:
+                self._states.setdefault(self._pictures.name(edge.child), []).append(edge)
+        streams = self._streams()
+        self.judgement = self._judge.judge(
+            states,
+            lambda one: _counts(one, listened_s),
+            lambda edge: streams.get(self._pictures.name(edge.child)) is edge.stream,
+        )
+        return self.judgement
+
+    def about(self, frame: str) -> list[str]:
+        """Return what is known of the edge above a frame: a line for each publisher, then what is wrong."""
+        edges = self._pictures.edges
+        lines = [line for one in self._states.get(frame, ()) for line in _published(one)]
+        if not lines and frame in edges:
+            lines = [f"nothing came from {edges[frame].owner} yet"]
+        return lines + self.judgement.about(frame)
+
+
+def _counts(one: Difference, listened_s: float) -> bool:
+    """Return whether it is so now: neither of somebody who has left, nor of what may still come."""
+    if one.violation is not None and one.live is not None and one.live.present is False:
+        return False
+    return listened_s >= FOUND_S or one.code not in _MISSING
+
+
+def _published(edge: EdgeState) -> Iterator[str]:
+    """Yield who publishes an edge, in which parent, how often, and how old the newest pose is."""
+    kind = (
+        "fixed"
+        if edge.stream.static
+        else f"{edge.timing.rate:.3g} Hz"
+        if edge.timing.rate
+        else "once"
+    )
+    age = edge.age_s if edge.data_age_s is None else edge.data_age_s
+    gone = ", has left" if edge.present is False else ""
+    yield f"{who(edge)} in {edge.parent}, {kind}, {duration(age)} old{gone}"

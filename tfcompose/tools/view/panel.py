@@ -1,0 +1,394 @@
+"""The panel next to the scene: a selected frame, the owners, joints to move, and the pose of a mount to edit."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from functools import partial
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.foundation.numbers import clean_rpy
+from tfcompose.tools.view.choices import Choices
+from tfcompose.tools.view.edit import ImmovableError
+from tfcompose.tools.view.facts import facts_of, numbers
+from tfcompose.tools.view.findings import paragraphs, saved_html
+from tfcompose.tools.view.kinematics import poses_in_roots
+from tfcompose.tools.view.scene import RobotScene, wxyz
+from tfcompose.tools.view.tree_panel import TreePanel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import viser
+
+    from tfcompose.model.robot import Joint, Robot
+    from tfcompose.tools.view.session import Session
+
+#: How far a joint without limits can be moved, in radians or metres, and the step of the gizmo in
+#: millimetres, degrees.
+_UNLIMITED = math.pi
+_SNAP_MM, _SNAP_DEG = 1.0, 1.0
+#: The gizmo of a robot whose largest body is 1 m long, in metres.
+_GIZMO_M = 0.25
+#: The frame in which a pose is shown, unless another is chosen.
+_PARENT = "its parent"
+#: The colour of an owner, at the right of the line below it.
+_SWATCH = (
+    '<div style="position: relative; height: 0"><div style="position: absolute; right: 1em; top:'
+    ' 0.15em; width: 4em; height: 0.8em; border-radius: 0.2em; background: {}"></div></div>'
+)
+#: How wide the panel is, in the picture's pixels.
+_WIDTH_PX = 350
+#: How long a sweep of the joints takes, and the time between two of its steps, in seconds.
+_SWEEP_S, _SWEEP_STEP_S = 6.0, 0.05
+
+
+def _snapped(pose: Pose, before: Pose) -> Pose:
+    """Return a pose in whole mm and degrees; a number that is less than half of one off keeps the value before."""
+
+    def snap(new: float, old: float, step: float) -> float:
+        return old if abs(new - old) < step / 2 else round(new / step) * step
+
+    x, y, z = (snap(*pair, _SNAP_MM / 1000) for pair in zip(pose.xyz, before.xyz, strict=True))
+    angles = zip(clean_rpy(pose.quat_xyzw), clean_rpy(before.quat_xyzw), strict=True)
+    roll, pitch, yaw = (snap(*pair, math.radians(_SNAP_DEG)) for pair in angles)
+    return Pose((x, y, z), quat_from_rpy(roll, pitch, yaw))
+
+
+def _phase(slider: Any) -> float:
+    """Return where a slider is in its sweep, in radians: 0 in its middle."""
+    half = (slider.max - slider.min) / 2
+    return math.asin(max(-1.0, min(1.0, (slider.value - slider.min) / half - 1)))
+
+
+class Panel:
+    """Shows a session on a server; with ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
+
+    ``choices`` are what somebody chose to see, which the panel changes. ``published`` are the
+    poses of frames in their roots where something else than the session says where they are.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        session: Session,
+        *,
+        edit: bool,
+        joints: bool = True,
+        choices: Choices | None = None,
+    ) -> None:
+        self.session = session
+        self.choices = choices or Choices()
+        self._gui = server.gui
+        self._server = server
+        self.positions = self.choices.positions
+        self.published: Mapping[str, Pose] | None = None
+        self.scene = RobotScene(server.scene, session.robot)
+        #: What the selected mount is dragged by, None where it cannot be moved.
+        self.gizmo: Any = None
+        self._numbers: list[Any] = []
+        self._showing = False
+        self._blocked: Any = None
+        #: Whether the joints are being moved to and fro.
+        self.is_sweeping = False
+        #: Whether another panel has taken its place.
+        self.is_gone = False
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(_WIDTH_PX)
+        self.tree = TreePanel(server.gui, session.robot, self.scene.colours, self.choices)
+        bases = (_PARENT, *session.robot.frames)
+        base = self.choices.base if self.choices.base in bases else _PARENT
+        with server.gui.add_folder("Frame"):
+            self._base: Any = server.gui.add_dropdown("in", bases, initial_value=base)
+            self._about = server.gui.add_html("")
+            self._names: Any = server.gui.add_checkbox(
+                "names of all frames", initial_value=self.choices.has_names
+            )
+        self.tree.on_select(self._show_selected)
+        self.tree.on_show(lambda: self.scene.hide(self.tree.hidden))
+        self._base.on_update(lambda _: self._choose_base())
+        self._names.on_update(lambda _: self._show_names())
+        self.scene.clicked = self.tree.select
+        if edit:
+            self._add_editor()
+        self._add_owners()
+        if self.scene.fields.sensors:
+            self._add_sensors()
+        if joints:
+            self._add_joints(session.robot)
+        self._begin()
+        self.scene.frame_camera(server, poses_in_roots(session.robot, self.positions))
+        threading.Thread(target=self.scene.add_meshes, name="meshes", daemon=True).start()
+
+    def _begin(self) -> None:
+        """Show what was chosen."""
+        self.refresh()
+        self.tree.mark_moved(frozenset(self.session.moved))
+        self.scene.hide(self.tree.hidden)
+        for owner in self.scene.colours:
+            self.scene.show_owner(owner, visible=self.choices.owners.get(owner, True))
+        self._show_names()
+        self._show_selected()
+        self._show_blocked()
+
+    def end(self) -> None:
+        """Move nothing any more: another panel takes this one's place, or none."""
+        self.is_gone = True
+        self.scene.end()
+
+    def refresh(self) -> None:
+        """Put the scene where joints and mounts are now."""
+        if self.published is None:
+            self.scene.update(self.session.robot, self.poses())
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Return where each frame is shown, in the root of its tree."""
+        return self.published or poses_in_roots(self.session.robot, self.positions)
+
+    @property
+    def selected(self) -> str:
+        """The selected frame."""
+        return self.choices.selected
+
+    def _choose_base(self) -> None:
+        self.choices.base = "" if self._base.value == _PARENT else self._base.value
+        self._show_selected()
+
+    def _show_names(self) -> None:
+        self.choices.has_names = self._names.value
+        self.scene.name_all(visible=self.choices.has_names)
+
+    def _show_selected(self) -> None:
+        robot, frame = self.session.robot, self.selected
+        self.scene.select(frame)
+        first, *further = facts_of(robot, self.session.state.sources, frame)
+        lines = [f"<b>{escape(first)}</b>", *map(escape, further)]
+        base, poses = self.choices.base, self.poses()
+        if {base, frame} <= poses.keys():
+            relative = numbers(poses[base].inverse() @ poses[frame])
+            lines += [f"in <b>{escape(base)}</b>, as shown:", relative]
+        self._about.content = paragraphs(lines)
+        if self._numbers:
+            self._show_mount()
+
+    def _add_owners(self) -> None:
+        with self._gui.add_folder("Owners"):
+            for owner, (red, green, blue) in self.scene.colours.items():
+                self._gui.add_html(_SWATCH.format(f"rgb({red}, {green}, {blue})"))
+                box = self._gui.add_checkbox(
+                    owner, initial_value=self.choices.owners.get(owner, True)
+                )
+                box.on_update(partial(self._show_owner, owner, box))
+
+    def _show_owner(self, owner: str, box: Any, _event: Any) -> None:
+        self.choices.owners[owner] = box.value
+        self.scene.show_owner(owner, visible=box.value)
+
+    def _add_sensors(self) -> None:
+        """Let the fields of view be shown, and the rays in them that the robot blocks."""
+        fields = self.scene.fields
+        for sensor, is_shown in self.choices.sensors.items():
+            fields.show(sensor, visible=is_shown)
+        if self.choices.reach is not None:
+            fields.draw(self.choices.reach)
+        with self._gui.add_folder("Fields of view"):
+            for sensor in fields.sensors:
+                box = self._gui.add_checkbox(sensor, initial_value=fields.shown[sensor])
+                box.on_update(partial(self._show_field, sensor, box))
+            reach = self._gui.add_number(
+                "drawn to (m)", fields.reach, min=0.01, max=300.0, step=0.01
+            )
+            reach.on_update(lambda _: self._draw_fields(reach.value))
+            self._blocked = self._gui.add_checkbox(
+                "blocked rays", initial_value=self.choices.has_blocked
+            )
+            self._blocked.on_update(lambda _: self._choose_blocked())
+            self.blocked = self._gui.add_html("")
+
+    def _draw_fields(self, reach: float) -> None:
+        self.choices.reach = reach
+        self.scene.fields.draw(reach)
+
+    def _choose_blocked(self) -> None:
+        self.choices.has_blocked = self._blocked.value
+        self._show_blocked()
+
+    def _show_field(self, sensor: str, box: Any, _event: Any) -> None:
+        self.choices.sensors[sensor] = box.value
+        self.scene.fields.show(sensor, visible=box.value)
+        self._show_blocked()
+
+    def _show_blocked(self) -> None:
+        """Draw the rays that are blocked, and say how many, if that is wanted."""
+        if self._blocked is not None:
+            lines = self.scene.fields.show_blocked(
+                self.session.robot if self._blocked.value else None
+            )
+            self.blocked.content = paragraphs([escape(line) for line in lines])
+
+    def _add_joints(self, robot: Robot) -> None:
+        joints = [edge.joint for edge in robot.edges if edge.joint and edge.joint.mimic is None]
+        if not joints:
+            return
+        with self._gui.add_folder("Joints"):
+            sliders = [self._slider(joint) for joint in joints]
+            self._gui.add_button("zero").on_click(lambda _: self._zero(sliders))
+            self._sweeps = self._gui.add_checkbox("sweep", initial_value=False)
+            self._sweeps.on_update(lambda _: self._sweep(sliders))
+
+    def _slider(self, joint: Joint) -> Any:
+        slides = joint.type == "prismatic"
+        lower, upper = -_UNLIMITED, _UNLIMITED
+        if joint.limit and joint.type != "continuous":
+            lower = joint.limit.lower if joint.limit.lower is not None else lower
+            upper = joint.limit.upper if joint.limit.upper is not None else upper
+        upper = max(lower, upper)
+        scale, unit = (1000.0, "mm") if slides else (math.degrees(1), "deg")
+        start = min(max(self.positions.get(joint.name, 0.0), lower), upper)
+        slider = self._gui.add_slider(
+            f"{joint.name} ({unit})",
+            lower * scale,
+            max(upper, lower + 1e-6) * scale,
+            0.1,
+            start * scale,
+        )
+        self.positions[joint.name] = start
+
+        def changed(_event: Any) -> None:
+            self.set_joint(joint.name, slider.value / scale)
+
+        slider.on_update(changed)
+        return slider
+
+    def set_joint(self, name: str, position: float) -> None:
+        """Move a joint, in radians or metres."""
+        self.positions[name] = position
+        if not self.is_sweeping:
+            self.refresh()
+
+    def _sweep(self, sliders: list[Any]) -> None:
+        """Move each joint to and fro between its limits, until that is switched off or the panel is gone."""
+        if self._sweeps.value and not self.is_sweeping:
+            self.is_sweeping = True
+            threading.Thread(target=self._sweep_until_over, args=(sliders,), daemon=True).start()
+
+    def _sweep_until_over(self, sliders: list[Any]) -> None:
+        begin, starts = time.monotonic(), [_phase(slider) for slider in sliders]
+        try:
+            while self._sweeps.value and not self.is_gone:
+                angle = (time.monotonic() - begin) / _SWEEP_S * math.tau
+                with self._server.atomic():
+                    for slider, start in zip(sliders, starts, strict=True):
+                        middle, half = (slider.max + slider.min) / 2, (slider.max - slider.min) / 2
+                        slider.value = middle + half * math.sin(angle + start)
+                    self.refresh()
+                time.sleep(_SWEEP_STEP_S)
+        finally:
+            self.is_sweeping = False
+
+    def _zero(self, sliders: list[Any]) -> None:
+        for slider in sliders:
+            slider.value = min(max(0.0, slider.min), slider.max)
+
+    def _add_editor(self) -> None:
+        labels = ("x (mm)", "y (mm)", "z (mm)", "roll (deg)", "pitch (deg)", "yaw (deg)")
+        with self._gui.add_folder("Mount"):
+            self._given = self._gui.add_html("")
+            self._numbers = [self._gui.add_number(label, 0.0, step=0.001) for label in labels]
+            self._snap: Any = self._gui.add_checkbox(
+                "snap to mm and degrees", initial_value=self.choices.snaps
+            )
+            self._snap.on_update(lambda _: self._choose_snap())
+            self._gui.add_button("undo").on_click(lambda _: self._again(self.session.undo()))
+            self._gui.add_button("redo").on_click(lambda _: self._again(self.session.redo()))
+            self._gui.add_button("save").on_click(lambda _: self.save())
+            self.report = self._gui.add_html("")
+        for handle in self._numbers:
+            handle.on_update(lambda _: self._typed())
+
+    def _choose_snap(self) -> None:
+        self.choices.snaps = self._snap.value
+
+    def _again(self, has_moved: bool) -> None:  # noqa: FBT001 (what undo and redo return)
+        if has_moved:
+            self._show_moved()
+            self._show_selected()
+
+    def _show_moved(self) -> None:
+        self.tree.mark_moved(frozenset(self.session.moved))
+        self.refresh()
+        self._show_blocked()
+
+    def _show_mount(self) -> None:
+        """Show the numbers that the file has for the selected frame, and a gizmo where they put it."""
+        if self.gizmo is not None:
+            self.gizmo.remove()
+            self.gizmo = None
+        try:
+            mount = self.session.mount(self.selected)
+        except ImmovableError as error:
+            self._given.content = paragraphs([escape(str(error))])
+            return
+        given = mount.given(mount.edge.pose)
+        self._given.content = paragraphs(
+            [f"pose of <b>{escape(mount.place)}</b> in <b>{escape(mount.relative_to)}</b>"]
+        )
+        self._fill(given)
+        at = self.poses()[mount.place]
+        scale = _GIZMO_M * self.scene.scale
+        self.gizmo = self._server.scene.add_transform_controls(
+            "/gizmo", scale=scale, wxyz=wxyz(at), position=at.xyz
+        )
+        self.gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
+
+    def _fill(self, given: Pose) -> None:
+        values = [value * 1000 for value in given.xyz] + [
+            math.degrees(one) for one in clean_rpy(given.quat_xyzw)
+        ]
+        self._showing = True
+        for handle, value in zip(self._numbers, values, strict=True):
+            handle.value = round(value, 6) + 0.0
+        self._showing = False
+
+    def _typed(self) -> None:
+        if not self._showing:
+            x, y, z, roll, pitch, yaw = (handle.value for handle in self._numbers)
+            angles = (math.radians(angle) for angle in (roll, pitch, yaw))
+            self.move(Pose((x / 1000, y / 1000, z / 1000), quat_from_rpy(*angles)))
+
+    def _dragged(self) -> None:
+        mount = self.session.mount(self.selected)
+        w, qx, qy, qz = (float(value) for value in self.gizmo.wxyz)
+        px, py, pz = (float(value) for value in self.gizmo.position)
+        base = self.poses()[mount.relative_to]
+        given = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
+        self.move(_snapped(given, mount.given(mount.edge.pose)) if self.choices.snaps else given)
+        self._show_selected()
+
+    def move(self, given: Pose) -> None:
+        """Give the selected mount the pose that its file is to have."""
+        try:
+            mount = self.session.mount(self.selected)
+        except ImmovableError as error:
+            self.report.content = paragraphs([escape(str(error))])
+            return
+        self.session.move(mount.edge.child, mount.of_edge(given))
+        self._show_moved()
+        if self.gizmo is not None:
+            at = self.poses()[mount.place]
+            self.gizmo.wxyz, self.gizmo.position = wxyz(at), at.xyz
+
+    def save(self) -> None:
+        """Save what was moved, and report it."""
+        try:
+            saved = self.session.save()
+        except OSError as error:
+            self.report.content = paragraphs([escape(f"not saved: {error}")])
+            return
+        self.report.content = saved_html(saved)
+        self.tree.mark_moved(frozenset(self.session.moved))
+        self._show_selected()

@@ -1,0 +1,169 @@
+"""Where everything is that a scene shows, from the newest transforms of each frame: a ``Picture``, as data."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tfcompose.foundation.geometry import Pose
+from tfcompose.tools.view.forest import Forest, pose_of, poses_of, row_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.model.robot import Robot
+    from tfcompose.tf.ros.tf_codec import Row
+    from tfcompose.tools.view.forest import Rows
+    from tfcompose.tools.view.judgement import Judgement
+
+_TURNING = frozenset({"revolute", "continuous"})
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Where everything is, in the roots of its trees, or in the fixed frame.
+
+    Attributes:
+        robot: the robot with the parents that were published.
+        poses: of each of its frames; what did not come is where the robot says.
+        further: the poses of frames that are not the robot's.
+        ghosts: where the robot has frames that are elsewhere, and all below them.
+        wrong: the edges, (parent, child), of which something is wrong.
+    """
+
+    robot: Robot
+    poses: Mapping[str, Pose]
+    further: Mapping[str, Pose] = field(default_factory=dict)
+    ghosts: Mapping[str, Pose] = field(default_factory=dict)
+    wrong: tuple[tuple[str, str], ...] = ()
+
+
+class Pictures:
+    """Makes pictures of a robot; frames have the names of its file, which may be others on the tree.
+
+    What is in one tree with the ``fixed`` frame is shown as seen from there; empty: from its root.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.fixed = ""
+        self.edges = {
+            edge.child: edge for edge in reversed(robot.edges)
+        }  # of several parents the first
+        self._names = {robot.final(frame): frame for frame in robot.frames}
+        self._rows: dict[str, Row] = {}
+        self._judged: object = None
+        self._grow({edge.child: edge.parent for edge in self.edges.values()})
+
+    def name(self, frame: str) -> str:
+        """Return the name in the robot's file of a frame on the tree; others keep theirs."""
+        return self._names.get(frame, frame)
+
+    def next(self, newest: Mapping[str, Row], judgement: Judgement) -> Picture | None:
+        """Return the picture of the newest transforms by frame, or None where it is the one before."""
+        parents = {edge.child: edge.parent for edge in self.edges.values()}
+        parents |= {child: self.name(row[0].removeprefix("/")) for child, row in newest.items()}
+        if parents != self._parents or not self._rows.keys() <= newest.keys():
+            self._grow(parents)
+        changed = {child: row for child, row in newest.items() if self._rows.get(child) is not row}
+        judged = (judgement.wrong, frozenset(judgement.off), self.fixed)
+        if not changed and self._judged == judged:
+            return None
+        self._judged = judged
+        if changed:
+            self._rows |= changed
+            rows = [self._forest.index[child] for child in changed]
+            self._local[rows] = [row[4:11] for row in changed.values()]
+        return self._picture(judgement)
+
+    def _grow(self, parents: dict[str, str]) -> None:
+        """Take the parents of frames, and begin with the poses that the robot has."""
+        self._parents = parents
+        frames = dict.fromkeys([*self.robot.frames, *parents, *parents.values()])
+        self._forest = Forest(tuple(frames), parents)
+        self._local = np.array(
+            [row_of(self.edges[one].pose if one in self.edges else Pose()) for one in frames],
+            np.float64,
+        ).reshape(-1, 7)
+        self._rows = {}
+        self._judged = None
+        edges = tuple(
+            replace(edge, parent=parents.get(edge.child, edge.parent)) for edge in self.robot.edges
+        )
+        self._shown = replace(self.robot, edges=edges)
+
+    def _picture(self, judgement: Judgement) -> Picture:
+        in_roots = self._forest.in_roots(self._local)
+        rows = self._in_fixed(in_roots, in_roots)
+        placed = dict(zip(self._forest.frames, poses_of(rows), strict=True))
+        known = self.robot.frames
+        poses = {frame: placed[frame] for frame in known}
+        further = {frame: pose for frame, pose in placed.items() if frame not in known}
+        wrong = tuple(
+            (self._parents[frame], frame)
+            for frame in sorted(judgement.wrong)
+            if frame in self._parents
+        )
+        return Picture(self._shown, poses, further, self._ghosts(judgement, in_roots), wrong)
+
+    def _in_fixed(self, in_roots: Rows, others: Rows) -> Rows:
+        return (
+            self._forest.in_frame(self.fixed, in_roots, others)
+            if self.fixed in self._forest.index
+            else others
+        )
+
+    def _ghosts(self, judgement: Judgement, in_roots: Rows) -> dict[str, Pose]:
+        off = judgement.off.keys() & self.edges.keys() & self._forest.index.keys()
+        if not off:
+            return {}
+        meant = self._local.copy()
+        for child in off:
+            row = self._forest.index[child]
+            meant[row] = row_of(self._meant(child, pose_of(self._local[row].tolist())))
+        placed = self._in_fixed(in_roots, self._forest.in_roots(meant))
+        frames = self._forest.below(set(off))
+        return {one: pose_of(placed[self._forest.index[one]].tolist()) for one in sorted(frames)}
+
+    def _meant(self, child: str, live: Pose) -> Pose:
+        """Return where the robot has the frame in its parent; what a joint moves is where it was published."""
+        edge = self.edges[child]
+        if edge.joint is None:
+            return edge.pose
+        if edge.joint.type in _TURNING:
+            return Pose(edge.pose.xyz, live.quat_xyzw)
+        return Pose(live.xyz, edge.pose.quat_xyzw)
+
+
+class ShownTree(ABC):
+    """A tree of transforms that is shown, and judged, as it runs or at a time of a recording."""
+
+    judgement: Judgement
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._pictures = Pictures(robot)
+
+    @property
+    def fixed(self) -> str:
+        """The frame from which its tree is shown; empty: the root."""
+        return self._pictures.fixed
+
+    @fixed.setter
+    def fixed(self, frame: str) -> None:
+        self._pictures.fixed = frame
+
+    def moved(self) -> Picture | None:
+        """Return where everything is if something moved, or is judged otherwise, since the last time; else None."""
+        return self._pictures.next(self._newest(), self.judgement)
+
+    @abstractmethod
+    def about(self, frame: str) -> list[str]:
+        """Return what is known of the edge above a frame, then what is wrong with it."""
+
+    @abstractmethod
+    def _newest(self) -> Mapping[str, Row]:
+        """Return the newest transform of each frame, by its name in the robot's file."""

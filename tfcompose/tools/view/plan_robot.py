@@ -1,0 +1,54 @@
+"""A built plan as a robot that can be shown: its edges, with the bodies and joint limits of the description."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.urdf.convert import robot_of
+from tfcompose.compiler.urdf.read import read_xml
+from tfcompose.foundation.findings import Span
+from tfcompose.model.robot import Edge, Joint, Link, Robot
+
+if TYPE_CHECKING:
+    from tfcompose.compiler.urdf.convert import Finder
+    from tfcompose.model.plan import Plan, PlanEdge
+    from tfcompose.model.robot import Limit
+
+
+def robot_of_plan(plan: Plan, description: str | None, file: str, find: Finder) -> Robot:
+    """Return the robot that a plan describes, frames named as on the live tree.
+
+    ``description`` is the text of the URDF beside the plan in ``file``, None where there is none;
+    ``find`` looks for its meshes.
+
+    Raises:
+        RejectedError: if that is no URDF.
+    """
+    links: dict[str, Link] = {}
+    limits: dict[str, Limit | None] = {}
+    ros = plan.ros
+    if description is not None:
+        described = robot_of(read_xml(description, file), file, find).robot
+        final = {
+            one: one if one in ros.shared_frames else f"{ros.frame_prefix}{one}"
+            for one in described.links
+        }
+        links = {final[name]: link for name, link in described.links.items()}
+        limits = {final[edge.child]: edge.joint.limit for edge in described.edges if edge.joint}
+    edges = tuple(_edge(edge, limits.get(edge.child)) for edge in plan.edges)
+    frames = {frame: edge.at for edge in edges for frame in (edge.parent, edge.child)}
+    frames |= {edge.child: edge.at for edge in edges}
+    frames |= {frame: Span(file) for frame in links if frame not in frames}
+    return Robot(
+        plan.robot, file, frames, edges, links, (), plan.base, guard=plan.guard, args=plan.args
+    )
+
+
+def _edge(edge: PlanEdge, limit: Limit | None) -> Edge:
+    at = Span(*edge.source)
+    joint = Joint(**asdict(edge.joint), at=at, limit=limit) if edge.joint else None
+    return Edge(
+        edge.parent, edge.child, edge.kind, edge.owner, edge.pose,
+        node=edge.node, rate=edge.rate, joint=joint, switched=edge.switched, pose_known=edge.pose_known, at=at,
+    )  # fmt: skip

@@ -1,0 +1,195 @@
+"""Shows a file again when it changes on disk; while it is broken the last good scene stays, with what is found."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import watchfiles
+
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.tools.view.findings import findings_html
+from tfcompose.tools.view.panel import Panel
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    import viser
+    from typing_extensions import Self
+
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.robot import Robot
+    from tfcompose.tools.view.session import Session
+
+#: What changes together is one change, in milliseconds.
+_TOGETHER_MS = 100
+
+
+class Files:
+    """Reads files, and knows which it has read, and what was in them; of meshes, when they were changed."""
+
+    def __init__(self, read: Callable[[str], str]) -> None:
+        self._read = read
+        self._texts: dict[str, str] = {}
+        self._meshes: dict[str, int] = {}
+
+    def __call__(self, file: str) -> str:
+        """Return the text of a file; raises what reading raises."""
+        self._texts.setdefault(file, "")  # one that is not there yet may come
+        text = self._texts[file] = self._read(file)
+        return text
+
+    def wrote(self, file: str, text: str) -> None:
+        """Know of a text that the file has from now on: it is no change."""
+        self._texts[file] = text
+
+    def look_at(self, meshes: Iterable[str]) -> None:
+        """Know of these mesh files, and no others, and when they were changed."""
+        self._meshes = {file: _changed_ns(file) for file in meshes}
+
+    @property
+    def folders(self) -> set[Path]:
+        """The folders of all files that were read: editors replace files by others."""
+        several = (*self._texts, *self._meshes)
+        return {folder for file in several if (folder := Path(file).resolve().parent).is_dir()}
+
+    def differ(self) -> bool:
+        """Return whether a file has another text than when it was read, or a mesh was changed."""
+        return any(self._now(file) != text for file, text in self._texts.items()) or any(
+            _changed_ns(file) != before for file, before in self._meshes.items()
+        )
+
+    def _now(self, file: str) -> str:
+        try:
+            return self._read(file)
+        except RejectedError:
+            return ""
+
+
+def _changed_ns(file: str) -> int:
+    try:
+        return Path(file).stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+class Watcher:
+    """Sets ``changed`` when something changes beside the files, in a thread of its own, within a ``with`` block."""
+
+    def __init__(self, files: Files) -> None:
+        self.changed = threading.Event()
+        self._files = files
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="watcher", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        while not self._over.is_set():
+            folders = self._files.folders
+            for _ in watchfiles.watch(
+                *folders,
+                watch_filter=None,
+                debounce=_TOGETHER_MS,
+                stop_event=self._over,
+                rust_timeout=500,
+                yield_on_timeout=True,
+                raise_interrupt=False,
+                recursive=False,
+            ):
+                if self._files.differ():
+                    self.changed.set()
+                if self._files.folders != folders:
+                    break
+
+
+def _meshes(robot: Robot) -> set[str]:
+    bodies = (
+        shape for link in robot.links.values() for shape in (*link.visuals, *link.collisions)
+    )
+    return {shape.mesh.path for shape in bodies if shape.mesh and shape.mesh.path}
+
+
+class ReloadedPanel:
+    """The panel of a session, made anew with each good version of its files.
+
+    Args:
+        server: where it is shown.
+        session: what is shown.
+        files: what the session was read with.
+        edit: as for ``Panel``.
+        joints: as for ``Panel``.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        session: Session,
+        files: Files,
+        *,
+        edit: bool,
+        joints: bool,
+    ) -> None:
+        self.session = session
+        self.files = files
+        self._server = server
+        self._edit, self._joints = edit, joints
+        self._broken: Any = None
+        self.panel = Panel(server, session, edit=edit, joints=joints)
+        files.look_at(_meshes(session.robot))
+
+    def end(self) -> None:
+        """Let the panel move nothing any more."""
+        self.panel.end()
+
+    def reload(self) -> bool:
+        """Read the files again; return whether there is another panel now, that of the robot which they describe."""
+        if not self.files.differ():
+            return False  # as after a save
+        try:
+            texts = {file: self.files(file) for file in self.session.texts}
+            state = self.session.compiled(texts)
+        except RejectedError as error:
+            self._show(error.findings)
+            return False
+        got_worse = state.errors and not self.session.state.errors
+        if state.robot is None or not state.robot.frames or got_worse:
+            self._show(state.found)
+            return False
+        self.session.replace(texts, state)
+        self.files.look_at(_meshes(state.robot))
+        before = self.panel
+        before.end()
+        with self._server.atomic():
+            self._server.gui.reset()
+            self._server.scene.reset()
+            self._broken = None
+            self.panel = Panel(
+                self._server,
+                self.session,
+                edit=self._edit,
+                joints=self._joints,
+                choices=before.choices,
+            )
+        if state.errors:
+            self._show(state.found)
+        return True
+
+    @property
+    def found(self) -> str:
+        """What is said to be wrong with the files as they are now, as HTML; empty where nothing is."""
+        return self._broken.content if self._broken else ""
+
+    def _show(self, found: tuple[Finding, ...]) -> None:
+        """Say what is wrong with the files as they are now."""
+        if self._broken is None:
+            with self._server.gui.add_folder("File", order=-2):
+                self._broken = self._server.gui.add_html("")
+        self._broken.content = findings_html(found)

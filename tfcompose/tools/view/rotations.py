@@ -1,0 +1,135 @@
+"""A rotation in the form in which a file gives it, changed as little as possible.
+
+Each form is numbers by their path below the key: ``(0,)`` of ``rpy``, ``("axis", 0)``,
+``("down",)`` of ``look``. What is returned are the numbers of the new rotation, of all that say
+the same the ones nearest to those that are there.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.geometry import (
+    angle_between,
+    matrix_from_quat,
+    norm,
+    normalised,
+    quat_from_rpy,
+    rpy_from_quat,
+)
+from tfcompose.foundation.numbers import clean_rpy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.foundation.geometry import Quaternion, Vector
+
+Numbers = dict[tuple[str | int, ...], float]
+"""Numbers in SI by their path below a key."""
+
+#: What two texts of one rotation differ by, in radians.
+_SAME_RAD = 1e-9
+#: So near to ±π/2 roll and yaw turn about one axis.
+_UPRIGHT = 1e-7
+#: How far an axis may be from the old one for the angle alone to change.
+_SAME_AXIS = 1e-9
+
+
+def rpy_near(rotation: Quaternion, old: Vector, tolerance: float) -> Vector:
+    """Return roll, pitch and yaw of a rotation: those in which the fewest numbers differ from the old ones."""
+
+    def changes(rpy: Vector) -> tuple[int, float]:
+        differences = [abs(new - was) for new, was in zip(rpy, old, strict=True)]
+        return sum(one > tolerance for one in differences), sum(differences)
+
+    return min(_all_rpy(rotation, old), key=changes)
+
+
+def _all_rpy(rotation: Quaternion, old: Vector) -> Iterator[Vector]:
+    """Yield the angles that make the rotation, each as near to the old one as whole revolutions bring it."""
+    exact = rpy_from_quat(rotation)
+    found = [exact, clean_rpy(rotation)]
+    roll, pitch, yaw = exact
+    if math.pi / 2 - abs(pitch) < _UPRIGHT:
+        sign = math.copysign(1.0, pitch)  # only yaw ∓ roll counts
+        found += [
+            (old[0], pitch, yaw + sign * (old[0] - roll)),
+            (roll + sign * (old[2] - yaw), pitch, old[2]),
+        ]
+    found += [(roll + math.pi, math.pi - pitch, yaw + math.pi) for roll, pitch, yaw in found]
+    for one in found:
+        near = tuple(
+            new + math.tau * round((was - new) / math.tau)
+            for new, was in zip(one, old, strict=True)
+        )
+        rpy = (near[0], near[1], near[2])
+        if angle_between(quat_from_rpy(*rpy), rotation) < _SAME_RAD:
+            yield rpy
+    yield exact
+
+
+def rpy_numbers(rotation: Quaternion, old: Numbers, tolerance: float) -> Numbers:
+    """Return the numbers of ``rpy``."""
+    rpy = rpy_near(rotation, (old[0,], old[1,], old[2,]), tolerance)
+    return {(index,): angle for index, angle in enumerate(rpy)}
+
+
+def quat_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) -> Numbers:
+    """Return the numbers of ``quat_xyzw``, on the side of the old one."""
+    sign = math.copysign(1.0, sum(part * old[index,] for index, part in enumerate(rotation)))
+    return {(index,): sign * part for index, part in enumerate(rotation)}
+
+
+def matrix_numbers(rotation: Quaternion, _old: Numbers, _tolerance: float) -> Numbers:
+    """Return the numbers of ``matrix``."""
+    rows = matrix_from_quat(rotation)
+    return {
+        (row, column): rows[row][column] for row, column in itertools.product(range(3), range(3))
+    }
+
+
+def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) -> Numbers:
+    """Return the numbers of ``axis_angle``: only another angle, if the axis is the same."""
+    old_axis = (old["axis", 0], old["axis", 1], old["axis", 2])
+    length = norm(old_axis)
+    x, y, z, w = normalised(rotation)
+    half = norm((x, y, z))
+    angle, axis = (
+        2 * math.atan2(half, w),
+        ((x / half, y / half, z / half) if half else (0.0, 0.0, 0.0)),
+    )
+    along = sum(a * b / length for a, b in zip(axis, old_axis, strict=True))
+    sign = math.copysign(1.0, along)
+    aside = math.dist([sign * part for part in axis], [part / length for part in old_axis])
+    if half < _SAME_AXIS or aside * half < _SAME_AXIS:
+        angle *= sign
+        axis = old_axis
+    was = old["angle",]
+    angle += math.tau * round((was - angle) / math.tau)
+    return {("axis", 0): axis[0], ("axis", 1): axis[1], ("axis", 2): axis[2], ("angle",): angle}
+
+
+def direction_numbers(rotation: Quaternion, old: Numbers, tolerance: float) -> Numbers:
+    """Return the numbers of ``look`` with angles: in the keys that are there, and in others where they are needed."""
+    up, left = ("up",) in old, ("right",) not in old
+    pitch_key, yaw_key = "up" if up else "down", "left" if left else "right"
+    pitch_sign, yaw_sign = (-1 if up else 1), (1 if left else -1)
+    was = (
+        old.get(("roll",), 0.0),
+        pitch_sign * old.get((pitch_key,), 0.0),
+        yaw_sign * old.get((yaw_key,), 0.0),
+    )
+    roll, pitch, yaw = rpy_near(rotation, was, tolerance)
+    new: Numbers = {(pitch_key,): pitch_sign * pitch, (yaw_key,): yaw_sign * yaw, ("roll",): roll}
+    return {path: value for path, value in new.items() if path in old or abs(value) > tolerance}
+
+
+FORMS: Mapping[str, Any] = {
+    "rpy": rpy_numbers,
+    "quat_xyzw": quat_numbers,
+    "matrix": matrix_numbers,
+    "axis_angle": axis_angle_numbers,
+    "look": direction_numbers,
+}

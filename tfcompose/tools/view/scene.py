@@ -1,0 +1,322 @@
+"""A robot as a scene of viser: bodies, frames as axes, and edges as lines in the colour of their owner."""
+
+from __future__ import annotations
+
+import colorsys
+import itertools
+import math
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tfcompose.foundation.geometry import Pose
+from tfcompose.tools.view.fields import FieldsOfView
+from tfcompose.tools.view.shapes import mesh_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    import viser
+
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.robot import Robot, Shape
+
+#: Where a colour begins on the wheel, and how far the next one is: the golden angle keeps
+#: neighbours apart. Reds are left out at both ends, as they say that an edge is wrong.
+_FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
+_NO_RED = 0.1
+_GREY = (105, 112, 122)
+#: The axes of a robot whose largest body is 1 m long, in metres.
+_AXES_M = 0.08
+#: How much larger the axes of the selected frame are.
+_SELECTED = 2.0
+_GHOST = (60, 120, 220)
+#: Where the camera begins, as a direction from the middle of the robot, and how many radii of it
+#: away.
+_FROM = np.array([0.62, 0.62, 0.48])
+_RADII = 2.0
+
+
+def wxyz(pose: Pose) -> tuple[float, float, float, float]:
+    """Return the rotation in the order that viser takes."""
+    x, y, z, w = pose.quat_xyzw
+    return (w, x, y, z)
+
+
+def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
+    """Return a colour for each owner of an edge, in the order of the tree."""
+    owners = dict.fromkeys(edge.owner for edge in robot.edges)
+    colours = {}
+    for index, owner in enumerate(owners):
+        hue = _NO_RED + (1 - 2 * _NO_RED) * ((_FIRST_HUE + index * _NEXT_HUE) % 1)
+        rgb = colorsys.hsv_to_rgb(hue, 0.85, 0.85)
+        colours[owner] = (round(rgb[0] * 255), round(rgb[1] * 255), round(rgb[2] * 255))
+    return colours
+
+
+def _add_shape(
+    scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int, int, int], opacity: float
+) -> Any:
+    """Add a shape to the scene; return its mesh in its own frame, and its handle, or None if it has nothing to show."""
+    mesh = mesh_of(shape)
+    if mesh is None or mesh.is_empty:
+        return None
+    handle = scene.add_mesh_simple(
+        name,
+        np.asarray(mesh.vertices, np.float32),
+        np.asarray(mesh.faces, np.uint32),
+        color=colour,
+        opacity=opacity,
+        flat_shading=True,
+        side="double",
+        cast_shadow=False,
+        receive_shadow=False,
+        wxyz=wxyz(shape.pose),
+        position=shape.pose.xyz,
+    )
+    return mesh, handle
+
+
+class RobotScene:
+    """What a scene shows of one robot; ``update`` moves it.
+
+    Reading the meshes of an arm takes seconds. A link that has collision shapes is shown by these
+    until ``add_meshes`` has read what its visual ones need.
+    """
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self._scene = scene
+        self.colours = colours_of(robot)
+        self._bodies: dict[str, Any] = {}
+        self._later: list[tuple[str, str, tuple[Shape, ...], list[Any]]] = []
+        self._lock = threading.Lock()
+        self._is_gone = False
+        self._corners: dict[str, list[Any]] = {}
+        self._axes: Any = None
+        self._lines: dict[str, Any] = {}
+        self._labels: dict[str, Any] = {}
+        self._at: Mapping[str, Pose] = {}
+        self._robot = robot
+        self._hidden: frozenset[str] = frozenset()
+        self._selected = ""
+        self._names_all = False
+        #: What is called with the frame of a body that is clicked.
+        self.clicked: Callable[[str], None] = lambda _: None
+        scene.set_up_direction("+z")
+        scene.world_axes.visible = False
+        for index, (frame, link) in enumerate(robot.links.items()):
+            shapes = link.visuals or link.collisions
+            if not shapes or frame not in robot.frames:
+                continue
+            name = f"/body/{index}"
+            self._bodies[frame] = scene.add_frame(name, show_axes=False)
+            is_later = link.collisions and any(shape.kind == "mesh" for shape in link.visuals)
+            handles = self._add_shapes(
+                frame, f"{name}/first", link.collisions if is_later else shapes
+            )
+            if is_later:
+                self._later.append((frame, f"{name}/visual", shapes, handles))
+        sides = (
+            high - low
+            for frame in self._corners
+            for low, high in zip(*self.bounds(frame), strict=True)
+        )
+        #: How large axes and the like are drawn, against those of a robot whose largest body is 1
+        #: m long: as its root.
+        self.scale = math.sqrt(max(sides, default=1.0) or 1.0)
+        self._axes_m = _AXES_M * self.scale
+        self.fields = FieldsOfView(scene, robot, self.scale)
+
+    def add_meshes(self) -> None:
+        """Show visual meshes in the place of collision shapes; a mesh that cannot be read leaves them."""
+        for frame, name, shapes, before in self._later:
+            if any(mesh_of(shape) is None for shape in shapes):
+                continue
+            with self._lock:
+                if self._is_gone:
+                    return
+                self._add_shapes(frame, name, shapes)
+                for handle in before:
+                    handle.remove()
+
+    def end(self) -> None:
+        """Let ``add_meshes`` change nothing any more: another scene takes this one's place, or none."""
+        with self._lock:
+            self._is_gone = True
+
+    def _add_shapes(self, frame: str, name: str, shapes: tuple[Shape, ...]) -> list[Any]:
+        handles = []
+        for number, shape in enumerate(shapes):
+            rgba = shape.material.rgba if shape.material else None
+            colour = (
+                (round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255))
+                if rgba
+                else _GREY
+            )
+            added = _add_shape(self._scene, f"{name}/{number}", shape, colour, 0.8)
+            if added is not None:
+                mesh, handle = added
+                handles.append(handle)
+                handle.on_click(lambda _, frame=frame: self.clicked(frame))
+                corners = itertools.product(*mesh.bounds.T.tolist())
+                self._corners.setdefault(frame, []).extend(
+                    (shape.pose @ Pose(one)).xyz for one in corners
+                )
+        return handles
+
+    def update(self, robot: Robot, poses: Mapping[str, Pose]) -> None:
+        """Put every frame where it is in the root of its tree."""
+        for frame, body in self._bodies.items():
+            if poses[frame] != self._at.get(frame):
+                body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
+        for frame, label in self._labels.items():
+            if poses[frame] != self._at.get(frame):
+                label.position = poses[frame].xyz
+        self._robot, self._at = robot, poses
+        self.fields.update(poses)
+        rows = np.array(
+            [poses[frame].xyz + poses[frame].quat_xyzw for frame in robot.frames], np.float32
+        ).reshape(-1, 7)
+        rotations, positions = rows[:, [6, 3, 4, 5]], rows[:, :3]
+        if self._axes is None:
+            self._axes = self._scene.add_batched_axes(
+                "/frames", rotations, positions, axes_length=self._axes_m, axes_radius=self._axes_m / 20,
+                batched_scales=self._scales(),
+            )  # fmt: skip
+        else:
+            self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
+        self._draw_edges()
+
+    def _draw_edges(self) -> None:
+        poses, shown = self._at, self._at.keys() - self._hidden
+        ends: dict[str, list[tuple[Vector, Vector]]] = {owner: [] for owner in self.colours}
+        for edge in self._robot.edges:
+            if edge.parent in poses and edge.child in shown:
+                ends[edge.owner].append((poses[edge.parent].xyz, poses[edge.child].xyz))
+        for index, (owner, colour) in enumerate(self.colours.items()):
+            points = np.array(ends[owner], np.float32).reshape(-1, 2, 3)
+            if owner in self._lines:
+                self._lines[owner].points = points
+            else:
+                self._lines[owner] = self._scene.add_line_segments(
+                    f"/edges/{index}", points, colour, thickness=3, thickness_units="screen"
+                )
+
+    def frame_camera(self, server: viser.ViserServer, poses: Mapping[str, Pose]) -> None:
+        """Let the camera of a new client begin where the robot fills the picture, with a grid below all of it."""
+        bodies = [
+            (poses[frame] @ Pose(xyz)).xyz
+            for frame, corners in self._corners.items()
+            for xyz in corners
+        ]
+        points = np.array([pose.xyz for pose in poses.values()] + bodies).reshape(-1, 3)
+        least, most = points.min(axis=0), points.max(axis=0)
+        middle, radius = (least + most) / 2, float(np.linalg.norm(most - least)) / 2 + self._axes_m
+        server.initial_camera.look_at = middle
+        server.initial_camera.position = middle + _RADII * radius * _FROM
+        self._scene.add_grid(
+            "/grid",
+            20,
+            20,
+            cell_size=0.1,
+            section_size=1,
+            cell_color=(235, 235, 235),
+            fade_distance=max(12.0, 4 * radius),
+            position=(0.0, 0.0, float(least[2])),
+        )
+
+    def hide(self, frames: Iterable[str]) -> None:
+        """Hide these frames with their bodies, labels and the edges to them, and show all others again."""
+        self._hidden = frozenset(frames)
+        for frame, handle in (*self._bodies.items(), *self._labels.items()):
+            handle.visible = frame not in self._hidden
+        self._axes.batched_scales = self._scales()
+        self._draw_edges()
+        self.fields.hide(self._hidden)
+
+    def select(self, frame: str) -> None:
+        """Draw the axes of a frame larger than those of all others, with its name."""
+        self._selected = frame
+        self._axes.batched_scales = self._scales()
+        self._label()
+
+    def _scales(self) -> Any:
+        sizes = (
+            (_SELECTED if frame == self._selected else 1) * (frame not in self._hidden)
+            for frame in self._robot.frames
+        )
+        return np.fromiter(sizes, np.float32)
+
+    def name_all(self, *, visible: bool) -> None:
+        """Write the names of all frames next to them, or that of the selected one only."""
+        self._names_all = visible
+        self._label()
+
+    def _label(self) -> None:
+        for frame in [
+            one for one in self._labels if not (self._names_all or one == self._selected)
+        ]:
+            self._labels.pop(frame).remove()
+        for index, (frame, pose) in enumerate(self._at.items()):
+            if frame not in self._labels and (self._names_all or frame == self._selected):
+                self._labels[frame] = self._scene.add_label(
+                    f"/labels/{index}",
+                    frame,
+                    position=pose.xyz,
+                    visible=frame not in self._hidden,
+                    anchor="bottom-left",
+                )
+
+    def show_owner(self, owner: str, *, visible: bool) -> None:
+        """Show or hide the edges of an owner."""
+        self._lines[owner].visible = visible
+
+    def is_owner_shown(self, owner: str) -> bool:
+        """Return whether the scene shows the edges of an owner."""
+        return bool(self._lines[owner].visible)
+
+    def bounds(self, frame: str) -> tuple[Vector, Vector]:
+        """Return the least and the most of what the scene shows of a frame's body, in the frame and in metres."""
+        columns = list(zip(*self._corners[frame], strict=True))
+        (x0, y0, z0), (x1, y1, z1) = (tuple(map(one, columns)) for one in (min, max))
+        return (x0, y0, z0), (x1, y1, z1)
+
+    def is_shown(self, frame: str) -> bool:
+        """Return whether the scene shows the body of a frame."""
+        return bool(self._bodies[frame].visible)
+
+    def body_pose(self, frame: str) -> Pose:
+        """Return where the scene has the body of a frame."""
+        w, x, y, z = (float(value) for value in self._bodies[frame].wxyz)
+        px, py, pz = (float(value) for value in self._bodies[frame].position)
+        return Pose((px, py, pz), (x, y, z, w))
+
+
+class Ghosts:
+    """Bodies and axes where a robot's file has frames that are elsewhere."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self._scene = scene
+        self._links = robot.links
+        self._names = {frame: f"/ghost/{index}" for index, frame in enumerate(robot.frames)}
+        self._shown: dict[str, Any] = {}
+
+    def show(self, poses: Mapping[str, Pose]) -> None:
+        """Show these frames, by their poses in the roots of their trees, and no others."""
+        for frame in self._shown.keys() - poses.keys():
+            self._shown.pop(frame).remove()
+        for frame, name in self._names.items():
+            if frame not in poses:
+                continue
+            if frame not in self._shown:
+                self._shown[frame] = self._scene.add_frame(
+                    name, axes_length=_AXES_M / 2, axes_radius=_AXES_M / 40
+                )
+                link = self._links.get(frame)
+                for number, shape in enumerate((link.visuals or link.collisions) if link else ()):
+                    _add_shape(self._scene, f"{name}/{number}", shape, _GHOST, 0.25)
+            self._shown[frame].wxyz, self._shown[frame].position = (
+                wxyz(poses[frame]),
+                poses[frame].xyz,
+            )

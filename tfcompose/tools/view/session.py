@@ -1,0 +1,162 @@
+"""One robot file that is shown and edited: poses that were moved, what undoes them, and how they are saved."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from difflib import unified_diff
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import edited
+from tfcompose.tools.view.edit import Change, Elsewhere, change_of, mount_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from collections.abc import Set as AbstractSet
+
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.foundation.geometry import Pose
+    from tfcompose.model.robot import Robot
+    from tfcompose.tools.view.edit import Mount
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """What saving did: the diff, the findings of the result, and the poses that no edit of the files can give.
+
+    Nothing is saved where ``refused`` findings are new errors.
+    """
+
+    diff: str = ""
+    found: tuple[Finding, ...] = ()
+    refused: tuple[Finding, ...] = ()
+    elsewhere: tuple[Elsewhere, ...] = ()
+
+
+@dataclass(slots=True)
+class Session:
+    """A robot with moved mounts. ``texts`` are the files that may be edited, the robot's own one first.
+
+    ``compiled`` compiles texts that are not written yet, ``write`` replaces a file's old text by
+    the new one.
+    """
+
+    texts: Mapping[str, str]
+    compiled: Callable[[Mapping[str, str]], Compiled]
+    write: Callable[[str, str, str], None]
+    state: Compiled = field(init=False)
+    moved: dict[str, Pose] = field(default_factory=dict)
+    _undo: list[dict[str, Pose]] = field(default_factory=list)
+    _redo: list[dict[str, Pose]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.state = self.compiled(self.texts)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot with its moved mounts.
+
+        Raises:
+            ValueError: if the files did not get as far as a robot.
+        """
+        if self.state.robot is None:
+            raise ValueError("the files give no robot")
+        moved = self.moved
+        edges = (
+            replace(edge, pose=moved.get(edge.child, edge.pose)) for edge in self.state.robot.edges
+        )
+        return replace(self.state.robot, edges=tuple(edges))
+
+    def replace(self, texts: Mapping[str, str], state: Compiled) -> None:
+        """Go on with files that changed on disk, and what they compile to; moves of frames that are gone are lost."""
+        self.texts, self.state = texts, state
+        frames = state.robot.frames if state.robot else {}
+        self.moved = {child: pose for child, pose in self.moved.items() if child in frames}
+        self._undo.clear()
+        self._redo.clear()
+
+    def mount(self, child: str) -> Mount:
+        """Return what the file gives of the edge above a frame; raises ImmovableError.
+
+        A frame inside a sensor moves with the sensor, unless the file gives its own pose.
+        """
+        robot, source = self.robot, self.state.sources[0]
+        mount = mount_of(robot, source, child)
+        if mount.edge.sensor and not mount.edge.given and not mount.data:
+            holder = next(
+                (one.mount for one in robot.sensors if one.name == mount.edge.sensor), child
+            )
+            return mount_of(robot, source, holder)
+        return mount
+
+    def move(self, child: str, pose: Pose) -> None:
+        """Move the frame to a pose in its parent, which ``undo`` takes back."""
+        self._undo.append(dict(self.moved))
+        self._redo.clear()
+        self.moved[child] = pose
+
+    def undo(self) -> bool:
+        """Take back the last move; False if there is none."""
+        return self._step(self._undo, self._redo)
+
+    def redo(self) -> bool:
+        """Make the move again that was taken back; False if there is none."""
+        return self._step(self._redo, self._undo)
+
+    def _step(self, there: list[dict[str, Pose]], back: list[dict[str, Pose]]) -> bool:
+        if there:
+            back.append(self.moved)
+            self.moved = there.pop()
+            return True
+        return False
+
+    def save(self) -> Saved:
+        """Write what was moved into the files where the values stand, if that brings no new error.
+
+        Raises:
+            OSError: if a file cannot be written, or was changed meanwhile.
+        """
+        texts, state, elsewhere = dict(self.texts), self.state, dict[str, Elsewhere]()
+        for child, pose in self.moved.items():
+            if state.robot is None:
+                break
+            change = change_of(state.robot, state.sources[0], texts, child, pose)
+            if isinstance(change, Elsewhere):
+                elsewhere[child] = change
+            elif change.edits:
+                texts |= _with(texts, change)
+                state = self.compiled(texts)
+        before = Counter((one.code, one.message) for one in self.state.errors)
+        refused = tuple(one for one in state.errors if not before[one.code, one.message])
+        if refused:
+            return Saved(refused=refused, elsewhere=tuple(elsewhere.values()))
+        diff = ""
+        for file, text in texts.items():
+            old = self.texts[file]
+            if text != old:
+                self.write(file, old, text)
+                lines = unified_diff(
+                    old.splitlines(keepends=True), text.splitlines(keepends=True), file, file
+                )
+                diff += "".join(lines)
+        self._keep_undo(self.moved.keys() - elsewhere.keys())
+        self.texts, self.state = texts, state
+        self.moved = {child: pose for child, pose in self.moved.items() if child in elsewhere}
+        return Saved(diff, state.found, elsewhere=tuple(elsewhere.values()))
+
+    def _keep_undo(self, saved: AbstractSet[str]) -> None:
+        """Have undo and redo lead to where these frames were before the save, which the files no longer say."""
+        edges = self.state.robot.edges if self.state.robot else ()
+        before = {edge.child: edge.pose for edge in reversed(edges) if edge.child in saved}
+        for step in (*self._undo, *self._redo):
+            step.update({child: pose for child, pose in before.items() if child not in step})
+
+
+def _with(texts: Mapping[str, str], change: Change) -> dict[str, str]:
+    files = {edit.span.file for edit in change.edits}
+    new = {
+        file: edited(texts[file], [edit for edit in change.edits if edit.span.file == file])
+        for file in files
+    }
+    return {file: text for file, text in new.items() if text is not None}

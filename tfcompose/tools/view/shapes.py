@@ -1,0 +1,50 @@
+"""The triangles of shapes, few enough for a browser."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import trimesh
+
+from tfcompose.compiler.meshes import read_mesh
+
+if TYPE_CHECKING:
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.robot import Shape
+
+#: A mesh file with more triangles is drawn with so many: an arm with seven links stays below 2 MB
+#: of a page.
+MOST_TRIANGLES = 20_000
+
+
+def mesh_of(shape: Shape) -> Any:
+    """Return the triangles of a shape in its own frame, a ``trimesh.Trimesh`` in metres.
+
+    A mesh file with more than ``MOST_TRIANGLES`` is decimated to these (quadric error metrics,
+    Garland and Heckbert 1997). None: the file is not there or cannot be read.
+    """
+    size = shape.size
+    if shape.kind == "box":
+        return trimesh.creation.box(extents=size)
+    if shape.kind == "cylinder":
+        return trimesh.creation.cylinder(radius=size[0], height=size[1], sections=32)
+    if shape.kind == "sphere":
+        return trimesh.creation.icosphere(subdivisions=2, radius=size[0])
+    if shape.kind == "capsule":
+        return trimesh.creation.capsule(radius=size[0], height=size[1], count=[24, 24])
+    path = shape.mesh.path if shape.mesh else ""
+    try:
+        return _decimated(path, (size[0], size[1], size[2]), Path(path).stat().st_mtime_ns)
+    except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
+        return None
+
+
+@lru_cache(maxsize=256)
+def _decimated(path: str, scale: Vector, _changed_ns: int) -> Any:
+    mesh = read_mesh(path, scale)
+    if len(mesh.faces) > MOST_TRIANGLES:
+        mesh.merge_vertices()  # an STL file has each corner of each triangle by itself
+        mesh = mesh.simplify_quadric_decimation(face_count=MOST_TRIANGLES)
+    return mesh

@@ -1,0 +1,269 @@
+"""The panel of frames, at the left of the scene: a tree to search, select, open and close, and hide parts of.
+
+A control of viser for each of a thousand frames would take seconds. The tree is one element of
+HTML; what is clicked in it comes back as the text of a field below it, which is not shown.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import threading
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.text import counted
+from tfcompose.tools.view.frame_tree import FrameTree
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    import viser
+
+    from tfcompose.model.robot import Robot
+    from tfcompose.tools.view.choices import Choices
+    from tfcompose.tools.view.frame_tree import Row
+
+    Colour = tuple[int, int, int]
+
+_WIDTH_PX = 300
+_STYLE = """<style>
+div:has(> div > .tf-frames) > div:first-child {
+  position: sticky; top: 0; z-index: 1; padding-top: 0.5em; background: var(--mantine-color-body) }
+div:has(> .tf-frames) + div { display: none }
+.tf-frames { padding: 0 0.5em 0.7em; font-size: 0.85em; line-height: 1.55 }
+.tf-frames:focus { outline: none }
+.tf-frames button { all: unset; cursor: pointer; box-sizing: border-box }
+.tf-frames button:focus-visible { outline: 2px solid #228be6 }
+.tf-frames header { color: #868e96; padding: 0 0.3em 0.4em } .tf-frames header button { color: #1971c2 }
+.tf-frames header button:hover { text-decoration: underline }
+.tf-row { display: flex; align-items: center; border-radius: 0.25em } .tf-row:hover { background: #8080801c }
+.tf-row[aria-selected=true] { background: #228be62e; font-weight: 600 }
+.tf-row > i { flex: none; width: 1.2em; text-align: center; font-style: normal } .tf-row > i button { width: 100% }
+.tf-row > input { flex: none; width: 0.95em; height: 0.95em; margin: 0 0.4em 0 0.1em; cursor: pointer }
+.tf-row > button { flex: 1; overflow: hidden; text-overflow: ellipsis; white-space: nowrap }
+.tf-row.tf-hidden > button { opacity: 0.45 } .tf-row.tf-wrong > button { color: #dc1e1e }
+.tf-row button b { color: #e8590c }
+.tf-row mark { background: #ffd43b80; color: inherit }
+</style>"""
+#: Sends [what, frame, when] by the field below the tree: the time makes that another text each
+#: time.
+_SEND = """
+const send = (what, frame) => {
+  const field = this.parentElement.nextElementSibling.querySelector('input');
+  const text = JSON.stringify([what, frame, Date.now()]);
+  Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call(field, text);
+  field.dispatchEvent(new Event('input', {bubbles: true}));
+};"""
+_CLICKED = (
+    _SEND
+    + """
+const clicked = event.target.closest('[data-does]'), row = event.target.closest('[data-frame]');
+this.parentElement.dataset.hasKeys = '';
+if (clicked) send(clicked.dataset.does, row ? row.dataset.frame : '');"""
+)
+_PRESSED = (
+    _SEND
+    + """
+const rows = [...this.querySelectorAll('[data-frame]')], at = rows.findIndex(row => row.ariaSelected === 'true');
+const step = {ArrowDown: 1, ArrowUp: -1}[event.key];
+const opens = {ArrowRight: 'false', ArrowLeft: 'true'}[event.key];
+if (step || opens) {
+  event.preventDefault();
+  event.stopPropagation();
+  this.parentElement.dataset.hasKeys = '';
+  const next = rows[at + step];
+  if (next) send('select', next.dataset.frame);
+  if (opens && at >= 0 && rows[at].ariaExpanded === opens) send('open', rows[at].dataset.frame);
+}"""
+)
+#: The tree loses the keys when something else gets them, not when it is replaced.
+_LEFT = """
+const place = this.parentElement;
+setTimeout(() => { if (this.isConnected) delete place.dataset.hasKeys })"""
+#: What scrolls to the selected row, or to what is found first, when the tree is put into the page,
+#: where scripts do not run, and has the next keys go to the tree if the one before did.
+_PLACED = """<img hidden src="data:," onerror="
+const tree = this.closest('.tf-frames'), selected = tree.querySelector('[aria-selected=true]');
+const row = this.dataset.scrolls === 'true' && (selected || tree.querySelector('mark'));
+if (row) row.scrollIntoView({block: 'nearest'});
+const isFree = document.activeElement === document.body;
+if (isFree && 'hasKeys' in tree.parentElement.dataset) tree.focus({preventScroll: true})" data-scrolls="SCROLLS">"""
+_NO_OWNER = (134, 142, 150)
+
+
+class TreePanel:
+    """Shows the frames of a robot as a tree, and keeps in ``choices`` what somebody does with them.
+
+    Args:
+        gui: where it is shown.
+        robot: whose frames.
+        colours: of the owners of edges.
+        choices: what is shown, and changed.
+    """
+
+    def __init__(
+        self, gui: viser.GuiApi, robot: Robot, colours: Mapping[str, Colour], choices: Choices
+    ) -> None:
+        self.tree = FrameTree(robot)
+        self._choices = choices
+        self._lock = threading.RLock()
+        self._wrong: frozenset[str] = frozenset()
+        self._moved: frozenset[str] = frozenset()
+        self._on_select: list[Callable[[], None]] = []
+        self._on_show: list[Callable[[], None]] = []
+        self._colours = dict.fromkeys(robot.frames, _NO_OWNER)
+        self._titles = {frame: f"{frame} is a root" for frame in robot.frames}
+        for edge in reversed(robot.edges):  # of several parents the first
+            self._colours[edge.child] = colours[edge.owner]
+            self._titles[edge.child] = (
+                f"{edge.child} in {edge.parent}, {edge.kind}, by {edge.owner}"
+            )
+        if choices.selected not in robot.frames:
+            choices.selected = self.tree.frames[0]
+        choices.is_open |= self.tree.opened(choices.selected)
+        panel = gui.add_panel()
+        with panel.add_tab("Frames"):
+            self._search: Any = gui.add_text("search", choices.search)
+            self._html = gui.add_html(self.content(scrolls=True))
+            self._clicked: Any = gui.add_text("", "")
+        panel.dock_left()
+        panel.set_width(_WIDTH_PX)
+        self._search.on_update(lambda _: self.search(self._search.value))
+        self._clicked.on_update(lambda _: self._click(*json.loads(self._clicked.value)))
+
+    @property
+    def hidden(self) -> set[str]:
+        """The frames that are hidden."""
+        return self.tree.hidden(self._choices.is_shown)
+
+    def on_select(self, call: Callable[[], None]) -> None:
+        """Call this when another frame is selected."""
+        self._on_select.append(call)
+
+    def on_show(self, call: Callable[[], None]) -> None:
+        """Call this when frames are hidden, or shown again."""
+        self._on_show.append(call)
+
+    def select(self, frame: str) -> None:
+        """Select a frame, and open the tree down to it."""
+        with self._lock:
+            self._choices.selected = frame
+            self._choices.is_open |= self.tree.opened(frame)
+            self._refresh(scrolls=True)
+        for call in self._on_select:
+            call()
+
+    def search(self, search: str) -> None:
+        """Show the frames with these words in their names and all above them; select the one that is meant, if any."""
+        with self._lock:
+            self._choices.search = search
+            if self._search.value != search:
+                self._search.value = search
+            found = self.tree.matches(search)
+            meant = search if search in found else found.pop() if len(found) == 1 else None
+            self._refresh(scrolls=True)
+        if meant is not None and meant != self._choices.selected:
+            self.select(meant)
+
+    def show(self, frame: str, *, shown: bool) -> None:
+        """Show or hide a frame with all below it."""
+        self._show(self.tree.show(frame, self._choices.is_shown, shown=shown))
+
+    def _show(self, is_shown: dict[str, bool]) -> None:
+        with self._lock:
+            self._choices.is_shown = is_shown
+            self._refresh()
+        for call in self._on_show:
+            call()
+
+    def mark(self, wrong: frozenset[str]) -> None:
+        """Have those frames red of whose edges something is wrong."""
+        with self._lock:
+            if wrong != self._wrong:
+                self._wrong = wrong
+                self._refresh()
+
+    def mark_moved(self, moved: frozenset[str]) -> None:
+        """Have a dot after those frames that were moved and are not saved."""
+        with self._lock:
+            if moved != self._moved:
+                self._moved = moved
+                self._refresh()
+
+    def _open(self, is_open: dict[str, bool]) -> None:
+        with self._lock:
+            self._choices.is_open |= is_open
+            self._refresh()
+
+    def _click(self, does: str, frame: str, _when: float) -> None:
+        """Do what somebody clicked on in the page."""
+        frames = self.tree.frames
+        if does == "open all":
+            self._open(dict.fromkeys(frames, True))
+        elif does == "close all":
+            self._open(dict.fromkeys(frames, False))
+        elif does == "show all":
+            self._show({})
+        elif frame not in frames:
+            return  # of the robot that was shown before
+        elif does == "select":
+            self.select(frame)
+        elif does == "open":
+            self._open({frame: not self.tree.is_open(frame, self._choices.is_open)})
+        elif does == "show":
+            self.show(frame, shown=frame in self.hidden)
+
+    def _refresh(self, *, scrolls: bool = False) -> None:
+        self._html.content = self.content(scrolls=scrolls)
+
+    def content(self, *, scrolls: bool = False) -> str:
+        """Return the tree as HTML; it ``scrolls`` to the frame that is selected, or found, when it comes to a page."""
+        choices, hidden = self._choices, self.hidden
+        words = re.compile(
+            "|".join(map(re.escape, choices.search.split())) or r"(?!)", re.IGNORECASE
+        )
+        rows = "".join(
+            self._row(row, words, is_hidden=row.frame in hidden)
+            for row in self.tree.rows(choices.is_open, choices.search)
+        )
+        count = counted(len(self.tree.frames), "frame")
+        if choices.search.strip():
+            count = f"{len(self.tree.matches(choices.search))} of {count}"
+        does = ("open all", "close all", "show all") if hidden else ("open all", "close all")
+        buttons = (f'<button data-does="{one}">{one}</button>' for one in does)
+        header = f"<header>{' · '.join([count, *buttons])}</header>"
+        tree = f'<div role="tree">{rows}</div>{_PLACED.replace("SCROLLS", str(scrolls).lower())}'
+        handlers = (
+            f'onclick="{escape(_CLICKED)}" onkeydown="{escape(_PRESSED)}" onblur="{escape(_LEFT)}"'
+        )
+        return f'{_STYLE}<div class="tf-frames" tabindex="0" {handlers}>{header}{tree}</div>'
+
+    def _row(self, row: Row, words: re.Pattern[str], *, is_hidden: bool) -> str:
+        frame, title = row.frame, escape(self._titles[row.frame])
+        classes = "tf-row" + " tf-hidden" * is_hidden + " tf-wrong" * (frame in self._wrong)
+        selected = str(frame == self._choices.selected).lower()
+        opens = (
+            ""
+            if row.is_open is None
+            else f'<button data-does="open">{"▾" if row.is_open else "▸"}</button>'
+        )
+        moved = '<b title="moved, not saved"> ●</b>' if frame in self._moved else ""
+        expanded = "" if row.is_open is None else f' aria-expanded="{str(row.is_open).lower()}"'
+        return (
+            f'<div class="{classes}" role="treeitem" aria-level="{row.depth + 1}"'
+            f' aria-selected="{selected}"{expanded} data-frame="{escape(frame)}"'
+            f' style="{row.style}"><i>{opens}</i><input type="checkbox"'
+            f' data-does="show"{"" if is_hidden else " checked"} style="accent-color:'
+            f' rgb{self._colours[frame]}" title="show it and what is below"><button'
+            f' data-does="select" title="{title}">{_marked(frame, words)}{moved}</button></div>'
+        )
+
+
+def _marked(name: str, words: re.Pattern[str]) -> str:
+    """Return a name as HTML with the words marked that are searched for."""
+    parts, at = [], 0
+    for match in words.finditer(name):
+        parts += [escape(name[at : match.start()]), f"<mark>{escape(match[0])}</mark>"]
+        at = match.end()
+    return "".join([*parts, escape(name[at:])])

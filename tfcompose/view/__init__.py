@@ -1,5 +1,0 @@
-"""Shows a robot in the browser, and moves what is mounted: a new pose becomes edits of the robot file.
-
-``edit`` is pure functions over the file's text; ``scene`` and ``panel`` stand on viser. Files are read, compiled and
-written by whoever starts the view. Must not import ``cli``, ``guard``, ``launcher``, ``rclpy``, ``yaml``.
-"""

@@ -118,7 +118,7 @@ def test_an_organised_cloud_with_holes_and_colours(buffer: Buffer) -> None:
     points["x"][1, 2] = np.nan
     cloud = headed(PointCloud2)
     cloud.height, cloud.width, cloud.point_step, cloud.row_step = 3, 5, 32, 32 * 5 + 8
-    columns = kind.fields or {}
+    columns: Any = kind.fields
     cloud.fields = [
         PointField(name=name, offset=columns[name][1], datatype=7, count=1)
         for name in ("x", "y", "z", "rgb")

@@ -175,7 +175,13 @@ def disk() -> Disk:
         prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix
     )
     return Disk(
-        read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, _is_pointer
+        read_text,
+        os.path.isfile,
+        os.path.isdir,
+        prefixes=prefixes,
+        moments=moments,
+        expand=_expanded,
+        is_pointer=_is_pointer,
     )
 
 
@@ -192,8 +198,7 @@ def moments(path: str, scale: Vector) -> Moments:
     """Return volume, centre and tensor of a closed mesh at a scale; what reads meshes is loaded only here.
 
     Raises:
-        UnmeasurableError: as ``tfcompose.compiler.urdf.mesh.moments``, and if trimesh is not
-        installed.
+        UnmeasurableError: as ``tfcompose.urdf.mesh.moments``, and if trimesh is not installed.
     """
     if _is_pointer(path):
         raise UnmeasurableError("TF725", "it is a Git LFS pointer, not the mesh", FETCH)

@@ -66,7 +66,7 @@ class Fixer:
 
         Raises:
             OSError: if one cannot be written, or was changed meanwhile; those before it are
-            written.
+                written.
         """
         for path, text in self.texts.items():
             rewrite(Path(path), self._read[path], text)

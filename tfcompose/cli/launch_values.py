@@ -130,8 +130,8 @@ def launch_values(
 
 def _argument(name: str, spec: ArgSpec, value: Any) -> Argument:
     return Argument(
-        name, spec.kind, as_given(value), tuple(map(as_given, spec.choices)),
-        " ".join((spec.description or "").split()), spec.env,
+        name, spec.kind, as_given(value), choices=tuple(map(as_given, spec.choices)),
+        description=" ".join((spec.description or "").split()), env=spec.env,
     )  # fmt: skip
 
 

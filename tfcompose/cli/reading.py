@@ -26,7 +26,7 @@ def read_text(path: str) -> str:
 
     Raises:
         RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too
-        large.
+            large.
     """
     file = Path(path)
     try:

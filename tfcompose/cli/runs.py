@@ -148,7 +148,7 @@ def notices(
 
     Raises:
         OSError: if it cannot be reached; TimeoutError if the time is over; BrokenPipeError if
-        nobody reads.
+            nobody reads.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(place) as connection:

@@ -120,11 +120,11 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
         code,
         known.name,
         severity or known.severity,
-        message,
-        span,
-        tuple(notes),
-        help,
-        tuple(edits),
+        message=message,
+        span=span,
+        notes=tuple(notes),
+        help=help,
+        edits=tuple(edits),
     )
 
 

@@ -348,7 +348,7 @@ class Measure:
 
         Raises:
             PydanticCustomError: if it is no number, too large or too small, or its unit is unknown
-            or another kind's.
+                or another kind's.
         """
         number = self._in_si(value)
         if self.least is not None and number < self.least:

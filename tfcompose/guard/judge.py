@@ -202,10 +202,10 @@ class Judge:
                     edge,
                     publisher if track.live else "",
                     rate,
-                    age_s,
-                    track.delay_s,
-                    track.silent,
-                    track.slow,
+                    age_s=age_s,
+                    delay_s=track.delay_s,
+                    silent=track.silent,
+                    slow=track.slow,
                 )
         return [found[edge.child] for edge in self.plan.edges]
 
@@ -241,9 +241,9 @@ class Judge:
             self._start,
             self._rules.owners.memory(),
             self._senders.memory(),
-            self.cases.memory(),
-            self._publishers.memory(),
-            self.live.memory(),
+            cases=self.cases.memory(),
+            reported=self._publishers.memory(),
+            live=self.live.memory(),
         )
 
     def recall(self, memory: JudgeMemory, now: float) -> list[GuardEvent]:

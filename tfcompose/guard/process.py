@@ -231,7 +231,9 @@ def _run_marks(plan: Plan, profile: str) -> RunMarks:
         if process.component
         for node in process.nodes
     }
-    return RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile, LAUNCHER, inside)
+    return RunMarks(
+        RUN_ID, os.environ[RUN_ID], PROCESS, profile=profile, launcher=LAUNCHER, components=inside
+    )
 
 
 def _with_id(data: TFData) -> TFData:

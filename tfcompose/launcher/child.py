@@ -231,8 +231,8 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
     """Start the command as the leader of a new session, with its output in pipes.
 
     One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it
-    handles them (``tfcompose.foundation.signals``): one that comes while Python itself starts
-    waits, and neither kills it nor prints a traceback.
+    handles them (``tfcompose.signals``): one that comes while Python itself starts waits, and
+    neither kills it nor prints a traceback.
 
     Raises:
         OSError: if it cannot be started.

@@ -36,7 +36,7 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
 
     Raises:
         RosError: with the reason, if it cannot be read, or puts one of the topics into a partition
-        itself.
+            itself.
     """
     root = _read(file)
     profiles = root if root.tag == "profiles" else root.find("profiles")
@@ -92,7 +92,8 @@ class _Reader:
 
     Raises:
         ValueError: with one sentence, for a document type with its entities, or elements nested
-        too deep. expat.ExpatError: for what is not XML.
+            too deep.
+        expat.ExpatError: for what is not XML.
     """
 
     def __init__(self) -> None:

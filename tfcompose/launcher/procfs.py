@@ -167,9 +167,9 @@ def _marked(pid: int, run: str) -> Leftover | None:
         pid,
         env[RUN_ID],
         _command(pid),
-        began(pid),
-        _launcher(env.get(LAUNCHER, "")),
-        env.get(PROCESS, ""),
+        began=began(pid),
+        launcher=_launcher(env.get(LAUNCHER, "")),
+        process=env.get(PROCESS, ""),
     )
 
 

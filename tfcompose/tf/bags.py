@@ -88,7 +88,7 @@ class Recording:
 
         Raises:
             BagError: if it has none of the topics, is no bag, is damaged, or its messages are not
-            TF's.
+                TF's.
         """
         from rosbags.rosbag2 import Reader  # noqa: PLC0415 (it is optional)
 

@@ -81,10 +81,10 @@ def run(arguments: Namespace) -> int:
         arguments.a,
         arguments.b,
         arguments.once,
-        arguments.rate,
-        arguments.timeout,
-        topics,
-        arguments.at,
+        rate=arguments.rate,
+        timeout_s=arguments.timeout,
+        topics=topics,
+        at_ns=arguments.at,
     )
 
     def show(pose: Pose, stamp_ns: int | None) -> None:

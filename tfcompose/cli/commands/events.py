@@ -40,7 +40,9 @@ def run(arguments: Namespace) -> int:
     lines = _TimedLines()
     ended = False
     console = Console(
-        Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout)
+        Plan(place.name, "", None, ros=RosSettings(), edges=(), processes=()),
+        lines,
+        colour=coloured(sys.stdout),
     )
     try:
         for notice, at in notices(place, output=sys.stdout):

@@ -182,7 +182,8 @@ def graph_of_observers(
     missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
     arrows = [_arrow(one, poses=poses) for one in edges]
     arrows += [
-        Arrow(edge.parent, edge.child, edge.kind, edge.node, "missing", "") for edge in missing
+        Arrow(edge.parent, edge.child, edge.kind, owner=edge.node, detail="missing", pose="")
+        for edge in missing
     ]
     return Graph(printable(title), (), tuple(arrows))
 
@@ -195,7 +196,14 @@ def _arrow(one: EdgeState, *, poses: bool) -> Arrow:
     owner = printable(one.publisher) or "unknown"
     below = _pose(stream.pose) if poses else ""
     kind: Kind = "static" if stream.static else "dynamic"
-    return Arrow(printable(stream.parent), printable(stream.child), kind, owner, rate, below)
+    return Arrow(
+        printable(stream.parent),
+        printable(stream.child),
+        kind,
+        owner=owner,
+        detail=rate,
+        pose=below,
+    )
 
 
 def _pose(pose: Pose) -> str:

@@ -274,7 +274,14 @@ def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") 
     packages = pairs(arguments.packages, "=")
     known, target = _known_packages(packages), _target(arguments)
     prefixes = known.disk.prefixes if known.disk else ()
-    launch = Launch(file, arguments.given, packages, prefixes, arguments.all_branches, shown)
+    launch = Launch(
+        file,
+        arguments.given,
+        packages,
+        prefixes=prefixes,
+        every_branch=arguments.all_branches,
+        shown=shown,
+    )
     folders = {name: str(Path(folder).absolute()) for name, folder in packages.items()}
     descriptions = add_launch(draft, launch, target)
     presets = None if arguments.no_sensors else library()

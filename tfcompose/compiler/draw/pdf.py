@@ -31,7 +31,7 @@ def pdf(drawing: Drawing) -> bytes:
     """
     scale = min(POINTS_PER_PX, MOST_POINTS / max(drawing.width, drawing.height))
     width, height = drawing.width * scale, drawing.height * scale
-    paper = Box(0.0, 0.0, drawing.width, drawing.height, 0.0, "paper")
+    paper = Box(0.0, 0.0, drawing.width, height=drawing.height, radius=0.0, style="paper")
     content = f"{scale:.6f} 0 0 {-scale:.6f} 0 {_number(height)} cm\n"  # px, y down
     content += "".join([part for shape in (paper, *drawing.shapes) for part in _shape(shape)])
     data = zlib.compress(content.encode("latin-1"), 9)

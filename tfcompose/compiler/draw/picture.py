@@ -164,7 +164,9 @@ class _Pen:
         label = shortened(self.graph.groups[self.forest.group[area.frame]].label)
         x, y = area.x + self.left, area.top + self.top
         return (
-            Box(x, y, area.right - area.x, area.bottom - area.top, 7.0, "group"),
+            Box(
+                x, y, area.right - area.x, height=area.bottom - area.top, radius=7.0, style="group"
+            ),
             _text(label, "label", x + PAD, y + LABEL_STRIP - 2.5),
         )
 
@@ -218,7 +220,14 @@ class _Pen:
     def _frame(self, frame: str, place: Place, arrow: Arrow | None) -> list[Shape]:
         x, y = place.x + self.left, place.y + self.top
         if arrow is None:
-            box = Box(x, y - place.height / 2, place.width, place.height, CORNER, "root")
+            box = Box(
+                x,
+                y - place.height / 2,
+                place.width,
+                height=place.height,
+                radius=CORNER,
+                style="root",
+            )
             return [box, _text(shortened(frame), "name", x + PAD, y + BASE)]
         owner = self.owners[arrow.owner]
         colour, number = colour_of(owner), str(owner + 1)
@@ -226,8 +235,22 @@ class _Pen:
         left = x + BADGE_WIDTH + PAD
         name = _text(shortened(frame), "name", left, base)
         shapes: list[Shape] = [
-            Box(x, y - place.height / 2, place.width, place.height, CORNER, f"box{colour}"),
-            Box(x, y - place.height / 2, BADGE_WIDTH, place.height, CORNER, f"badge{colour}"),
+            Box(
+                x,
+                y - place.height / 2,
+                place.width,
+                height=place.height,
+                radius=CORNER,
+                style=f"box{colour}",
+            ),
+            Box(
+                x,
+                y - place.height / 2,
+                BADGE_WIDTH,
+                height=place.height,
+                radius=CORNER,
+                style=f"badge{colour}",
+            ),
             Text(
                 x + BADGE_WIDTH / 2,
                 y + 3.6,
@@ -339,4 +362,4 @@ def _symbol(item: _Item, x: float, y: float) -> list[Shape]:
     number = Text(
         middle, y - 0.2, text, f"number{colour}", width_of(text, 10.0, bold=True), middle=True
     )
-    return [Box(x, y - 11.8, BADGE_WIDTH, 16.0, 4.0, f"badge{colour}"), number]
+    return [Box(x, y - 11.8, BADGE_WIDTH, height=16.0, radius=4.0, style=f"badge{colour}"), number]

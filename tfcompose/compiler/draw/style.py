@@ -89,7 +89,12 @@ def style_of(names: str) -> Style:
         return style
     over = STYLES[second]
     return Style(
-        style.fill, style.stroke, over.width or style.width, over.dash, style.size, style.bold
+        style.fill,
+        style.stroke,
+        over.width or style.width,
+        dash=over.dash,
+        size=style.size,
+        bold=style.bold,
     )
 
 

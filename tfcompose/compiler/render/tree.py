@@ -171,9 +171,9 @@ def _arrows(edge: Edge, *, poses: bool) -> Iterator[Arrow]:
         edge.parent,
         edge.child,
         edge.kind,
-        edge.owner,
-        _rate(edge),
-        pose_text(edge) if poses else "",
+        owner=edge.owner,
+        detail=_rate(edge),
+        pose=pose_text(edge) if poses else "",
     )
     for parent in edge.switched:
         yield Arrow(parent, edge.child, edge.kind, edge.owner, alternative=True)

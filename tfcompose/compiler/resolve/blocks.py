@@ -72,11 +72,11 @@ def _hardware(name: str, spec: HardwareSpec, source: Source) -> Hardware:
         name,
         spec.plugin,
         spec.type,
-        source.at_key(at),
-        spec.params,
-        components,
-        spec.rw_rate,
-        spec.is_async,
+        at=source.at_key(at),
+        params=spec.params,
+        components=components,
+        rw_rate=spec.rw_rate,
+        is_async=spec.is_async,
     )
 
 
@@ -84,7 +84,9 @@ def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component
     command, state = (
         [Interface(i, params) for i, params in one.items()] for one in (spec.command, spec.state)
     )
-    return Component(kind, name, at, tuple(command), tuple(state), spec.params)
+    return Component(
+        kind, name, at, command=tuple(command), state=tuple(state), params=spec.params
+    )
 
 
 def _blocks_of(

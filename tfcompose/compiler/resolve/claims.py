@@ -111,7 +111,9 @@ class _Work:
             return None
         claims = (*(preset.publishes if preset else ()), *by_hand)
         roles = Roles(self.robot, process.name, preset, claims)
-        claimant = Claimant(process, node, claims, preset, roles, node.flat_params)
+        claimant = Claimant(
+            process, node, claims, preset=preset, roles=roles, given=node.flat_params
+        )
         self._set_names(claimant)
         for claim in self._of_one(claimant) if preset and preset.one_of else claims:
             self._settle(claimant, claim)

@@ -208,7 +208,17 @@ class Drafts:
         )
         relative_at = self.source.at((*at, "relative_to")) if keys.relative_to else None
         place_at = self.source.at((*at, "place")) if place else None
-        self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at, at, part))
+        self.edges.append(
+            Draft(
+                edge,
+                keys.relative_to,
+                relative_at,
+                place=place,
+                place_at=place_at,
+                at=at,
+                part=part,
+            )
+        )
 
     def named_joint(self, name: str, at: Path) -> Span:
         """Take the name of the joint that an entry is, or whose key ``joint`` it is; return its place."""

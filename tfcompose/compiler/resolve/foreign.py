@@ -213,7 +213,14 @@ def _use(
         else:
             blocks.append(block)
     named = {name: part.source.at_key((*at, "params", name)) for name in spec.params}
-    return Use(part.source.at((*at, "macro")), spec.macro, words, tuple(blocks), files, named)
+    return Use(
+        part.source.at((*at, "macro")),
+        spec.macro,
+        words,
+        blocks=tuple(blocks),
+        files=files,
+        places=named,
+    )
 
 
 def _is_markup(value: Any) -> TypeGuard[str]:

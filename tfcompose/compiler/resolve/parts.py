@@ -55,7 +55,12 @@ class Parts:
         spec, source, joined = validated.spec, validated.source, []
         for name, declared in spec.parts.items():
             part = PartEntry(
-                name, declared, spec, source, prefix, ("parts", name) in validated.broken
+                name,
+                declared,
+                spec,
+                source=source,
+                outer_prefix=prefix,
+                is_broken=("parts", name) in validated.broken,
             )
             try:
                 joined.append(part.joined(*self._robot(part, packages)))

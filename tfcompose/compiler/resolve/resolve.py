@@ -196,9 +196,9 @@ class _Work:
             self.library,
             self.read,
             self.disk,
-            resolve,
-            environment,
-            files,
+            resolve=resolve,
+            environment=environment,
+            files=files,
             collected=self.collected,
         )
         self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)

@@ -53,10 +53,10 @@ def zones_of(spec: RobotSpec, source: Source) -> tuple[Zone, ...]:
             name,
             source.at_key(("coverage", name)),
             one.frame,
-            one.center,
-            one.box,
-            one.by,
-            one.least,
+            center=one.center,
+            size=one.box,
+            by=one.by,
+            least=one.least,
         )
         for name, one in spec.coverage.items()
     )

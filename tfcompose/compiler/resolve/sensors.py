@@ -175,22 +175,22 @@ class _Mounting:
             sensor.name,
             declared.preset,
             preset.kind,
-            self.place(),
-            mount,
-            tuple(self.renamed(name) for name in sensor.frames()),
-            tuple(self.renamed(name) for name in sensor.driven()),
-            "" if named == "none" else named or own,
-            preset.driver.off if preset.driver else None,
-            sensor.tf == DRIVER,
-            {
+            at=self.place(),
+            mount=mount,
+            frames=tuple(self.renamed(name) for name in sensor.frames()),
+            driver_frames=tuple(self.renamed(name) for name in sensor.driven()),
+            driver="" if named == "none" else named or own,
+            switch=preset.driver.off if preset.driver else None,
+            publishes=sensor.tf == DRIVER,
+            claims={
                 f"{claim.parent} → {self.renamed(sensor.named(claim.child))}": claim.off
                 for claim in claims_of(sensor)
             },
-            preset.driver is None or preset.driver.by_default,
-            serial,
-            sensor.options.get(serial) if serial else None,
-            self.place("tf"),
-            optics,
+            by_default=preset.driver is None or preset.driver.by_default,
+            serial_option=serial,
+            serial=sensor.options.get(serial) if serial else None,
+            tf_at=self.place("tf"),
+            optics=optics,
         )
 
     def check_overrides(self, mount: str) -> None:

@@ -245,11 +245,11 @@ def _hardware(element: Element, block: Block) -> Hardware:
         attributes.get("name", ""),
         plugin.text.strip(),
         attributes["type"],
-        block.at,
-        _params(inner),
-        tuple(components),
-        int(attributes["rw_rate"]) if "rw_rate" in attributes else None,
-        attributes["is_async"] == "true" if "is_async" in attributes else None,
+        at=block.at,
+        params=_params(inner),
+        components=tuple(components),
+        rw_rate=int(attributes["rw_rate"]) if "rw_rate" in attributes else None,
+        is_async=attributes["is_async"] == "true" if "is_async" in attributes else None,
     )
 
 
@@ -260,7 +260,12 @@ def _component(element: Element) -> Component:
         if len({one.name for one in interfaces}) != len(interfaces):
             raise _UnsupportedError
     return Component(
-        element.tag, attributes.get("name", ""), element.at, command, state, _params(element)
+        element.tag,
+        attributes.get("name", ""),
+        element.at,
+        command=command,
+        state=state,
+        params=_params(element),
     )
 
 

@@ -56,8 +56,7 @@ def expand(
 
     Raises:
         RejectedError: if xacro refuses the file, or needs too much for it; with the findings where
-        a robot file names
-            it, if one does.
+            a robot file names it, if one does.
     """
     given = {name: str(value) for name, value in arguments.items()}
     request = {

@@ -68,7 +68,8 @@ def read_urdf(
 
     Raises:
         RejectedError: if it cannot be read, or is no URDF; or takes no arguments, and is given
-        some. ValueError: if the packages have no disk to read from.
+            some.
+        ValueError: if the packages have no disk to read from.
     """
     disk = packages.disk
     if disk is None:

@@ -23,7 +23,7 @@ def moments(path: str, scale: Vector) -> Moments:
 
     Raises:
         UnmeasurableError: if the file is no mesh, or the mesh is not closed or has faces turned
-        both ways.
+            both ways.
     """
     try:
         mesh = read_mesh(path, scale)

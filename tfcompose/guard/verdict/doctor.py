@@ -409,7 +409,7 @@ def examine(states: Sequence[TreeState]) -> Diagnosis:
         sorted(findings, key=lambda one: one.severity),
         len(edges),
         len(names),
-        seconds,
-        roots,
-        elsewhere,
+        seconds=seconds,
+        roots=roots,
+        elsewhere=elsewhere,
     )

@@ -54,16 +54,19 @@ class Violation:
     """One edge that was published by a node that may not, or in a way that it may not.
 
     Attributes:
-        code: the finding's code. parent: the frame in which the pose was given. child: the frame
-        whose pose it was. nodes: the nodes of which one did it: a single one where the rmw says
-        who sent a message, none where the sender
-            has no name.
-        static: whether it came on /tf_static. edge: the planned edge of that child, None where
-        nobody declared one. namesake: whether the publisher has the owner's name and is not the
-        owner. loop: the frames of a loop that the edge closes. detail: what was seen of stamps, or
-        who the other publisher is. recorded: whether it is from a recording, in which nobody has a
-        name. stranger: whether the publisher is seen to be of no process that the plan starts,
-        whatever its name.
+        code: the finding's code.
+        parent: the frame in which the pose was given.
+        child: the frame whose pose it was.
+        nodes: the nodes of which one did it: a single one where the rmw says who sent a message,
+            none where the sender has no name.
+        static: whether it came on /tf_static.
+        edge: the planned edge of that child, None where nobody declared one.
+        namesake: whether the publisher has the owner's name and is not the owner.
+        loop: the frames of a loop that the edge closes.
+        detail: what was seen of stamps, or who the other publisher is.
+        recorded: whether it is from a recording, in which nobody has a name.
+        stranger: whether the publisher is seen to be of no process that the plan starts, whatever
+            its name.
     """
 
     code: str
@@ -541,7 +544,7 @@ class OwnershipRules:
         edge = self.planned.get(sent.child)
         parent, child, static = sent.parent, sent.child, sent.static
         if parent == child:
-            return Violation(SELF, parent, child, nodes, static, edge)
+            return Violation(SELF, parent, child, nodes=nodes, static=static, edge=edge)
         if edge is None:
             return self._unplanned(sent, nodes, now)
         code = code_of(edge, parent, static=static, owner=edge.node in nodes, sure=len(nodes) == 1)
@@ -549,7 +552,18 @@ class OwnershipRules:
         namesake = code in {"", "TF809"} and self._is_namesake(edge, sent)
         code = LOOP if loop else "TF801" if namesake else code
         return (
-            Violation(code, parent, child, nodes, static, edge, namesake, loop) if code else None
+            Violation(
+                code,
+                parent,
+                child,
+                nodes=nodes,
+                static=static,
+                edge=edge,
+                namesake=namesake,
+                loop=loop,
+            )
+            if code
+            else None
         )
 
     def may_be_undeclared(self, parent: str, child: str) -> bool:
@@ -565,9 +579,9 @@ class OwnershipRules:
         loop = self._tree.loop(parent, child, now)
         ours = any(self._tree.is_planned(*edge) for edge in pairwise(loop))
         if loop and (ours or undeclared):
-            return Violation(LOOP, parent, child, nodes, static, None, loop=loop)
+            return Violation(LOOP, parent, child, nodes=nodes, static=static, edge=None, loop=loop)
         if undeclared:
-            return Violation("TF803", parent, child, nodes, static, None)
+            return Violation("TF803", parent, child, nodes=nodes, static=static, edge=None)
         if sent.gid is None:
             return None
         current, before = self._others.take(child, sent.gid)
@@ -576,7 +590,9 @@ class OwnershipRules:
             return None
         named = self._senders.nodes(current, static=static)
         other = named[0] if len(named) == 1 else "another"
-        return Violation(TWO_PUBLISHERS, parent, child, nodes, static, None, detail=other)
+        return Violation(
+            TWO_PUBLISHERS, parent, child, nodes=nodes, static=static, edge=None, detail=other
+        )
 
     def _is_namesake(self, edge: PlanEdge, sent: SentEdge) -> bool:
         """Return whether a publisher has the owner's name and is not the owner.

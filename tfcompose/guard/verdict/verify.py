@@ -177,7 +177,7 @@ class _Comparison:
     ) -> Difference:
         stream = one.stream
         violation = Violation(
-            code, stream.parent, stream.child, one.nodes, stream.static, edge,
+            code, stream.parent, stream.child, nodes=one.nodes, static=stream.static, edge=edge,
             namesake=namesake, recorded=self.state.recorded,
         )  # fmt: skip
         return Difference(code, edge, one, violation)

@@ -226,8 +226,7 @@ class Moving:
 
         Raises:
             ValueError: with a sentence that is the same for the same fault, if a position is not
-            finite or a message
-                cannot hold the time.
+                finite or a message cannot hold the time.
         """
         q = positions[self._columns].astype(np.float64, copy=False)
         if not np.isfinite(q).all():

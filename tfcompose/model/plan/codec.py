@@ -120,7 +120,16 @@ def fields_of(cls: type) -> tuple[Field, ...]:
         kind = _without_none(hints[one.name]) if omitted and default is None else hints[one.name]
         default = default if omitted else MISSING
         about = one.metadata.get("description", "")
-        found.append(Field(one.name, kind, default, omitted, "flat" in one.metadata, about))
+        found.append(
+            Field(
+                one.name,
+                kind,
+                default,
+                omitted=omitted,
+                flat="flat" in one.metadata,
+                description=about,
+            )
+        )
     return tuple(found)
 
 

@@ -72,10 +72,10 @@ def load_request(
         container.nodes[0],
         process.nodes[0],
         component.package,
-        component.plugin,
-        remap,
-        {name: _filled(value, fill) for name, value in component.params.items()},
-        component.extra_arguments,
+        plugin=component.plugin,
+        remap=remap,
+        params={name: _filled(value, fill) for name, value in component.params.items()},
+        extra_arguments=component.extra_arguments,
     )
 
 

@@ -182,7 +182,7 @@ def items(text: str, lookup: Callable[[str], Value]) -> list[Value]:
 
     Raises:
         ExpressionError: if it is no such text, or its ends are no whole numbers, or more than
-        ``MOST_ITEMS`` apart.
+            ``MOST_ITEMS`` apart.
     """
     match = _HOLE.fullmatch(text.strip())
     call = _RANGE.fullmatch(match[1]) if match else None

@@ -397,7 +397,7 @@ def with_includes(source: Source, read: Reader) -> Source:
 
     Raises:
         RejectedError: if a file cannot be read or is not YAML, if files include each other, or are
-        too many.
+            too many.
     """
     return _Includer(read).include(source, (source.file,))
 
@@ -468,7 +468,7 @@ def set_value(setting: str) -> Source:
 
     Raises:
         RejectedError: if there is no ``=``, the value is not YAML, or the key is one that is read
-        before.
+            before.
     """
     span = Span(f"--set {setting}")
     path_text, sign, value_text = setting.partition("=")

@@ -267,10 +267,10 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
             kind,
             path,
             context["message"],
-            context["help"],
-            is_on_key,
-            other,
-            context.get("instead"),
+            help=context["help"],
+            on_key=is_on_key,
+            other=other,
+            instead=context.get("instead"),
         )
     if kind == "missing":
         field = fields_of(mapping_at(model, path[:-1]))[str(path[-1])]

@@ -102,7 +102,15 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
     return Validated(
-        spec, source, found, refused, idle, given, args, variables.environment, done.conditions
+        spec,
+        source,
+        found,
+        refused=refused,
+        unused=idle,
+        given=given,
+        args=args,
+        environment=variables.environment,
+        conditions=done.conditions,
     )
 
 

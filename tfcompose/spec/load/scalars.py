@@ -65,7 +65,7 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
 
     Raises:
         ValueError: if the text is not of its tag's form (possible with a written tag), or no
-        finite number.
+            finite number.
     """
     if tag == STR:
         return text

@@ -86,7 +86,7 @@ def load(text: str, file: str) -> Source:
 
     Raises:
         RejectedError: if the text is not YAML, not one document, not a mapping, or too large to be
-        a robot.
+            a robot.
     """
     refuse_unreadable(text, file)
     if (begin := text.lstrip("\ufeff \t\r\n")).startswith("<") and not begin.startswith("<<"):

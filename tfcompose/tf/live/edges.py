@@ -50,20 +50,27 @@ class EdgeStream:
     Frames have the names that tf2 gives them: without the slash that some nodes write in front.
 
     Attributes:
-        parent: the frame in which the pose is given. child: the frame whose pose it is. static:
-        whether it came on /tf_static. gid: the publisher's id, 16 bytes; None where that is not
-        known, as in a bag. arrivals: when it came; ``arrivals.count`` are all,
-        ``arrivals.last_ns`` is when the newest came. first_ns: when the first message came, by the
-        receiver's clock. row: the newest transform. stamp_ns: the newest message's stamp.
-        newest_ns: the largest stamp so far. oldest_ns: the stamp of the first message. delay_ns:
-        how old the newest message's stamp was when it came; negative: ahead of the receiver's
-        clock. stamps_back: how many stamps were before the one that came before them.
-        stamps_repeated: how many stamps were the one that came before them. rejected: why tf2 does
-        not take it, the newest time that it did not. rejected_row: the newest that it did not
-        take. rejections: how many were not taken. slashed: whether a name came with a slash in
-        front. handover: the edges that put this frame in other parents, from the same publisher,
-        and this one; None if none
-            does.
+        parent: the frame in which the pose is given.
+        child: the frame whose pose it is.
+        static: whether it came on /tf_static.
+        gid: the publisher's id, 16 bytes; None where that is not known, as in a bag.
+        arrivals: when it came; ``arrivals.count`` are all, ``arrivals.last_ns`` is when the newest
+            came.
+        first_ns: when the first message came, by the receiver's clock.
+        row: the newest transform.
+        stamp_ns: the newest message's stamp.
+        newest_ns: the largest stamp so far.
+        oldest_ns: the stamp of the first message.
+        delay_ns: how old the newest message's stamp was when it came; negative: ahead of the
+            receiver's clock.
+        stamps_back: how many stamps were before the one that came before them.
+        stamps_repeated: how many stamps were the one that came before them.
+        rejected: why tf2 does not take it, the newest time that it did not.
+        rejected_row: the newest that it did not take.
+        rejections: how many were not taken.
+        slashed: whether a name came with a slash in front.
+        handover: the edges that put this frame in other parents, from the same publisher, and this
+            one; None if none does.
         begun: how often this one came after another of them.
     """
 
@@ -283,7 +290,9 @@ class TreeObserver:
             if gid is not None:
                 self._counts[gid] = self._counts.get(gid, 0) + 1
             arrivals = Arrivals(int(self.window_s * _SECOND_NS), int(self.settle_s * _SECOND_NS))
-            stream = EdgeStream(parent, child, static, gid, arrivals, received_ns, row)
+            stream = EdgeStream(
+                parent, child, static, gid=gid, arrivals=arrivals, first_ns=received_ns, row=row
+            )
             self._streams[parent, child, gid, static] = stream
             if gid is not None and not static:
                 self._handovers.setdefault((child, gid), Handover([], stream)).join(stream)
@@ -335,7 +344,14 @@ class TreeObserver:
         present = (
             None if self.recorded or stream.gid is None else stream.gid in self.publishers.present
         )
-        return EdgeState(stream, self._publisher_nodes(stream), timing, age_s, data_age_s, present)
+        return EdgeState(
+            stream,
+            self._publisher_nodes(stream),
+            timing,
+            age_s=age_s,
+            data_age_s=data_age_s,
+            present=present,
+        )
 
     def _publisher_nodes(self, stream: EdgeStream) -> tuple[str, ...]:
         """Return the publisher's node; without an id all on the topic, or all that were, where they have left."""

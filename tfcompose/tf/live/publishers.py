@@ -67,11 +67,11 @@ class MessageReader:
             edges,
             static,
             received.gid,
-            received.source_ns,
-            received.sequence,
-            stamps,
-            received.received_ns,
-            poses,
+            source_ns=received.source_ns,
+            sequence=received.sequence,
+            stamps_ns=stamps,
+            received_ns=received.received_ns,
+            poses=poses,
             exact=layout.exact,
         )
 
@@ -115,16 +115,20 @@ class Publisher:
 
     Attributes:
         gid: its id, 16 bytes, which comes with its messages where the rmw says who sent them.
-        node: its node's full name, None while that is not known. static: whether its topic is one
-        of fixed edges. topic: its topic's full name. type: its type, such as
-        ``tf2_msgs/msg/TFMessage``. latched: whether its durability is transient_local. reliable:
-        whether its reliability is reliable. where: on which machine and as which process it runs;
-        empty if that is not known. ours: whether that process is of the guard's own run; None: not
-        known. fenced: whether it sends behind the fence of a strict plan; None: there is no fence.
-        others: further nodes of which it may be one. process: the plan's process that it is of,
-        where that was seen. run: the run of another robot that it is of, where that was seen.
+        node: its node's full name, None while that is not known.
+        static: whether its topic is one of fixed edges.
+        topic: its topic's full name.
+        type: its type, such as ``tf2_msgs/msg/TFMessage``.
+        latched: whether its durability is transient_local.
+        reliable: whether its reliability is reliable.
+        where: on which machine and as which process it runs; empty if that is not known.
+        ours: whether that process is of the guard's own run; None: not known.
+        fenced: whether it sends behind the fence of a strict plan; None: there is no fence.
+        others: further nodes of which it may be one.
+        process: the plan's process that it is of, where that was seen.
+        run: the run of another robot that it is of, where that was seen.
         profile: the profile file that its process was started with instead of the fence's; empty:
-        none, or not known.
+            none, or not known.
     """
 
     gid: bytes

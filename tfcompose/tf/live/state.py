@@ -72,20 +72,24 @@ class TreeState:
     """What was observed in ``seconds`` on the topics (moving, fixed).
 
     Attributes:
-        edges: each edge of each publisher. publishers: who is on the two topics. volatile_readers:
-        the nodes that listen to the topic of fixed edges without asking for what was sent before.
-        nodes: the full names of other nodes, of this robot or not. graph: the topics, those of TF
-        among them. clock_ns: the newest time on /clock, None where nothing came. clock_moves:
-        whether that changed lately. stamped: what came with a header. moving_joints: the moving
-        joints of the robot's description. joint_names: those in joint states. settings: the
-        variables by which ROS is set up here. processes: other processes of this machine with ROS,
-        as far as they can be looked at. skews_s: how far the clock of a publisher's machine is
-        ahead of this one's, at least (negative: or its
-            messages are that long under way), by id.
-        malformed: how many messages came that are no TFMessage, by their publisher's id. beyond:
-        how many transforms came of edges that are not among ``edges``, because their publisher
-        sends too many,
-            by its id.
+        edges: each edge of each publisher.
+        publishers: who is on the two topics.
+        volatile_readers: the nodes that listen to the topic of fixed edges without asking for what
+            was sent before.
+        nodes: the full names of other nodes, of this robot or not.
+        graph: the topics, those of TF among them.
+        clock_ns: the newest time on /clock, None where nothing came.
+        clock_moves: whether that changed lately.
+        stamped: what came with a header.
+        moving_joints: the moving joints of the robot's description.
+        joint_names: those in joint states.
+        settings: the variables by which ROS is set up here.
+        processes: other processes of this machine with ROS, as far as they can be looked at.
+        skews_s: how far the clock of a publisher's machine is ahead of this one's, at least
+            (negative: or its messages are that long under way), by id.
+        malformed: how many messages came that are no TFMessage, by their publisher's id.
+        beyond: how many transforms came of edges that are not among ``edges``, because their
+            publisher sends too many, by its id.
         recorded: whether it is from a recording, which does not say who published.
     """
 

@@ -149,10 +149,12 @@ class Identity:
     """Whose process a publisher is of; what is not known, or not proven, is None or empty.
 
     Attributes:
-        ours: whether it is of one's own run. process: the plan's process that it is of. fenced:
-        whether it was started with its profile of the fence; None too where it is of another run.
-        run: the run of another robot that it is of. profile: the profile file that it was started
-        with, where that is not the fence's.
+        ours: whether it is of one's own run.
+        process: the plan's process that it is of.
+        fenced: whether it was started with its profile of the fence; None too where it is of
+            another run.
+        run: the run of another robot that it is of.
+        profile: the profile file that it was started with, where that is not the fence's.
     """
 
     ours: bool | None = None
@@ -327,33 +329,29 @@ class TFGraph:
                 )
 
     def _publisher(
-        self, one: Writer, topic: str, *, static: bool, fenced: bool | None
+        self, writer: Writer, topic: str, *, static: bool, fenced: bool | None
     ) -> Publisher:
-        if one.gid not in self._where:
+        if writer.gid not in self._where:
             own = self._own_gid()
-            self._where[one.gid] = origin(one.gid, own)
-            self._ours[one.gid] = (
-                self._marks.identify(environments(one.gid, own)) if self._marks else Identity()
+            self._where[writer.gid] = origin(writer.gid, own)
+            self._ours[writer.gid] = (
+                self._marks.identify(environments(writer.gid, own)) if self._marks else Identity()
             )
-        known = self._ours[one.gid]
+        known = self._ours[writer.gid]
+        if fenced is None:
+            fenced = known.fenced if writer.gid not in self._public else False
         return Publisher(
-            one.gid,
-            (
-                None
-                if one.node.endswith(UNKNOWN_NODE)
-                else NO_NODE
-                if one.node == BARE_DDS
-                else one.node
-            ),
-            static,
-            topic,
-            one.type,
-            one.durability == "transient_local",
-            one.reliability == "reliable",
-            self._where[one.gid],
-            known.ours,
-            fenced if fenced is not None else False if one.gid in self._public else known.fenced,
-            process=self._marks.process_of(known, one.node) if self._marks else "",
+            writer.gid,
+            _node_of(writer),
+            static=static,
+            topic=topic,
+            type=writer.type,
+            latched=writer.durability == "transient_local",
+            reliable=writer.reliability == "reliable",
+            where=self._where[writer.gid],
+            ours=known.ours,
+            fenced=fenced,
+            process=self._marks.process_of(known, writer.node) if self._marks else "",
             run=known.run,
             profile=known.profile,
         )
@@ -363,3 +361,10 @@ class TFGraph:
         if not self._own:
             self._own = own_gid(self._node, self.topics[0])
         return self._own
+
+
+def _node_of(writer: Writer) -> str | None:
+    """Return the node's full name, None while it is not known; a writer of plain DDS has none."""
+    if writer.node.endswith(UNKNOWN_NODE):
+        return None
+    return NO_NODE if writer.node == BARE_DDS else writer.node

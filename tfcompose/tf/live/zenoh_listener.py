@@ -59,9 +59,16 @@ class ZenohListener:
         observer.take_graph(publishers, sorted({one.node for one in publishers if one.node}))
 
 
-def _publisher(one: TokenOfPublisher, *, static: bool) -> Publisher:
-    latched, reliable = one.durability == "transient_local", one.reliability == "reliable"
-    return Publisher(one.gid, one.node, static, one.topic, one.type, latched, reliable)
+def _publisher(token: TokenOfPublisher, *, static: bool) -> Publisher:
+    return Publisher(
+        token.gid,
+        token.node,
+        static=static,
+        topic=token.topic,
+        type=token.type,
+        latched=token.durability == "transient_local",
+        reliable=token.reliability == "reliable",
+    )
 
 
 def listen_on_zenoh(

@@ -54,7 +54,7 @@ class Names:
 
         Raises:
             ValueError: with a sentence that is the same for the same fault, if it has another
-            number of positions.
+                number of positions.
         """
         at = _FRAME_AT + len(self.raw)
         count = struct.unpack_from(f"{self.order}I", data, at)[0] if at + 4 <= len(data) else -1

@@ -213,7 +213,7 @@ def own_type() -> Any:
 
     Raises:
         RosError: if the rmw is not rmw_fastrtps_cpp, or rosidl's structures are not the expected
-        ones.
+            ones.
     """
     rmw = get_rmw_implementation_identifier()
     if rmw != _RMW:

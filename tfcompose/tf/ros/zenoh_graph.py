@@ -107,9 +107,9 @@ def publisher_of(token: str) -> TokenOfPublisher | None:
         gid_of_token(token),
         f"{namespace.rstrip('/')}/{node}",
         topic,
-        f"{found[1].replace('::', '/')}/{found[2]}" if found else kind,
-        "transient_local" if rest.partition(":")[0] == _TRANSIENT_LOCAL else "volatile",
-        "best_effort" if reliability == _BEST_EFFORT else "reliable",
+        type=f"{found[1].replace('::', '/')}/{found[2]}" if found else kind,
+        durability="transient_local" if rest.partition(":")[0] == _TRANSIENT_LOCAL else "volatile",
+        reliability="best_effort" if reliability == _BEST_EFFORT else "reliable",
     )
 
 

@@ -273,7 +273,7 @@ def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
 
     Raises:
         InvalidArgumentException: if there is no x, y or z of type float32 or float64, or too
-        little data.
+            little data.
     """
     given = (
         cloud.data

@@ -40,8 +40,9 @@ class StaticTransformBroadcaster:
     pose is not sent, and the node's log says so.
 
     Args:
-        node: an rclpy node. qos: an rclpy QoSProfile or a depth; default tf2's: reliable,
-        transient local, the last message.
+        node: an rclpy node.
+        qos: an rclpy QoSProfile or a depth; default tf2's: reliable, transient local, the last
+            message.
     """
 
     def __init__(self, node: Any, qos: Any = None) -> None:

@@ -136,10 +136,10 @@ class Buffer(BufferCore, BufferInterface):
     """tf2_ros's ``Buffer``: takes and gives messages, and waits.
 
     Args:
-        cache_time: how long samples are kept, a duration; default 10 s. node: an rclpy node; when
-        its clock goes back, all moving edges are forgotten. (A listener sees to that, too.)
-            Where tf2_msgs is installed it offers the service ``tf2_frames``, which view_frames
-            asks.
+        cache_time: how long samples are kept, a duration; default 10 s.
+        node: an rclpy node; when its clock goes back, all moving edges are forgotten. (A listener
+            sees to that, too.) Where tf2_msgs is installed it offers the service ``tf2_frames``,
+            which view_frames asks.
 
     Lookups take and raise what ``BufferCore``'s do (module ``core``), and can wait for what is not
     there yet.

@@ -29,9 +29,11 @@ class BufferClient(BufferInterface):
     """Looks up by the action tf2_msgs/LookupTransform; the node must be spun elsewhere meanwhile.
 
     Args:
-        node: an rclpy node. ns: the action's name. check_frequency: taken for tf2's sake; an
-        answer is there as soon as it has come. timeout_padding: how much longer than a lookup's
-        timeout its answer may take, a duration, or seconds as a float.
+        node: an rclpy node.
+        ns: the action's name.
+        check_frequency: taken for tf2's sake; an answer is there as soon as it has come.
+        timeout_padding: how much longer than a lookup's timeout its answer may take, a duration,
+            or seconds as a float.
 
     Raises:
         RosError: if there is no tf2_msgs.
@@ -57,8 +59,9 @@ class BufferClient(BufferInterface):
         """Return the server's pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
 
         Raises:
-            TimeoutException: if there is no server, or it does not answer. TransformException: if
-            there is no such transform; the exceptions are those of ``Buffer``.
+            TimeoutException: if there is no server, or it does not answer.
+            TransformException: if there is no such transform; the exceptions are those of
+                ``Buffer``.
         """
         goal = self._action.goal(
             target_frame, source_frame, nanoseconds(time), nanoseconds(timeout)

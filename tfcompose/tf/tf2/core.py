@@ -33,7 +33,7 @@ class BufferCore(PoseBuffer):
 
     Args:
         cache_time: how long samples are kept before the newest of their edge, a duration; default
-        10 s.
+            10 s.
     """
 
     def __init__(self, cache_time: Any = None) -> None:

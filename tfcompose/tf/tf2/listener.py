@@ -18,14 +18,20 @@ class TransformListener:
     """Subscribes to TF and puts it into a buffer, until it is closed.
 
     Args:
-        buffer: what is filled. node: an rclpy node; whoever spins it feeds the buffer. None: a
-        node of its own with a thread of its own. spin_thread: spin the node that was handed over
-        in a thread of the listener's. qos: an rclpy QoSProfile or a depth for /tf; default tf2's:
-        reliable, volatile, the last 100. static_qos: the same for /tf_static; default tf2's:
-        reliable, transient local, the last 100. tf_topic: the topic of moving edges.
-        tf_static_topic: the topic of fixed edges. static_only: listen to fixed edges alone.
-        namespace: listen to /NAMESPACE/tf and /NAMESPACE/tf_static instead. use_sim_time: the
-        listener's own node follows /clock; a node that is handed over has its own parameter.
+        buffer: what is filled.
+        node: an rclpy node; whoever spins it feeds the buffer. None: a node of its own with a
+            thread of its own.
+        spin_thread: spin the node that was handed over in a thread of the listener's.
+        qos: an rclpy QoSProfile or a depth for /tf; default tf2's: reliable, volatile, the last
+            100.
+        static_qos: the same for /tf_static; default tf2's: reliable, transient local, the last
+            100.
+        tf_topic: the topic of moving edges.
+        tf_static_topic: the topic of fixed edges.
+        static_only: listen to fixed edges alone.
+        namespace: listen to /NAMESPACE/tf and /NAMESPACE/tf_static instead.
+        use_sim_time: the listener's own node follows /clock; a node that is handed over has its
+            own parameter.
 
     When a node's clock goes back, as a simulator's or a bag's does, the buffer forgets all moving
     edges, and the node's log says so. What is rejected is logged once for each frame and reason.

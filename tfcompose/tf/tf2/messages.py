@@ -307,7 +307,7 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
 
     Raises:
         InvalidArgumentException: if there is no x, y or z of such a type, or less data than the
-        cloud claims to have.
+            cloud claims to have.
     """
     require_numpy()
     from tfcompose.tf.tf2.arrays import moved_cloud  # noqa: PLC0415 (numpy is optional)

@@ -232,7 +232,7 @@ class PoseBuffer:
 
         Raises:
             LookupException, ConnectivityException, InvalidArgumentException: as ``lookup`` for
-            time 0.
+                time 0.
         """
         if self._mixed:
             return None
@@ -321,4 +321,12 @@ def _frame_info(name: str, cache: TimeCache | None) -> FrameInfo:
     if cache is None or not len(cache):
         return FrameInfo(name, "", static=False, authority="", oldest_ns=0, newest_ns=0, samples=0)
     oldest, newest = (0, 0) if cache.static else (cache.oldest_ns, cache.newest_ns)
-    return FrameInfo(name, cache.parent, cache.static, cache.authority, oldest, newest, len(cache))
+    return FrameInfo(
+        name,
+        cache.parent,
+        cache.static,
+        authority=cache.authority,
+        oldest_ns=oldest,
+        newest_ns=newest,
+        samples=len(cache),
+    )

@@ -278,7 +278,7 @@ class Rollout:
 
         Raises:
             RejectedError: with what keeps it from being started; nothing runs otherwise than
-            before.
+                before.
         """
         await self._all(self._send)
         found = [one for some in await self._all(self._rehearse) for one in some]
@@ -322,7 +322,7 @@ class Rollout:
 
         Raises:
             RejectedError: with what is missing, or which host was lost, and what the others went
-            back to.
+                back to.
         """
         begun = time.monotonic()
         changing = [one for one in self.shares if one.changes()]
@@ -641,11 +641,11 @@ async def reached(
                 f"{plan.robot}.{there.name}",
                 plan.robot,
                 there.name,
-                probe["base"],
-                probe["executable"],
-                tuple(probe["setup"]),
-                target.system,
-                has_wheels,
+                base=probe["base"],
+                python=probe["executable"],
+                setup=tuple(probe["setup"]),
+                system=target.system,
+                has_wheels=has_wheels,
             )
             rollout.shares.append(Share(there, unit, probe))
         yield rollout

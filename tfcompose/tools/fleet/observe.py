@@ -134,8 +134,7 @@ class FleetObserver:
 
         Raises:
             StaleError: if a link or an edge between the two is stale, of which the buffer still
-            has the last pose; or
-                nothing came from a robot.
+                has the last pose; or nothing came from a robot.
             TransformException: if there is none.
         """
         needed = self._between(target, source)
@@ -179,7 +178,12 @@ class FleetObserver:
             edges.append(EdgeStatus(parent, child, age_s, delay_s, stale))
         age_s = None if link.last is None else now - link.last
         return RobotStatus(
-            robot, router, self._state(router, age_s), age_s, tuple(edges), link.delay_s
+            robot,
+            router,
+            self._state(router, age_s),
+            age_s=age_s,
+            edges=tuple(edges),
+            delay_s=link.delay_s,
         )
 
     def _state(self, router: str, age_s: float | None) -> LinkState:

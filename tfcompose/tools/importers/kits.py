@@ -126,7 +126,7 @@ def add_vehicles(
 
     Raises:
         RejectedError: if the folder holds no calibrations, or it is not said of which kit they are
-        to be.
+            to be.
     """
     config = folder / "config" if (folder / "config").is_dir() else folder
     own = sorted(

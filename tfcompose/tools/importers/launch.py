@@ -402,10 +402,10 @@ class _Work:
             )  # it is one of all nodes'
             reader = "tf" if record["package"] == "tf" else "tf2_ros"
         return Program(
-            span, record.get("package"), record.get("executable"), argv, bool(record.get("shell")),
-            record.get("name"), record.get("label"), record.get("namespace"), tuple(params),
-            tuple((old, new) for old, new in record.get("remap", ())), self._env(record), keys,
-            record.get("period", 0.0), reader, description, tuple(todo), loads,  # type: ignore[arg-type]
+            span, record.get("package"), record.get("executable"), argv=argv, shell=bool(record.get("shell")),
+            name=record.get("name"), label=record.get("label"), namespace=record.get("namespace"), params=tuple(params),
+            remap=tuple((old, new) for old, new in record.get("remap", ())), env=self._env(record), keys=keys,
+            period_s=record.get("period", 0.0), reader=reader, description=description, todo=tuple(todo), loads=loads,  # type: ignore[arg-type]
         )  # fmt: skip
 
     def _is_container(self, record: dict[str, Any]) -> bool:

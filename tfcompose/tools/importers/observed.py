@@ -117,7 +117,13 @@ class Observed:
             for child, keys in frames.items() if child in self._poses
         )  # fmt: skip
         return Robot(
-            "", "", dict.fromkeys((edge.child for edge in edges), at), edges, {}, (), None
+            "",
+            "",
+            dict.fromkeys((edge.child for edge in edges), at),
+            edges=edges,
+            links={},
+            processes=(),
+            base=None,
         )
 
     def _sensor(self, sensor: Recognised, driver: str) -> None:

@@ -325,7 +325,15 @@ def imported(
     other_name = [f"called {robot.name} in the source"] if name != robot.name else []
     notes.setdefault(("", ""), []).extend([*renamed, *unused, *other_name])
     folders = {package: target.from_folder(folder) for package, folder in packages.items()}
-    return Imported(robot, name, target, tuple(sensors), notes, angles(document.root), folders)
+    return Imported(
+        robot,
+        name,
+        target,
+        sensors=tuple(sensors),
+        notes=notes,
+        rpy=angles(document.root),
+        packages=folders,
+    )
 
 
 def with_findings(

@@ -325,14 +325,16 @@ class _Search:
                     sensor,
                     name,
                     mount,
-                    tuple(match.edge for match in inside),
-                    given,
-                    frozenset(match.edge.child for match in inside if match.own_xyz),
-                    frozenset(match.edge.child for match in inside if match.own_rotation),
-                    names.get(body, body),
-                    preset.driver is not None,
-                    {there: own for own, there in names.items() if there != own},
-                    frozenset(
+                    inside=tuple(match.edge for match in inside),
+                    options=given,
+                    own_xyz=frozenset(match.edge.child for match in inside if match.own_xyz),
+                    own_rotation=frozenset(
+                        match.edge.child for match in inside if match.own_rotation
+                    ),
+                    body=names.get(body, body),
+                    driven=preset.driver is not None,
+                    names={there: own for own, there in names.items() if there != own},
+                    sent=frozenset(
                         match.edge.child for key, match in found.items() if wanted[key].driver
                     ),
                 ),

@@ -387,7 +387,7 @@ def add_script(draft: Draft, text: str, file: str, target: Target) -> None:
 
     Raises:
         RejectedError: if it is no script by its name or first line, and nothing of ROS stands in
-        it.
+            it.
     """
     if not (
         file.endswith((".sh", ".bash"))

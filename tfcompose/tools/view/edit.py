@@ -133,7 +133,15 @@ def mount_of(robot: Robot, source: Source, child: str) -> Mount:
     poses = poses_in_roots(robot, {})
     parent_from_base = poses[edge.parent].inverse() @ poses[base]
     child_from_place = poses[child].inverse() @ poses[place]
-    return Mount(edge, edge.entry, data, place, base, parent_from_base, child_from_place)
+    return Mount(
+        edge,
+        edge.entry,
+        data,
+        place=place,
+        relative_to=base,
+        parent_from_base=parent_from_base,
+        child_from_place=child_from_place,
+    )
 
 
 def change_of(

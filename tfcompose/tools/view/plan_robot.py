@@ -41,7 +41,15 @@ def robot_of_plan(plan: Plan, description: str | None, file: str, find: Finder) 
     frames |= {edge.child: edge.at for edge in edges}
     frames |= {frame: Span(file) for frame in links if frame not in frames}
     return Robot(
-        plan.robot, file, frames, edges, links, (), plan.base, guard=plan.guard, args=plan.args
+        plan.robot,
+        file,
+        frames,
+        edges=edges,
+        links=links,
+        processes=(),
+        base=plan.base,
+        guard=plan.guard,
+        args=plan.args,
     )
 
 

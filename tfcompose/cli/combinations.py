@@ -12,7 +12,7 @@ from itertools import combinations as subsets
 from itertools import product
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.findings import Finding, Note
+from tfcompose.foundation.findings import Finding, Note, Span
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -65,25 +65,26 @@ def _new_pairs(
     return sum(frozenset((choice, other)) in missing for other in chosen.items())
 
 
+#: What makes findings of several combinations the same one.
+Key = tuple[str, str, Span | None]
+
+
 def merged(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Finding]:
     """Return each finding once; one that is not in all combinations has a note that says in which it is."""
-    where: dict[tuple[object, ...], list[int]] = {}
-    firsts: dict[tuple[object, ...], Finding] = {}
-    for index, (_, found) in enumerate(judged):
-        for one in found:
-            key = (one.code, one.message, one.span)
-            firsts.setdefault(key, one)
+    where: dict[Key, list[int]] = {}
+    firsts: dict[Key, Finding] = {}
+    for index, (_, findings) in enumerate(judged):
+        for finding in findings:
+            key = (finding.code, finding.message, finding.span)
+            firsts.setdefault(key, finding)
             if where.setdefault(key, [])[-1:] != [index]:
                 where[key].append(index)
     every = [combination for combination, _ in judged]
-    return [
-        (
-            one
-            if len(where[key]) == len(judged)
-            else replace(one, notes=(*one.notes, Note(_named(every, where[key]))))
-        )
-        for key, one in firsts.items()
-    ]
+    for key, indices in where.items():
+        if len(indices) < len(judged):
+            note = Note(_named(every, indices))
+            firsts[key] = replace(firsts[key], notes=(*firsts[key].notes, note))
+    return list(firsts.values())
 
 
 def _named(every: Sequence[Combination], where: Sequence[int]) -> str:

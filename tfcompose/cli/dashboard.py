@@ -395,22 +395,13 @@ class Dashboard:
             set(self.status.missing) if self.status else {edge.name for edge in self.plan.edges}
         )
         silent = set(self.status.silent) if self.status else set()
-        table = [
-            (
-                edge.name,
-                edge.owner,
-                edge.kind,
-                f"{edge.rate:g} Hz" if edge.rate and edge.kind != "static" else "–",
-                (
-                    "not live"
-                    if edge.name in missing
-                    else "silent"
-                    if edge.name in silent
-                    else "live"
-                ),
-            )
-            for edge in self.plan.edges
-        ]
+        table = []
+        for edge in self.plan.edges:
+            rate = f"{edge.rate:g} Hz" if edge.rate and edge.kind != "static" else "–"
+            state = "silent" if edge.name in silent else "live"
+            if edge.name in missing:
+                state = "not live"
+            table.append((edge.name, edge.owner, edge.kind, rate, state))
         table.sort(key=lambda cells: cells[-1] == "live")  # what needs attention comes first
         if not table:
             return [Text(" this plan has no edges", style="dim")]
@@ -436,9 +427,8 @@ class Dashboard:
 
     def _help_page(self, columns: int, rows: int) -> list[Text]:
         del columns
-        lines = [
-            Text(f" {line}", style="bold" if line == "Keys" else "") for line in HELP.splitlines()
-        ]
+        styles = {"Keys": "bold"}
+        lines = [Text(f" {line}", style=styles.get(line, "")) for line in HELP.splitlines()]
         return lines[self._scroll("help").window(len(lines), rows)]
 
     def _timed(self, at: float, line: Text) -> Text:

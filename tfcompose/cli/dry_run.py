@@ -85,10 +85,8 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
     yield from _what(process)
     if plan.guard.mode == "strict" and process.kind not in ("external", "guard"):
         yield f"  fence    {_fence(plan, process)}"
-    nodes = [
-        name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "")
-        for name in process.nodes
-    ]
+    states = {name: f" → {state}" for name, state in process.lifecycle.items()}
+    nodes = [name + states.get(name, "") for name in process.nodes]
     if nodes:
         yield f"  nodes    {', '.join(nodes)}"
     for name, value in _environment(plan, process).items():

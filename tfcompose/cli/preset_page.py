@@ -372,7 +372,8 @@ def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
     parts += [f"{' x '.join(map(str, optics['resolution']))} px"] if "resolution" in optics else []
     parts += [f"{optics[word]} {word}" for word in ("channels", "samples") if word in optics]
     if "near" in optics or "far" in optics:
-        near, far = (number(optics[word]) if word in optics else "?" for word in ("near", "far"))
+        near = number(optics["near"]) if "near" in optics else "?"
+        far = number(optics["far"]) if "far" in optics else "?"
         parts.append(f"{near} to {far} m")
     parts += [f"up to {number(optics['rate'])} Hz"] if "rate" in optics else []
     parts += [f"{optics['shutter']} shutter"] if "shutter" in optics else []
@@ -509,7 +510,8 @@ def _role_text(frame: dict[str, Any]) -> str:
 
 def _parameters(values: dict[str, Any]) -> str:
     """Return parameters as ROS takes them: 0.0 is another type than 0."""
-    return ", ".join(
-        f"{key}: {str(value).lower() if isinstance(value, bool) else value}"
-        for key, value in values.items()
-    )
+    return ", ".join(f"{key}: {_parameter_text(value)}" for key, value in values.items())
+
+
+def _parameter_text(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

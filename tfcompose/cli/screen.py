@@ -58,11 +58,12 @@ class Keys:
 
 
 def _keys(text: str) -> list[str]:
-    pairs = (match.groups() for match in _KEY.finditer(text))
-    return [
-        _NAMED.get(sequence, "") if sequence else _NAMED.get(char, char)
-        for sequence, char in pairs
-    ]
+    return [_key_name(*match.groups()) for match in _KEY.finditer(text)]
+
+
+def _key_name(sequence: str, char: str) -> str:
+    """Return the name of a key; an escape sequence that no key sends has none."""
+    return _NAMED.get(sequence, "") if sequence else _NAMED.get(char, char)
 
 
 class _Stream(StringIO):

@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
 
 from tfcompose.compiler.render.text import PLAIN, render_text
+from tfcompose.foundation.text import masked
 
 if TYPE_CHECKING:
     import socket
@@ -98,7 +99,7 @@ def size_of(fd: int) -> tuple[int, int]:
 
 def printable(text: str) -> str:
     """Return the text without what would move a terminal's cursor."""
-    return "".join(character if character.isprintable() else "?" for character in text)
+    return masked(text, "?")
 
 
 def plain(text: str) -> str:
@@ -111,18 +112,14 @@ def coloured_only(text: str) -> str:
     pieces = _SEQUENCE.split(text)
     if len(pieces) == 1:
         return _marked(text)
-    colours = [piece if _COLOUR.fullmatch(piece) else "" for piece in pieces[1::2]]
+    colours = [(_COLOUR.fullmatch(piece) and piece) or "" for piece in pieces[1::2]]
     pieces[::2], pieces[1::2] = map(_marked, pieces[::2]), colours
     last = "".join(colours).rpartition("\033")[2]
     return "".join(pieces) + (PLAIN if last and f"\033{last}" != PLAIN else "")
 
 
 def _marked(text: str) -> str:
-    if text.isprintable():
-        return text
-    return "".join(
-        c if c.isprintable() or c == "\t" else "\N{REPLACEMENT CHARACTER}" for c in text
-    )
+    return masked(text, "\N{REPLACEMENT CHARACTER}", kept="\t")
 
 
 def has_reader(stream: TextIO) -> bool:

@@ -40,8 +40,16 @@ def duration(seconds: float) -> str:
 
 def visible(text: str) -> str:
     """Return the text with what cannot be seen, such as control characters, as Python's escapes."""
-    return (
-        text
-        if text.isprintable()
-        else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
-    )
+    return "".join(map(_visible_character, text))
+
+
+def _visible_character(character: str) -> str:
+    return character if character.isprintable() else ascii(character)[1:-1]
+
+
+def masked(text: str, mark: str, kept: str = "") -> str:
+    """Return the text with a mark for each character that cannot be seen, but those of ``kept``."""
+    if text.isprintable():
+        return text
+    hidden = {character for character in text if not character.isprintable()} - {*kept}
+    return text.translate(dict.fromkeys(map(ord, hidden), mark))

@@ -316,9 +316,11 @@ def _files_at(path: Path) -> list[Path]:
 
 def _in_order(file: Path) -> list[tuple[int, str]]:
     """Order names by the numbers in them: a bag that was split is numbered."""
-    return [
-        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", file.name)
-    ]
+    return [_order_of(part) for part in re.split(r"(\d+)", file.name)]
+
+
+def _order_of(part: str) -> tuple[int, str]:
+    return (int(part), "") if part.isdigit() else (-1, part)
 
 
 def _damaged(path: str, error: Exception) -> BagError:

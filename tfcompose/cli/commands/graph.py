@@ -154,7 +154,8 @@ def _published_graph(arguments: Namespace) -> Graph:
     from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 
     plan, pairs = observed_topics(arguments)
-    observers = {pair: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
+    settle_s = 0.0 if arguments.bag else SETTLE_S
+    observers = {pair: TreeObserver(settle_s=settle_s) for pair in pairs}
     if arguments.bag:
         read_bag(arguments.bag, observers)
     else:

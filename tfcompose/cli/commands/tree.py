@@ -129,7 +129,8 @@ def _print_published(arguments: Namespace) -> None:
 
     plan, pairs = observed_topics(arguments)
     parts = parts_of(plan) if plan else {}
-    observers = {pair: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
+    settle_s = 0.0 if arguments.bag else SETTLE_S
+    observers = {pair: TreeObserver(settle_s=settle_s) for pair in pairs}
     if arguments.bag:
         read_bag(arguments.bag, observers)
     else:

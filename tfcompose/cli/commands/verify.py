@@ -70,10 +70,8 @@ def run(arguments: Namespace) -> int:
     plan, places = _running_plan(arguments) or expected_plan(
         arguments.file or DEFAULT_FILE, arguments
     )
-    observers = {
-        topics: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S)
-        for topics in parts_of(plan)
-    }
+    settle_s = 0.0 if arguments.bag else SETTLE_S
+    observers = {topics: TreeObserver(settle_s=settle_s) for topics in parts_of(plan)}
     # Programs get each missing edge; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()

@@ -228,7 +228,9 @@ _OF_AN_ENTRY = 2  # its section and its name
 def with_replaced(found: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
     """Return the findings; one that is about a value which replaced another has a note with the other's place."""
     overlaid = [source for source in sources if source.replaced]
-    return [replace(one, notes=_with_notes(one, overlaid)) if overlaid else one for one in found]
+    if not overlaid:
+        return list(found)
+    return [replace(finding, notes=_with_notes(finding, overlaid)) for finding in found]
 
 
 def _with_notes(found: Finding, sources: Iterable[Source]) -> tuple[Note, ...]:

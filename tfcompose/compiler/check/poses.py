@@ -359,7 +359,8 @@ def are_swapped(one: Edge, other: Edge) -> bool:
     """Return whether the two are named after two sides of their parent and each stands, mirrored, on the other one."""
     axis, sign = side_of(one.child, other.child)
     here, there = one.pose.xyz, other.pose.xyz
-    mirrored = tuple(-value if index == axis else value for index, value in enumerate(there))
+    mirrored = list(there)
+    mirrored[axis] = -mirrored[axis]
     return sign * here[axis] < -_MIDDLE_M and math.dist(here, mirrored) < _MIRRORED_M
 
 

@@ -109,10 +109,10 @@ def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     children = {*_CHILD.findall(text)} if text is not None else robot.described()
     prefix = params.get("frame_prefix", "")
     known = {robot.final(frame): frame for frame in robot.frames}
-    sent = {
-        known.get(f"{prefix}{name}" if prefix or text is not None else robot.final(name))
-        for name in children
-    }
+    if prefix or text is not None:
+        sent = {known.get(f"{prefix}{name}") for name in children}
+    else:
+        sent = {known.get(robot.final(name)) for name in children}
     others = [
         edge
         for edge in robot.edges

@@ -87,15 +87,13 @@ def collapsed(graph: Graph) -> Graph:
         for frame in first
         if len(inside[frame].frames) > 1
     }
-    arrows = tuple(
-        (
-            replace(arrow, detail=f"{arrow.detail} +{beneath[arrow.child]}".strip())
-            if beneath.get(arrow.child)
-            else arrow
-        )
-        for arrow in graph.arrows
-        if arrow.child not in gone and arrow.parent not in gone
-    )
+    arrows = []
+    for arrow in graph.arrows:
+        if arrow.child in gone or arrow.parent in gone:
+            continue
+        count = beneath.get(arrow.child)
+        detail = f"{arrow.detail} +{count}".strip() if count else arrow.detail
+        arrows.append(replace(arrow, detail=detail))
     groups = tuple(
         replace(group, frames=tuple(one for one in group.frames if one in needed))
         for group in graph.groups
@@ -103,7 +101,7 @@ def collapsed(graph: Graph) -> Graph:
     return replace(
         graph,
         frames=tuple(frame for frame in graph.frames if frame not in gone),
-        arrows=arrows,
+        arrows=tuple(arrows),
         groups=groups,
         hidden=tuple(
             arrow for arrow in graph.arrows if arrow.child in gone and not arrow.alternative

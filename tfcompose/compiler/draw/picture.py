@@ -332,7 +332,9 @@ def _owner_items(owners: dict[str, int], edges: Counter[str]) -> list[_Item]:
 
 
 def _line_items(graph: Graph) -> list[_Item]:
-    used = {"alternative" if arrow.alternative else arrow.kind for arrow in graph.arrows}
+    used: set[str] = {arrow.kind for arrow in graph.arrows if not arrow.alternative}
+    if any(arrow.alternative for arrow in graph.arrows):
+        used.add("alternative")
     return [_Item(text, kind=kind) for kind, text in LINES.items() if kind in used]
 
 

@@ -27,10 +27,10 @@ def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
     ``target`` says where they are written and how they address meshes.
     """
     live = robot.with_final_names()
-    descriptions = {
-        part: _descriptions(robot_of, target, f"{part}/" if part else "")
-        for part, robot_of in described(robot)
-    }
+    descriptions = {}
+    for part, robot_of in described(robot):
+        folder = f"{part}/" if part else ""
+        descriptions[part] = _descriptions(robot_of, target, folder)
     stock = {part: files[1].text for part, files in descriptions.items()}
     return (
         File("plan.json", write_plan(plan_of(live, target))),

@@ -94,11 +94,11 @@ def cast(sensor: str, optics: Optics, into: Sequence[Vector], bodies: Sequence[B
         for index, far in hits:
             if far < found[index][0] and far <= reach:
                 found[index] = (far, body.link)
-    rays = tuple(
-        Ray(direction, *(hit if hit[1] not in inside else (math.inf, None)))
-        for direction, hit in zip(into, found, strict=True)
-    )
-    return View(sensor, optics, rays, inside, tuple(left_out))
+    rays = []
+    for direction, (far, link) in zip(into, found, strict=True):
+        is_free = link in inside
+        rays.append(Ray(direction, math.inf, None) if is_free else Ray(direction, far, link))
+    return View(sensor, optics, tuple(rays), inside, tuple(left_out))
 
 
 Hits = list[tuple[int, float]]

@@ -57,7 +57,7 @@ def _annotation(found: Finding) -> str:
         properties = {"file": at.file, "line": at.line, "col": at.column} | properties
         if at.end_line == at.line:
             properties["endColumn"] = at.end_column
-    notes = [f"{note.span}: {note.message}" if note.span else note.message for note in found.notes]
+    notes = [": ".join(map(str, filter(None, (note.span, note.message)))) for note in found.notes]
     lines = [found.message, *notes, *([f"help: {found.help}"] if found.help else [])]
     message = "\n".join(map(visible, lines))
     listed = ",".join(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import counted, visible
+from tfcompose.foundation.text import counted, masked, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -78,8 +79,8 @@ def _excerpt(
     else:
         skipped = 0
     width = max(1, min(end, skipped + len(shown)) - start)
-    lead = "".join("\t" if character == "\t" else " " for character in shown[: start - skipped])
-    shown = "".join(c if c.isprintable() or c == "\t" else "?" for c in shown.rstrip())
+    lead = re.sub(r"[^\t]", " ", shown[: start - skipped])
+    shown = masked(shown.rstrip(), "?", kept="\t")
     return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 

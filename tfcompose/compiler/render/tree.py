@@ -63,7 +63,7 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
 def _fitted(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:
     """Return the rows as lines of at most so many columns, where names are no longer than that."""
     for kinds in ({"static", "joints", "dynamic"}, {"dynamic"}):
-        facts = [_facts(edge, kinds) if edge else [] for _, _, edge in rows]
+        facts = [_facts(edge, kinds) for _, _, edge in rows]
         drawing = [(lines, name, some) for (lines, name, _), some in zip(rows, facts, strict=True)]
         found = [GAP.join([lines + name, *some]) for lines, name, some in drawing]
         if _widest(found) <= columns:
@@ -86,8 +86,10 @@ def wrapped(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> lis
     ]
 
 
-def _facts(edge: Edge, kinds: Collection[str]) -> list[str]:
+def _facts(edge: Edge | None, kinds: Collection[str]) -> list[str]:
     """Return what is said of an edge; its kind if it is among these, and its owner does not say as much."""
+    if edge is None:
+        return []
     kind = edge.kind if edge.kind in kinds and edge.owner not in {STATIC, JOINTS} else ""
     facts = (kind, edge.owner, _rate(edge), *pose_text(edge).split(GAP), _switched(edge))
     return [fact for fact in facts if fact]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -94,11 +95,12 @@ class Bodies:
         raise ValueError("a shape without a form")
 
     def _shapes(self, shapes: tuple[specs.Shape, ...], at: Path) -> tuple[Shape, ...]:
-        return tuple(
-            self.shape(shape, (*at, index) if self.source.has((*at, index)) else at)
-            for index, shape in enumerate(shapes)
-            if any(getattr(shape, form) for form in FORMS)
-        )
+        made = []
+        for index, shape in enumerate(shapes):
+            if any(getattr(shape, form) for form in FORMS):
+                in_list = (*at, index)
+                made.append(self.shape(shape, in_list if self.source.has(in_list) else at))
+        return tuple(made)
 
     def _material(self, given: specs.Material, at: Path) -> Material:
         """Return the colour with its name; one without is named after its parts, so that URDF keeps them apart."""
@@ -207,4 +209,4 @@ def _coloured(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
 
 
 def _word(uri: str) -> str:
-    return "".join(char if char.isascii() and char.isalnum() else "_" for char in uri)
+    return re.sub(r"[^A-Za-z0-9]", "_", uri)

@@ -55,10 +55,9 @@ class _Work:
         claimants = [self._node(process, node) for node in process.ros_nodes]
         if all(one is not None for one in claimants):
             self.known.add(process.name)
-        nodes = (
-            one.settled() if one else node
-            for node, one in zip(process.ros_nodes, claimants, strict=True)
-        )
+        nodes = []
+        for node, claimant in zip(process.ros_nodes, claimants, strict=True):
+            nodes.append(claimant.settled() if claimant else node)
         return replace(process, ros_nodes=tuple(nodes))
 
     def edge(self, edge: Edge) -> Edge:

@@ -127,11 +127,16 @@ def _not_a_parameter(value: object) -> str:
             if value is None
             else "a mapping"
         )
-    kinds = {
-        float if type(one) is int else str if isinstance(one, str) else type(one) for one in value
-    }
     if not value:
         return "an empty list, which has no type"
-    if len(kinds) > 1 or not kinds <= {bool, float, str}:
-        return "a list of several kinds"
-    return ""
+    kinds = {_kind_of(item) for item in value}
+    return "a list of several kinds" if len(kinds) > 1 or None in kinds else ""
+
+
+def _kind_of(item: object) -> type | None:
+    """Return the kind of a parameter that an item of a list is; numbers are one kind."""
+    if isinstance(item, bool):
+        return bool
+    if isinstance(item, (int, float)):
+        return float
+    return str if isinstance(item, str) else None

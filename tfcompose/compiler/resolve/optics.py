@@ -8,11 +8,11 @@ from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.model.robot import Optics, OpticsSource
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
     from tfcompose.compiler.resolve.presets import Sensor
     from tfcompose.model.robot import OpticsKind
-    from tfcompose.spec.language.optics import OpticsSpec
+    from tfcompose.spec.language.optics import OpticsSourceSpec, OpticsSpec
     from tfcompose.spec.load import Source
 
 #: Keys of the language that ``Optics`` has under the same name; those that are left out stay as
@@ -93,15 +93,19 @@ def _merged(
         values.setdefault("vertical", (min(elevations), max(elevations)))
     sources = []
     for spec, outdated in ((base, replaced), (own, set[str]())):
-        for one in (spec.source if spec else None) or ():
-            keys = tuple(key for key in one.of if key not in outdated)
-            sources += [OpticsSource(keys, one.where, one.quality)] if keys else []
-    unsaid = tuple(
-        key
-        for key in given
-        if not any(key in one.of for one in (own.source if own else None) or ())
-    )
-    return values, [*sources, OpticsSource(unsaid, where, "robot file")] if unsaid else sources
+        for source in _sources(spec):
+            keys = tuple(key for key in source.of if key not in outdated)
+            if keys:
+                sources.append(OpticsSource(keys, source.where, source.quality))
+    sourced = {key for source in _sources(own) for key in source.of}
+    unsourced = tuple(key for key in given if key not in sourced)
+    if unsourced:
+        sources.append(OpticsSource(unsourced, where, "robot file"))
+    return values, sources
+
+
+def _sources(spec: OpticsSpec | None) -> Sequence[OpticsSourceSpec]:
+    return (spec.source if spec else None) or ()
 
 
 def _values(spec: OpticsSpec | None) -> dict[str, Any]:

@@ -34,9 +34,14 @@ def with_param_files(
     package.
     """
     work = _Work(source, read, packages, robot.ros.namespace)
-    processes = tuple(work.process(one) if one.name in own else one for one in robot.processes)
-    source_data = robot.source_data | ({"parameter files": work.digests} if work.digests else {})
-    return replace(robot, processes=processes, source_data=source_data), work.found
+    processes = list(robot.processes)
+    for index, process in enumerate(processes):
+        if process.name in own:
+            processes[index] = work.process(process)
+    source_data = dict(robot.source_data)
+    if work.digests:
+        source_data["parameter files"] = work.digests
+    return replace(robot, processes=tuple(processes), source_data=source_data), work.found
 
 
 @dataclass(slots=True)

@@ -83,9 +83,8 @@ def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
     for option, wanted in condition.items():
         value = tf if option == "tf" else options.get(option)
         every = wanted if isinstance(wanted, list) else [wanted]
-        if not all(
-            one in value if isinstance(value, (list, tuple)) else one == value for one in every
-        ):
+        chosen = value if isinstance(value, (list, tuple)) else [value]
+        if not all(item in chosen for item in every):
             return False
     return True
 

@@ -207,7 +207,8 @@ def _sensor(sensor: MountedSensor, names: Names) -> MountedSensor:
 
 def _zone(zone: Zone, robot: Robot, names: Names) -> Zone:
     sensors = {sensor.name for sensor in robot.sensors}
-    by = tuple(names.process(one) if one in sensors else one for one in zone.by)
+    renamed = {name: names.process(name) for name in sensors}
+    by = tuple(renamed.get(name, name) for name in zone.by)
     return replace(zone, name=f"{names.part}/{zone.name}", frame=names.frame(zone.frame), by=by)
 
 

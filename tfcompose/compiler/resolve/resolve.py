@@ -405,12 +405,12 @@ def _guard(declared: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
 
 def _with_rates(edges: tuple[Edge, ...], processes: list[Process]) -> tuple[Edge, ...]:
     """Give moving edges without a rate their process's: that of ``joints``, or of the stand-in."""
-    rates = {
-        process.name: process.simulate.rate if process.simulate else process.rate
-        for process in processes[::-1]
-    }
-    return tuple(
-        edge if edge.rate is not None or edge.kind == "static" or rates.get(edge.owner) is None
-        else replace(edge, rate=rates[edge.owner])
-        for edge in edges
-    )  # fmt: skip
+    rates = {}
+    for process in reversed(processes):
+        rates[process.name] = process.simulate.rate if process.simulate else process.rate
+    rated = []
+    for edge in edges:
+        has_none = edge.rate is None and edge.kind != "static"
+        rate = rates.get(edge.owner) if has_none else edge.rate
+        rated.append(replace(edge, rate=rate))
+    return tuple(rated)

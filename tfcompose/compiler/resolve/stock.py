@@ -51,19 +51,16 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
         found.append(
             finding("TF316", message, robot.frames.get(frame), help="state_publisher: tfcompose")
         )
-    edges = tuple(
-        (
-            replace(edge, owner=JOINTS)
-            if edge.owner == STATIC and edge.kind == "static" and edge.child in below
-            else edge
-        )
-        for edge in robot.edges
-    )
-    has_work = any(edge.owner == JOINTS for edge in edges)
-    processes = tuple(
-        _stock(one, robot) if one.name == JOINTS and has_work else one for one in robot.processes
-    )
-    return replace(robot, edges=edges, processes=processes), found
+    edges = []
+    for edge in robot.edges:
+        is_taken = edge.owner == STATIC and edge.kind == "static" and edge.child in below
+        edges.append(replace(edge, owner=JOINTS if is_taken else edge.owner))
+    processes = list(robot.processes)
+    if any(edge.owner == JOINTS for edge in edges):
+        for index, process in enumerate(processes):
+            if process.name == JOINTS:
+                processes[index] = _stock(process, robot)
+    return replace(robot, edges=tuple(edges), processes=tuple(processes)), found
 
 
 def _stock(joints: Process, robot: Robot) -> Process:

@@ -118,10 +118,13 @@ def inertial(moments: Moments, density: float, mass: float | None = None) -> Ine
     """
     noise = density * _NOISE * trace(moments.tensor)
     xx, xy, xz, yy, yz, zz = (density * value for value in moments.tensor)
-    xy, xz, yz = (value if abs(value) > noise else 0.0 for value in (xy, xz, yz))
-    return Inertial(
-        mass or density * moments.volume, Pose(moments.centre), (xx, xy, xz, yy, yz, zz)
-    )
+    products = [xy, xz, yz]
+    for index, product in enumerate(products):
+        if abs(product) <= noise:
+            products[index] = 0.0
+    xy, xz, yz = products
+    tensor = (xx, xy, xz, yy, yz, zz)
+    return Inertial(mass or density * moments.volume, Pose(moments.centre), tensor)
 
 
 def of_primitives(mass: float, shapes: Sequence[Shape]) -> Inertial:

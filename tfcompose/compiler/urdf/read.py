@@ -204,14 +204,13 @@ def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) 
     reader = _Reader(expansion.text, file)
     texts = [_Text(read(name), name) for name in expansion.files]
     nowhere = _Origin(_Text("", file), 0)
-    reader.origins = [
-        (
-            _Origin(texts[place[0]], texts[place[0]].starts[place[1] - 1] + place[2])
-            if place
-            else nowhere
-        )
-        for place in expansion.places
-    ]
+    reader.origins = []
+    for place in expansion.places:
+        origin = nowhere
+        if place:
+            number, line, column = place
+            origin = _Origin(texts[number], texts[number].starts[line - 1] + column)
+        reader.origins.append(origin)
     return reader.read()
 
 

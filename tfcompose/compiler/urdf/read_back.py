@@ -120,10 +120,12 @@ def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
 
 def _given(values: Any) -> dict[str, Any]:
     """Return the values that a dataclass holds; yourdfpy leaves those of ``dynamics`` as text."""
-    given = ((one.name, getattr(values, one.name)) for one in fields(values))
-    return {
-        key: value if key == "joint" else float(value) for key, value in given if value is not None
-    }
+    present = {}
+    for field in fields(values):
+        value = getattr(values, field.name)
+        if value is not None:
+            present[field.name] = value if field.name == "joint" else float(value)
+    return present
 
 
 def _values(joint: Joint) -> dict[str, dict[str, Any] | None]:
@@ -197,15 +199,13 @@ def _meant_paint(material: Material | None, target: Target) -> dict[str, Any]:
 
 def _form(there: Any) -> dict[str, Any]:
     """Return the values of a solid; none where there is none of the kind."""
-    values = (
-        {}
-        if there is None
-        else {key: value for key, value in vars(there).items() if value is not None}
-    )
-    return {
-        key: tuple(value.tolist()) if hasattr(value, "tolist") else value
-        for key, value in values.items()
-    }
+    if there is None:
+        return {}
+    values = {}
+    for key, value in vars(there).items():
+        if value is not None:
+            values[key] = tuple(value.tolist()) if hasattr(value, "tolist") else value
+    return values
 
 
 def _solids(shape: Shape, target: Target) -> Iterator[tuple[str, dict[str, Any], Pose]]:

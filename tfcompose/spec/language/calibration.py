@@ -278,13 +278,13 @@ class CalibrationFile:
 
 def unreadable(file: str, form: str, at: Span, found: Iterable[Finding]) -> CalibrationFile:
     """Return what a file says that cannot be read: nothing, and why."""
-    exact = (replace(one, span=None) if one.span == Span(file) else one for one in found)
-    return CalibrationFile(file, form, (), tuple(_inside("TF610", one, file, at) for one in exact))
+    return CalibrationFile(file, form, (), tuple(_inside("TF610", one, file, at) for one in found))
 
 
 def _inside(code: str, found: Finding, file: str, at: Span) -> Finding:
     """Return a finding inside a calibration file as one at the place that names the file."""
-    notes = [Note("here", found.span), *found.notes] if found.span else found.notes
+    is_exact = found.span is not None and found.span != Span(file)
+    notes = [Note("here", found.span), *found.notes] if is_exact else found.notes
     return finding(code, f"{file}: {found.message}", at, help=found.help, notes=notes)
 
 

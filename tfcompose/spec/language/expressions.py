@@ -109,6 +109,15 @@ class EnvironmentText(str):
             return str(self)
 
 
+def _fill_around(text: str, lookup: Callable[[str], Value], later: re.Pattern[str]) -> str:
+    """Return ``text`` with what is before, between and after the matches of ``later`` filled."""
+    parts, end = [], 0
+    for match in later.finditer(text):
+        parts += [inserted(fill(text[end : match.start()], lookup, later)), match[0]]
+        end = match.end()
+    return "".join([*parts, inserted(fill(text[end:], lookup, later))])
+
+
 def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | None = None) -> Value:
     """Return ``text`` with each ``${…}`` computed; one that is the whole text keeps its type.
 
@@ -125,19 +134,7 @@ def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | Non
             + text[nested.end() :]
         )
     if later and later.search(text):
-        kept = [*later.finditer(text)]
-        pieces = [
-            text[a:b]
-            for a, b in zip(
-                [0, *(k.end() for k in kept)], [*(k.start() for k in kept), len(text)], strict=True
-            )
-        ]
-        filled = [
-            inserted(fill(piece, lookup, later)) if "${" in piece else piece for piece in pieces
-        ]
-        return "".join(
-            part for pair in zip(filled, [*(k[0] for k in kept), ""], strict=True) for part in pair
-        )
+        return _fill_around(text, lookup, later)
     deferred = _DEFERRED.search(text)
     if deferred:
         what = f"{deferred[1]}(…)"
@@ -355,9 +352,8 @@ class Arithmetic:
             return left
         sign = self._next()[1]
         right = self._sum()
-        left, right = (
-            one.value if isinstance(one, EnvironmentText) else one for one in (left, right)
-        )
+        left = left.value if isinstance(left, EnvironmentText) else left
+        right = right.value if isinstance(right, EnvironmentText) else right
         if sign in {"==", "!="} and not (
             isinstance(left, Quantity) and isinstance(right, Quantity)
         ):

@@ -205,10 +205,9 @@ def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
     for model in (own, *(one for one in definitions.values() if "properties" in one)):
         if model is not own:
             model.pop("required", None)
-        model["properties"] = {
-            name: schema if name == "preset" else _removable(schema)
-            for name, schema in model["properties"].items()
-        }
+        for name, schema in model["properties"].items():
+            if name != "preset":
+                model["properties"][name] = _removable(schema)
 
 
 def _removable(schema: dict[str, Any]) -> dict[str, Any]:
@@ -271,10 +270,10 @@ def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict
             return value
         if value.get("$ref") in mappings:
             return value | {"$ref": f"{value['$ref']}Overlay"}
-        return {
-            key: item if key in {"items", "default", "examples"} else merged(item)
-            for key, item in value.items()
-        }
+        result = {}
+        for key, item in value.items():
+            result[key] = item if key in {"items", "default", "examples"} else merged(item)
+        return result
 
     def optional(name: str, value: dict[str, Any]) -> dict[str, Any]:
         again = merged(value)

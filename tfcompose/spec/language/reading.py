@@ -97,11 +97,11 @@ def read(
         except ValidationError as error:
             errors = [(_path_of(one["loc"], data), one) for one in error.errors(include_url=False)]
         follows = {path[:end] for path in gone for end in range(1, len(path) + 1)}
-        new = [
-            (path, one)
-            for path, one in errors
-            if path not in (gone if one["type"] in UNKNOWN_KEYS else follows)
-        ]
+        new = []
+        for path, refused in errors:
+            old = gone if refused["type"] in UNKNOWN_KEYS else follows
+            if path not in old:
+                new.append((path, refused))
         refusals += _refusals(model, new, data)
         rest = _without(
             rest,
@@ -172,15 +172,14 @@ def _existing(data: Any, path: Path) -> Path:
 
 def _pruned(data: Any, tree: dict[Any, Any]) -> Any:
     if isinstance(data, list):
-        return [
-            _pruned(item, tree[index]) if index in tree else item
-            for index, item in enumerate(data)
-        ]
-    return {
-        name: _pruned(item, tree[name]) if name in tree else item
-        for name, item in data.items()
-        if tree.get(name) is not _ALL
-    }
+        items = list(data)
+        for index in tree.keys() & set(range(len(items))):
+            items[index] = _pruned(items[index], tree[index])
+        return items
+    kept = {name: item for name, item in data.items() if tree.get(name) is not _ALL}
+    for name in tree.keys() & kept.keys():
+        kept[name] = _pruned(kept[name], tree[name])
+    return kept
 
 
 def _refusals(
@@ -189,14 +188,13 @@ def _refusals(
     """Return what pydantic refused in one turn, in this project's words."""
     unknown = [path for path, one in errors if one["type"] in UNKNOWN_KEYS]
     meant = Counter((path[:-1], _slip(model, path)) for path in unknown)
-    return [
-        (
-            _unknown_key(model, path, data, meant)
-            if one["type"] in UNKNOWN_KEYS
-            else _refusal(model, path, one)
-        )
-        for path, one in errors
-    ]
+    refusals = []
+    for path, error in errors:
+        if error["type"] in UNKNOWN_KEYS:
+            refusals.append(_unknown_key(model, path, data, meant))
+        else:
+            refusals.append(_refusal(model, path, error))
+    return refusals
 
 
 #: The kinds of errors for a key that a model, or a dataclass, does not have.

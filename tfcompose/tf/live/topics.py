@@ -83,17 +83,14 @@ class TFTopics:
         # What everybody sends has a port of its own, so that a flood there throws out nothing of
         # what is fenced off.
         apart = bool(fence) and middleware().startswith("rmw_fastrtps")
-        self._public = [
-            _Readable(
-                (
-                    PublicTFReader(node, topics[static], static=static)
-                    if apart
-                    else TFSubscription(node, static=static, topic=topics[static], deep=deep)
-                ),
-                static,
-            )
-            for static in (True, False)
-        ]
+        self._public = []
+        for static in (True, False):
+            reader: PublicTFReader | TFSubscription
+            if apart:
+                reader = PublicTFReader(node, topics[static], static=static)
+            else:
+                reader = TFSubscription(node, static=static, topic=topics[static], deep=deep)
+            self._public.append(_Readable(reader, static))
 
     @property
     def readers(self) -> list[Reader]:

@@ -13,6 +13,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.text import masked
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -140,5 +142,5 @@ def words_of(pid: int) -> list[str]:
 
 def _shown(command: bytes) -> str:
     line = " ".join(command.decode(errors="replace").replace("\0", " ").split())
-    line = "".join(c if c.isprintable() else "?" for c in line)
+    line = masked(line, "?")
     return line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…"

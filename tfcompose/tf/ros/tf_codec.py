@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from tfcompose.foundation.geometry import Pose, Quaternion, Vector
+from tfcompose.foundation.text import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -389,7 +390,7 @@ def plain_name(frame: str) -> str:
     """Return a frame's name as tf2 takes it, without a leading slash, and as it can be shown: printable, cut short."""
     name = frame.removeprefix("/")
     if not name.isprintable():
-        name = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+        name = visible(name)
     return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}…"
 
 

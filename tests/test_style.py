@@ -1,0 +1,128 @@
+"""Text at a human width: the limits of style that no linter of the project checks."""
+
+import ast
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.house import PACKAGE, ROOT
+
+WIDTH = 99
+MOST_POSITIONAL = 5
+Comprehension = ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp
+
+
+def parts_of(comprehension: Comprehension) -> Iterator[ast.expr]:
+    """Yield what a comprehension evaluates for each item: all but the first iterable."""
+    if isinstance(comprehension, ast.DictComp):
+        yield comprehension.key
+        yield comprehension.value
+    else:
+        yield comprehension.elt
+    for index, generator in enumerate(comprehension.generators):
+        yield from generator.ifs
+        if index:
+            yield generator.iter
+
+
+def ternaries_in_comprehensions(tree: ast.AST) -> Iterator[int]:
+    for node in ast.walk(tree):
+        if isinstance(node, Comprehension):
+            parts = list(parts_of(node))
+            if any(isinstance(inner, ast.IfExp) for part in parts for inner in ast.walk(part)):
+                yield node.lineno
+
+
+def comprehensions_as_control_flow(tree: ast.AST) -> Iterator[int]:
+    """Yield lines where a comprehension runs for its effects, or adds what it names on the way."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, Comprehension):
+            yield node.lineno
+        elif isinstance(node, ast.AugAssign) and isinstance(node.value, Comprehension):
+            names = [inner for inner in ast.walk(node.value) if isinstance(inner, ast.NamedExpr)]
+            yield from [node.lineno for _ in names[:1]]
+
+
+def ternaries_in_unions(tree: ast.AST) -> Iterator[int]:
+    """Yield lines with two terms ``| (… if … else {})`` in one union."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.expr):
+            continue
+        terms: list[ast.expr] = []
+        left: ast.expr = node
+        while isinstance(left, ast.BinOp) and isinstance(left.op, ast.BitOr):
+            terms.append(left.right)
+            left = left.left
+        if sum(isinstance(term, ast.IfExp) for term in terms) > 1:
+            yield node.lineno
+
+
+def constructors_with_many_positional_arguments(tree: ast.AST) -> Iterator[int]:
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call) or len(node.args) <= MOST_POSITIONAL:
+            continue
+        name = ast.unparse(node.func).rpartition(".")[2]
+        if name[:1].isupper() and not name.isupper():
+            yield node.lineno
+
+
+def values_smuggled_through_arguments(tree: ast.AST) -> Iterator[int]:
+    """Yield lines that set an attribute of a command's parsed ``arguments``."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Assign):
+            continue
+        for target in node.targets:
+            if isinstance(target, ast.Attribute) and ast.unparse(target.value) == "arguments":
+                yield node.lineno
+
+
+CHECKS: tuple[Callable[[ast.AST], Iterator[int]], ...] = (
+    ternaries_in_comprehensions,
+    comprehensions_as_control_flow,
+    ternaries_in_unions,
+    constructors_with_many_positional_arguments,
+    values_smuggled_through_arguments,
+)
+#: Calls of other people's constructors, which take nothing by name.
+ALLOWED = {"tfcompose/tf/ros/node.py: constructors_with_many_positional_arguments"}
+
+
+def lines_of(file: Path, check: Callable[[ast.AST], Iterator[int]]) -> list[str]:
+    name = file.relative_to(ROOT).as_posix()
+    if f"{name}: {check.__name__}" in ALLOWED:
+        return []
+    return [f"{name}:{line}" for line in check(ast.parse(file.read_text("utf-8")))]
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_the_package_is_written_openly(check: Callable[[ast.AST], Iterator[int]]) -> None:
+    assert not [line for file in sorted(PACKAGE.rglob("*.py")) for line in lines_of(file, check)]
+
+
+@pytest.mark.parametrize(
+    ("check", "code"),
+    [
+        (ternaries_in_comprehensions, "[a if b else c for b in d]"),
+        (comprehensions_as_control_flow, "found += [x for y in z if (x := y.x)]"),
+        (comprehensions_as_control_flow, "[print(x) for x in y]"),
+        (ternaries_in_unions, "a | (b if c else {}) | (d if e else {})"),
+        (constructors_with_many_positional_arguments, "Pose(1, 2, 3, 4, 5, 6)"),
+        (values_smuggled_through_arguments, "arguments.is_one = True"),
+    ],
+)
+def test_each_check_finds_what_it_is_about(
+    check: Callable[[ast.AST], Iterator[int]], code: str
+) -> None:
+    assert list(check(ast.parse(code)))
+
+
+def test_no_line_is_wider_than_a_page() -> None:
+    """Ruff checks the same but for lines that an address makes long."""
+    files = [*sorted(PACKAGE.rglob("*.py")), *sorted((ROOT / "tests").rglob("*.py"))]
+    assert not [
+        f"{file.relative_to(ROOT)}:{number}"
+        for file in files
+        for number, line in enumerate(file.read_text("utf-8").splitlines(), 1)
+        if len(line) > WIDTH
+    ]

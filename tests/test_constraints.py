@@ -1,4 +1,4 @@
-"""constraints.txt has one version of each package that the README's commands install, and pyproject.toml allows it."""
+"""constraints.txt has one version of each required package, and pyproject.toml allows it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ def requirements(extras: set[str], environment: dict[str, str]) -> Iterator[Requ
     """Yield what is required there, with the extras that an extra names."""
     for requirement in map(Requirement, requires("tfcompose") or ()):
         marker = requirement.marker
-        if marker and not any(marker.evaluate(environment | {"extra": extra}) for extra in ("", *extras)):
+        if marker and not any(
+            marker.evaluate(environment | {"extra": extra}) for extra in ("", *extras)
+        ):
             continue
         if requirement.name == "tfcompose":
             yield from requirements(requirement.extras, environment)
@@ -32,7 +34,9 @@ def requirements(extras: set[str], environment: dict[str, str]) -> Iterator[Requ
 
 @pytest.mark.parametrize("machine", ["x86_64", "aarch64"])
 @pytest.mark.parametrize("python", ["3.10", "3.11", "3.12", "3.13", "3.14"])
-def test_every_package_that_is_required_has_one_version_and_it_is_allowed(python: str, machine: str) -> None:
+def test_every_package_that_is_required_has_one_version_and_it_is_allowed(
+    python: str, machine: str
+) -> None:
     environment = {
         "python_version": python,
         "python_full_version": f"{python}.0",
@@ -45,7 +49,8 @@ def test_every_package_that_is_required_has_one_version_and_it_is_allowed(python
         versions = [
             version
             for name, version, marker in PINS
-            if name == canonicalize_name(requirement.name) and (not marker or Marker(marker).evaluate(environment))
+            if name == canonicalize_name(requirement.name)
+            and (not marker or Marker(marker).evaluate(environment))
         ]
         allowed = list(requirement.specifier.filter(versions))
         assert (len(versions), allowed) == (1, versions), f"{requirement}: {versions}"

@@ -1,7 +1,8 @@
-"""Writes constraints.txt: the versions that the README's commands install, for each Python that they may be run with.
+"""constraints.txt: the versions that the README's commands install, for each Python.
 
-``python -m tests.support.constraints`` resolves them anew with uv, of the extra ``lint``, and takes the newest versions
-that pyproject.toml allows: one for all Pythons, or one for each range of them where packages have dropped the older.
+``python -m tests.support.constraints`` resolves them anew with uv, of the extra ``lint``: the
+newest that pyproject.toml allows, for all Pythons, or for each range of them where a package has
+dropped the older.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ EXTRAS = ("ros", "test", "lint")
 #: A package's name, its version, and the environments for which that is.
 LINE = re.compile(r"([a-z0-9]+(?:-[a-z0-9]+)*)==([0-9][\w.+!]*)(?: ; ([\w .'<>=!*()]+))?")
 
-_HEAD = "# The versions that the README's commands install. Written by: python -m tests.support.constraints\n"
+_HEAD = """\
+# The versions that the README's commands install, written by python -m tests.support.constraints.
+"""
 _OPTIONS = ["--universal", "--python-version", "3.10", "--no-annotate", "--no-header", "--quiet"]
 
 
@@ -41,7 +44,10 @@ def resolved() -> str:
     extras = [argument for extra in EXTRAS for argument in ("--extra", extra)]
     command = [sys.executable, "-m", "uv", "pip", "compile", "pyproject.toml", *extras, *_OPTIONS]
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
-    lines = sorted(f"{name}=={version}{marker and f' ; {marker}'}" for name, version, marker in pins(done.stdout))
+    lines = sorted(
+        f"{name}=={version}{marker and f' ; {marker}'}"
+        for name, version, marker in pins(done.stdout)
+    )
     return _HEAD + "\n".join(lines) + "\n"
 
 

@@ -297,10 +297,14 @@ def test_what_is_too_large_for_a_robot_is_refused_no_later_than_the_largest_file
 def test_text_that_is_nested_too_deep_is_refused_at_the_first_level_too_many(
     case: str, text: str, expected: tuple[str, int, int]
 ) -> None:
-    """However far the parser reads ahead, and however deep it goes itself: versions of PyYAML differ in that."""
+    """Versions of PyYAML differ in how far they read ahead, and in how deep they go themselves."""
     with pytest.raises(RejectedError) as rejected:
         load(text, "f")
-    places = [(found.code, found.span.line, found.span.column) for found in rejected.value.findings if found.span]
+    places = [
+        (found.code, found.span.line, found.span.column)
+        for found in rejected.value.findings
+        if found.span
+    ]
     assert places == [expected], case
 
 

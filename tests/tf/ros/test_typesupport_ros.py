@@ -74,7 +74,7 @@ def test_another_layout_is_refused_with_a_sentence(
 
 #: A tf2_msgs whose class is as rosidl makes it: its type support is loaded when rclpy asks for it.
 ROSIDLS = """
-from tfcompose.ros.typesupport import own_type
+from tfcompose.tf.ros.typesupport import own_type
 class Metaclass_TFMessage(type):
     _TYPE_SUPPORT = None
     @classmethod
@@ -86,7 +86,7 @@ class TFMessage(metaclass=Metaclass_TFMessage):
 """
 
 READS_FIRST = """
-from tfcompose.ros.node import PublicTFReader, open_node
+from tfcompose.tf.ros.node import PublicTFReader, open_node
 with open_node("one", "/") as node:
     reader = PublicTFReader(node, "/tf", static=False)
     print(type(reader._type).__name__)
@@ -102,7 +102,10 @@ def test_a_reader_may_be_the_first_that_uses_an_installed_tf2_msgs(
     package.mkdir()
     (package / "__init__.py").touch()
     (package / "msg.py").write_text(ROSIDLS)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]))
+    monkeypatch.setenv(
+        "PYTHONPATH",
+        os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]),
+    )
     assert python(READS_FIRST) == "Metaclass_TFMessage\n"
 
 

@@ -44,14 +44,15 @@ _GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
 
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
-#: What the C parser says at its thousandth level (PyYAML 6.0.4). A bracket may begin a key, so it has read ahead: no
-#: farther than to the line's end and 1,024 characters, and it has yielded fewer than ``DEEPEST`` levels.
+#: What the C parser of PyYAML 6.0.4 says at its thousandth level. A bracket may begin a key, so it
+#: has read ahead, up to the line's end or for 1,024 characters, and has yielded fewer levels than
+#: ``DEEPEST``.
 _TOO_DEEP = "exceeded maximum nesting depth"
 _READ_AHEAD = 900  # characters: less than it has read ahead, by more than ``DEEPEST`` levels
 
 
 def parse_events(text: str) -> Iterator[Any]:
-    """Yield the parser's events; of a text that it refuses as too deep, more than ``DEEPEST`` levels first.
+    """Yield the parser's events, more than ``DEEPEST`` levels before it refuses a text for depth.
 
     So a reader that stops there stops at the same place, whichever version of PyYAML there is.
 
@@ -66,10 +67,12 @@ def parse_events(text: str) -> Iterator[Any]:
     except yaml.MarkedYAMLError as error:
         if error.problem != _TOO_DEEP or error.problem_mark is None:
             raise
-        # With a line break there, no bracket before it begins a key, and all of them are given out at once.
+        # With a line break there, no bracket before it begins a key, and all are yielded at once.
         end = error.problem_mark.index - _READ_AHEAD
         try:
-            yield from islice(yaml.parse(f"{text[:end]}\n{text[end:]}", Loader=_LOADER), count, None)
+            yield from islice(
+                yaml.parse(f"{text[:end]}\n{text[end:]}", Loader=_LOADER), count, None
+            )
         except yaml.MarkedYAMLError as other:
             other.problem_mark = error.problem_mark  # without the line break
             raise

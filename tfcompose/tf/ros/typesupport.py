@@ -205,7 +205,7 @@ def tf_message_type() -> Any:
         # There is none with the wheels from PyPI.
         from tf2_msgs.msg import TFMessage  # noqa: PLC0415
 
-        load_type_support: Any = check_for_type_support  # rclpy does not say the types of its arguments
+        load_type_support: Any = check_for_type_support  # rclpy does not say its types
         load_type_support(TFMessage)
         return TFMessage
     return own_type()

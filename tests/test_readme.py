@@ -183,6 +183,7 @@ def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
     assert len(commands) == 2
     assert commands[0].endswith("tfcompose up robots/autonomous_robot.yaml --profile demo")
     assert commands[1].endswith("pytest")
+    assert all("pip install -c constraints.txt -e " in command for command in commands)
 
 
 def test_its_figures_are_those_that_benchmarks_wrote() -> None:

@@ -430,7 +430,7 @@ def test_without_a_launcher_the_guard_loads_also_into_a_container_that_was_start
 STOCK = """
 tfcompose: 1
 robot: rover
-frames: {base_link: {}, laser: {parent: base_link, owner: mount}}
+frames: {base_link: {}, laser: {parent: base_link, owner: mount, static: true}}
 containers: {box: {isolation: isolated}}
 processes:
   mount:

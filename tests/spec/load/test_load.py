@@ -284,6 +284,30 @@ def test_what_is_too_large_for_a_robot_is_refused_no_later_than_the_largest_file
         assert time.process_time() - began < longest, case
 
 
+@for_each(
+    [
+        ("brackets", "a: 1\nb: " + "[" * 2000, ("TF008", 2, 43)),
+        ("braces", "{" * 20_000, ("TF008", 1, 41)),
+        ("after other levels", "x: [1]\ny: {ü: " + "[ ää, " * 300 + "[" * 1500, ("TF008", 2, 236)),
+        ("closed", "- " + "[" * 5000 + "]" * 5000, ("TF008", 1, 42)),
+        ("a string", "b: " + "[" * 100 + '"' + " " * 60 + '", ' + "[" * 1200, ("TF008", 1, 43)),
+        ("no key where one must be", "a: 1\n" + "[" * 2000, ("TF002", 2, 1)),
+    ]
+)
+def test_text_that_is_nested_too_deep_is_refused_at_the_first_level_too_many(
+    case: str, text: str, expected: tuple[str, int, int]
+) -> None:
+    """Versions of PyYAML differ in how far they read ahead, and in how deep they go themselves."""
+    with pytest.raises(RejectedError) as rejected:
+        load(text, "f")
+    places = [
+        (found.code, found.span.line, found.span.column)
+        for found in rejected.value.findings
+        if found.span
+    ]
+    assert places == [expected], case
+
+
 def laid(text: str, *profiles: str) -> Source:
     return composed(load(text, "f"), profiles)
 

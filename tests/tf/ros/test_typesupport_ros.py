@@ -1,5 +1,7 @@
 import gc
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -68,6 +70,43 @@ def test_another_layout_is_refused_with_a_sentence(
     )
     with pytest.raises(RosError, match="Jazzy"):
         typesupport.own_type()
+
+
+#: A tf2_msgs whose class is as rosidl makes it: its type support is loaded when rclpy asks for it.
+ROSIDLS = """
+from tfcompose.tf.ros.typesupport import own_type
+class Metaclass_TFMessage(type):
+    _TYPE_SUPPORT = None
+    @classmethod
+    def __import_type_support__(cls):
+        cls.own = own_type()
+        cls._TYPE_SUPPORT = cls.own.__class__._TYPE_SUPPORT
+class TFMessage(metaclass=Metaclass_TFMessage):
+    pass
+"""
+
+READS_FIRST = """
+from tfcompose.tf.ros.node import PublicTFReader, open_node
+with open_node("one", "/") as node:
+    reader = PublicTFReader(node, "/tf", static=False)
+    print(type(reader._type).__name__)
+    reader.close()
+"""
+
+
+def test_a_reader_may_be_the_first_that_uses_an_installed_tf2_msgs(
+    domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, python: Callable[[str], str]
+) -> None:
+    assert domain
+    package = tmp_path / "tf2_msgs"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "msg.py").write_text(ROSIDLS)
+    monkeypatch.setenv(
+        "PYTHONPATH",
+        os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]),
+    )
+    assert python(READS_FIRST) == "Metaclass_TFMessage\n"
 
 
 SEES = """

@@ -173,6 +173,7 @@ def test_a_client_that_is_destroyed_has_no_server(server: Server) -> None:
         ended.lookup_transform("odom", "laser", Time())
 
 
-def test_without_tf2_msgs_it_says_so() -> None:
+def test_without_tf2_msgs_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "tf2_msgs", None)  # as if it were not installed, where it is
     with pytest.raises(RosError, match="tf2_msgs"):
         client()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -41,7 +42,40 @@ _FORBIDDEN = re.compile("[\0\ud800-\udfff]")
 #: A key that swallowed the beginning of its value: ``mast {parent``, ``mast:{parent``.
 _GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
 
-LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+#: What the C parser of PyYAML 6.0.4 says at its thousandth level. A bracket may begin a key, so it
+#: has read ahead, up to the line's end or for 1,024 characters, and has yielded fewer levels than
+#: ``DEEPEST``.
+_TOO_DEEP = "exceeded maximum nesting depth"
+_READ_AHEAD = 900  # characters: less than it has read ahead, by more than ``DEEPEST`` levels
+
+
+def parse_events(text: str) -> Iterator[Any]:
+    """Yield the parser's events, more than ``DEEPEST`` levels before it refuses a text for depth.
+
+    So a reader that stops there stops at the same place, whichever version of PyYAML there is.
+
+    Raises:
+        yaml.YAMLError: if it is not YAML.
+    """
+    count = 0
+    try:
+        for event in yaml.parse(text, Loader=_LOADER):
+            count += 1
+            yield event
+    except yaml.MarkedYAMLError as error:
+        if error.problem != _TOO_DEEP or error.problem_mark is None:
+            raise
+        # With a line break there, no bracket before it begins a key, and all are yielded at once.
+        end = error.problem_mark.index - _READ_AHEAD
+        try:
+            yield from islice(
+                yaml.parse(f"{text[:end]}\n{text[end:]}", Loader=_LOADER), count, None
+            )
+        except yaml.MarkedYAMLError as other:
+            other.problem_mark = error.problem_mark  # without the line break
+            raise
 
 
 @dataclass(slots=True)
@@ -100,8 +134,7 @@ class Reader:
             RejectedError: where the text stops being YAML, is too deep, or too large.
         """
         try:
-            events: Iterator[Any] = yaml.parse(text, Loader=LOADER)
-            for event in events:
+            for event in parse_events(text):
                 kind = type(event)
                 if kind is ScalarEvent:  # most of them are
                     self._scalar(event)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
-from tfcompose.spec.load.nodes import DEEPEST, LOADER
+from tfcompose.spec.load.nodes import DEEPEST, parse_events
 from tfcompose.spec.load.source import MOST_VALUES, refuse_unreadable
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _refuse_deep(text: str, file: str) -> None:
         yaml.YAMLError: if it is not YAML.
     """
     depth = 0
-    for event in yaml.parse(text, Loader=LOADER):
+    for event in parse_events(text):
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > DEEPEST:

@@ -31,6 +31,7 @@ from hashlib import sha256
 from importlib.util import find_spec
 from typing import Any
 
+from rclpy.type_support import check_for_type_support
 from rclpy.utilities import get_rmw_implementation_identifier
 from rosidl_generator_py import import_type_support
 
@@ -204,6 +205,8 @@ def tf_message_type() -> Any:
         # There is none with the wheels from PyPI.
         from tf2_msgs.msg import TFMessage  # noqa: PLC0415
 
+        load_type_support: Any = check_for_type_support  # rclpy does not say its types
+        load_type_support(TFMessage)
         return TFMessage
     return own_type()
 

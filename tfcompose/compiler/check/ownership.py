@@ -343,8 +343,11 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
         most = _most_hz(process)
         if most is None:
             continue
-        wanted = [(edge.rate or 0.0, f"{edge.name} needs", edge.rate_at or edge.at) for edge in robot.edges
-                  if edge.joint and edge.owner == process.name]  # fmt: skip
+        wanted = [
+            (edge.rate or 0.0, f"{edge.name} needs", edge.rate_at or edge.at)
+            for edge in robot.edges
+            if edge.joint and edge.owner == process.name
+        ]
         if wanted:
             wanted += [
                 (one.simulate.rate, f"{one.name} sends", one.at)

@@ -56,8 +56,14 @@ def _widest(lines: Iterable[str]) -> int:
 def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
     if edge is None:
         return name
-    rest = "  ".join(fact for fact in (pose_text(edge), _switched(edge)) if fact)
-    return f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {_rate(edge):<6}  {rest}".rstrip()
+    columns = (
+        f"{name:<{width}}",
+        f"{edge.kind:<7}",
+        f"{edge.owner:<{owners}}",
+        f"{_rate(edge):<6}",
+    )
+    rest = [fact for fact in (pose_text(edge), _switched(edge)) if fact]
+    return "  ".join([*columns, *rest]).rstrip()
 
 
 def _fitted(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:

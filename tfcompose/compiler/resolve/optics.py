@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 #: Keys of the language that ``Optics`` has under the same name; those that are left out stay as
 #: they are there.
 _KEYS = (
-    "projection", "backward", "horizontal", "vertical", "diagonal", "resolution", "near", "far", "channels",
-    "elevations", "samples", "rate", "shutter", "baseline", "active",
-)  # fmt: skip
+    *("projection", "backward", "horizontal", "vertical", "diagonal", "resolution", "near"),
+    *("far", "channels", "elevations", "samples", "rate", "shutter", "baseline", "active"),
+)
 #: What the streams of a sensor are unless they say it.
 _KINDS: dict[str, OpticsKind] = {
     "camera": "camera",

@@ -80,12 +80,21 @@ class _Mounting:
         joint = own.joint if own else None
         at: Path = ("sensors", self.sensor.name, "frames", name)
         edge = Edge(
-            parent=self.renamed(parent), child=final, kind="dynamic" if kind == "dynamic" else "static", owner=owner,
-            pose=pose, at=self.place(), given=False, sensor=self.sensor.name, nominal=nominal,
-            other_axes=frame.other_axes, pose_known=not missing, joint_name=joint or "",
+            parent=self.renamed(parent),
+            child=final,
+            kind="dynamic" if kind == "dynamic" else "static",
+            owner=owner,
+            pose=pose,
+            at=self.place(),
+            given=False,
+            sensor=self.sensor.name,
+            nominal=nominal,
+            other_axes=frame.other_axes,
+            pose_known=not missing,
+            joint_name=joint or "",
             joint_at=self.drafts.named_joint(joint, at) if joint else None,
             entry=("sensors", self.sensor.name, "frames", name),
-        )  # fmt: skip
+        )
         self.drafts.edges.append(Draft(edge))
 
     def pose_of(

@@ -10,8 +10,8 @@ No Python is run, and of the environment only what ``env`` names is read. The gr
     sum        = product {("+" | "-") product}
     product    = sign {("*" | "/") sign}
     sign       = ["+" | "-"] value
-    value      = NUMBER [UNIT] | NAME | TEXT | "true" | "false" | NAME "(" choice ")" | "(" choice ")"
-               | "env" "(" NAME ["," DEFAULT] ")"
+    value      = NUMBER [UNIT] | NAME | TEXT | "true" | "false" | NAME "(" choice ")"
+               | "(" choice ")" | "env" "(" NAME ["," DEFAULT] ")"
 
 TEXT is in single or double quotes. DEFAULT is a text up to the bracket, as it stands there. The
 items of a loop are a list, or one ``range(sum [, sum])``.

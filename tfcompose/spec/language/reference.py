@@ -32,11 +32,13 @@ _HEAD = {
     "fleet": "The language of fleet files",
 }
 _VALUES = (
-    "A bare number is in SI units and radians; a string may carry a unit: `30 cm`, `15 deg`, `50"
-    " Hz`."
+    "A bare number is in SI units and radians; a string may carry a unit: `30 cm`, `15 deg`,"
+    " `50 Hz`."
 )
-_EXPRESSIONS = """\
-`${…}` computes from `vars`, `args` and the environment; inside `[ ]` and `{ }` it needs quotes: `[0, 0, "${mast}"]`."""
+_EXPRESSIONS = (
+    "`${…}` computes from `vars`, `args` and the environment; inside `[ ]` and `{ }` it needs"
+    ' quotes: `[0, 0, "${mast}"]`.'
+)
 _REQUIRED = "Keys without a default are required."
 
 

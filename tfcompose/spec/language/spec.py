@@ -35,7 +35,10 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path
 
 Pattern = tuple[str, ...]
-"""Where something is in the language: keys, and ``*`` for any name. Items of a list stand where the list does."""
+"""Where something is in the language: keys, and ``*`` for any name.
+
+Items of a list stand where the list does.
+"""
 
 
 class Spec(BaseModel):

@@ -47,10 +47,16 @@ class _Sums:
         """Return both together."""
         spans = [(each.least_ns, each.most_ns) for each in (self, other) if each.delays]
         return _Sums(
-            self.begun_ns, self.gaps + other.gaps, self.gaps_ns + other.gaps_ns, self.squares + other.squares,
-            max(self.longest_ns, other.longest_ns), self.delays + other.delays, self.delays_ns + other.delays_ns,
-            min((low for low, _ in spans), default=0), max((high for _, high in spans), default=0),
-        )  # fmt: skip
+            self.begun_ns,
+            self.gaps + other.gaps,
+            self.gaps_ns + other.gaps_ns,
+            self.squares + other.squares,
+            max(self.longest_ns, other.longest_ns),
+            self.delays + other.delays,
+            self.delays_ns + other.delays_ns,
+            min((low for low, _ in spans), default=0),
+            max((high for _, high in spans), default=0),
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,11 @@ numpy, and the listener needs rclpy. ::
     from tfcompose.tf.tf2 import Buffer, TransformException, TransformListener
 
     buffer = Buffer()
-    buffer.set("base_link", "laser", Pose((0.2, 0.0, 0.3)), 0, static=True)  # or: listener = TransformListener(buffer)
+    # or: listener = TransformListener(buffer)
+    buffer.set("base_link", "laser", Pose((0.2, 0.0, 0.3)), 0, static=True)
     try:
-        pose, stamp_ns = buffer.lookup("base_link", "laser")  # the newest; or lookup_transform for a message
+        # the newest; or lookup_transform for a message
+        pose, stamp_ns = buffer.lookup("base_link", "laser")
     except TransformException as error:
         print(error)  # which edge is missing, or how many milliseconds too early or too late
 

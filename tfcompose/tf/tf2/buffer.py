@@ -81,9 +81,14 @@ class BufferInterface:
         return moved if new_type is None else convert(moved, new_type)
 
     def transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, object_stamped: Any, target_frame: str, target_time: Any, fixed_frame: str, timeout: Any = 0,
+        self,
+        object_stamped: Any,
+        target_frame: str,
+        target_time: Any,
+        fixed_frame: str,
+        timeout: Any = 0,
         new_type: type | None = None,
-    ) -> Any:  # fmt: skip
+    ) -> Any:
         """Return an object in another frame at another time, between which ``fixed_frame`` stands still.
 
         Raises:
@@ -99,35 +104,45 @@ class BufferInterface:
 
     def lookup_transform(
         self,
-        target_frame: str,  # noqa: ARG002
-        source_frame: str,  # noqa: ARG002
-        time: Any,  # noqa: ARG002
-        timeout: Any = 0,  # noqa: ARG002
+        target_frame: str,
+        source_frame: str,
+        time: Any,
+        timeout: Any = 0,
     ) -> Any:
         """Return the pose of the source frame in the target frame: for subclasses to define."""
         raise NotImplementedException
 
     def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,  # noqa: ARG002
-        timeout: Any = 0,  # noqa: ARG002
-    ) -> Any:  # fmt: skip
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        timeout: Any = 0,
+    ) -> Any:
         """Return the pose of the source frame at one time in the target frame at another: for subclasses to define."""
         raise NotImplementedException
 
     def can_transform(
         self,
-        target_frame: str,  # noqa: ARG002
-        source_frame: str,  # noqa: ARG002
-        time: Any,  # noqa: ARG002
-        timeout: Any = 0,  # noqa: ARG002
+        target_frame: str,
+        source_frame: str,
+        time: Any,
+        timeout: Any = 0,
     ) -> Any:
         """Return whether ``lookup_transform`` would answer: for subclasses to define."""
         raise NotImplementedException
 
     def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,  # noqa: ARG002
-        timeout: Any = 0,  # noqa: ARG002
-    ) -> Any:  # fmt: skip
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        timeout: Any = 0,
+    ) -> Any:
         """Return whether ``lookup_transform_full`` would answer: for subclasses to define."""
         raise NotImplementedException
 
@@ -173,7 +188,7 @@ class Buffer(BufferCore, BufferInterface):
         if id(clock) not in self._jumps:
             self._jumps[id(clock)] = (clock, on_clock_jump(node, self.time_jump_callback))
 
-    def time_jump_callback(self, time_jump: object = None) -> None:  # noqa: ARG002 (what rclpy's clock gives)
+    def time_jump_callback(self, time_jump: object = None) -> None:
         """Forget all samples of moving edges, since the clock went back."""
         self.clear()
 
@@ -197,9 +212,14 @@ class Buffer(BufferCore, BufferInterface):
         return transform_stamped(target_frame, source_frame, stamp_ns, pose)
 
     def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
         timeout: Any = 0,
-    ) -> Any:  # fmt: skip
+    ) -> Any:
         """Return the pose of the source frame at one time in the target frame at another.
 
         Between the times ``fixed_frame`` is taken to stand still. The stamp is that of the target.
@@ -212,17 +232,28 @@ class Buffer(BufferCore, BufferInterface):
         return transform_stamped(target_frame, source_frame, stamp_ns, pose)
 
     def can_transform(
-        self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0, return_debug_tuple: bool = False  # noqa: FBT001, FBT002 (tf2's)
-    ) -> Any:  # fmt: skip
+        self,
+        target_frame: str,
+        source_frame: str,
+        time: Any,
+        timeout: Any = 0,
+        return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (tf2's)
+    ) -> Any:
         """Return whether ``lookup_transform`` would answer; with ``return_debug_tuple`` also why not."""
         time_ns = nanoseconds(time)
         error = self._error(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
         return (error is None, str(error or "")) if return_debug_tuple else error is None
 
     def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
-        timeout: Any = 0, return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (the same)
-    ) -> Any:  # fmt: skip
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        timeout: Any = 0,
+        return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (the same)
+    ) -> Any:
         """Return whether ``lookup_transform_full`` would answer; with ``return_debug_tuple`` also why not."""
         times = nanoseconds(target_time), nanoseconds(source_time)
         error = self._error(

@@ -69,9 +69,14 @@ class BufferClient(BufferInterface):
         return self._answer(goal, timeout)
 
     def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
         timeout: Any = 0,
-    ) -> Any:  # fmt: skip
+    ) -> Any:
         """Return the server's pose of the source frame at one time in the target frame at another.
 
         Raises:
@@ -94,9 +99,14 @@ class BufferClient(BufferInterface):
         return True
 
     def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
         timeout: Any = 0,
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         """Return whether ``lookup_transform_full`` would answer."""
         try:
             self.lookup_transform_full(

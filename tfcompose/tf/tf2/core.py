@@ -107,9 +107,15 @@ class BufferCore(PoseBuffer):
     # Velocities.
 
     def lookup_velocity(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any,
-        reference_frame: str = "", reference_point: Sequence[float] = (0.0, 0.0, 0.0), reference_point_frame: str = "",
-    ) -> Velocity:  # fmt: skip
+        self,
+        tracking_frame: str,
+        observation_frame: str,
+        time: Any,
+        averaging_interval: Any,
+        reference_frame: str = "",
+        reference_point: Sequence[float] = (0.0, 0.0, 0.0),
+        reference_point_frame: str = "",
+    ) -> Velocity:
         """Return how fast one frame moves as seen from another: (``linear`` m/s, ``angular`` rad/s).
 
         It is the mean over ``averaging_interval`` around a time (0: up to the newest), as far as
@@ -142,9 +148,15 @@ class BufferCore(PoseBuffer):
         )
 
     def lookupVelocityFullCore(  # noqa: N802, PLR0913, PLR0917 (tf2_py's name and arguments)
-        self, tracking_frame: str, observation_frame: str, reference_frame: str, reference_point: Sequence[float],
-        reference_point_frame: str, time: Any, averaging_interval: Any,
-    ) -> Velocity:  # fmt: skip
+        self,
+        tracking_frame: str,
+        observation_frame: str,
+        reference_frame: str,
+        reference_point: Sequence[float],
+        reference_point_frame: str,
+        time: Any,
+        averaging_interval: Any,
+    ) -> Velocity:
         """Return what ``lookup_velocity`` does; but time 0 is the epoch here, as in tf2, and not the newest."""
         moving = Moving(
             tracking_frame,

@@ -19,6 +19,7 @@ from tests.support.processes import Started
 from tests.support.skips import unexpected
 from tests.support.waiting import TIMEOUT_S
 from tfcompose.foundation.geometry import Pose
+from tfcompose.launcher.program import HERE
 from tfcompose.model.plan import Clock, Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.model.plan.file import write_plan
 from tfcompose.tf.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES, missing_ros
@@ -163,11 +164,11 @@ def nodes(domain: Domain) -> Iterator[Any]:
 
 @pytest.fixture
 def start(domain: Domain) -> Iterator[Callable[..., Started]]:
-    """Start ``python -m MODULE ARGUMENT…`` in the test's domain; what still runs at the test's end is killed."""
+    """Start ``tfcompose WORD…`` in the test's domain; what still runs at the test's end is killed."""
     running: list[Started] = []
 
-    def run(module: str, *arguments: object, **environment: str) -> Started:
-        command = [sys.executable, "-m", module, *map(str, arguments)]
+    def run(*words: object, **environment: str) -> Started:
+        command = [*HERE, *map(str, words)]
         env = {**domain.environment, **environment}
         process = processes.start(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         running.append(Started(process))

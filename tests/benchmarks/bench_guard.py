@@ -20,6 +20,7 @@ import pytest
 
 from tests.benchmarks.results import record
 from tfcompose.foundation.geometry import Pose
+from tfcompose.launcher.program import HERE
 from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.model.plan.file import write_plan
 
@@ -93,9 +94,7 @@ def measure() -> list[tuple[float, float]]:
         file, log = Path(folder, "plan.json"), Path(folder, "said.txt")
         file.write_text(write_plan(plan()), encoding="utf-8")
         with log.open("wb") as out:
-            guard = subprocess.Popen(
-                [sys.executable, "-m", "tfcompose.guard", str(file), "guard"], stdout=out
-            )
+            guard = subprocess.Popen([*HERE, "guard", str(file), "guard"], stdout=out)
         listener, owner = (
             subprocess.Popen([sys.executable, "-c", code]) for code in (LISTENER, OWNER)
         )

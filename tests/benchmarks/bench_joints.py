@@ -24,6 +24,7 @@ import pytest
 
 from tests.benchmarks.results import record
 from tfcompose.foundation.geometry import Pose
+from tfcompose.launcher.program import HERE
 from tfcompose.model.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.model.plan.file import write_plan
 
@@ -94,13 +95,8 @@ def measure(
     from tfcompose.tf.ros.node import open_node  # noqa: PLC0415 (after ROS's variables are set)
 
     with tempfile.TemporaryDirectory() as folder, open_node("bench", "/rover") as node:
-        words = [
-            "-m",
-            "tfcompose.launcher.publishers.joints",
-            str(plan_file(Path(folder), joints)),
-            "joints",
-        ]
-        command = [sys.executable, *(["-c", PLAIN] if plain else words)]
+        words = [*HERE, "joints", str(plan_file(Path(folder), joints)), "joints"]
+        command = [sys.executable, "-c", PLAIN] if plain else words
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         try:
             return _measure(process.pid, _sender(node, joints), seconds)

@@ -349,7 +349,7 @@ def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
     assert not (tmp_path / "build").exists()
     assert str(tmp_path) not in first.stdout
     assert [
-        word in first.stdout for word in ("${python}", "${plan}", "odom → base_link", "20 Hz")
+        word in first.stdout for word in ("${tfcompose}", "${plan}", "odom → base_link", "20 Hz")
     ] == [True] * 4
     tfc("build")
     assert tfc("up", "build/rover/plan.json", "--dry-run").stdout == first.stdout

@@ -78,10 +78,8 @@ def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
     ]
     assert main(["export", "systemd", *words]) == 0
     unit = (robot / "build" / "rover" / "systemd" / "rover-static.service").read_text("utf-8")
-    assert (
-        "/opt/ros/jazzy/setup.bash -- /usr/bin/python3 -m tfcompose.launcher.exec"
-        " /opt/rover/plan.json static\n" in unit
-    )
+    assert '/opt/ros/jazzy/setup.bash -- /usr/bin/python3 -c "import os, sys; ' in unit
+    assert unit.count(" exec /opt/rover/plan.json static\n") == 1
     assert str(robot) not in unit
     assert "PATH" not in unit, "the setup file says it"
 
@@ -99,11 +97,11 @@ def test_units_of_a_declared_host_have_its_python_and_setup_unless_others_are_gi
     unit = robot / "build" / "rover" / "systemd" / "rover-arm_drive.service"
     assert main(["export", "systemd", "two.yaml", "--host", "jetson"]) == 0
     assert "/opt/a.bash /opt/b.bash" in unit.read_text("utf-8")
-    assert "/opt/py -m tfcompose" in unit.read_text("utf-8")
+    assert "/opt/py -c " in unit.read_text("utf-8")
     assert (
         main(["export", "systemd", "two.yaml", "--host", "jetson", "--python", "/usr/bin/py"]) == 0
     )
-    assert "/usr/bin/py -m tfcompose" in unit.read_text("utf-8")
+    assert "/usr/bin/py -c " in unit.read_text("utf-8")
 
 
 def test_a_strict_plan_has_no_launch_file_because_there_is_no_guard_in_it(

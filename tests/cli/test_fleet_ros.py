@@ -27,11 +27,10 @@ def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_off
     start: Callable[..., Any], tmp_path: Path
 ) -> None:
     (tmp_path / "stranger.py").write_text(STRANGER, encoding="utf-8")
-    robot = start("tfcompose", "up", ROBOT)
+    robot = start("up", ROBOT)
     robot.until_says("tree complete: 11 edges")
     assert robot.output.count("tree complete") == 1
     observed = start(
-        "tfcompose",
         "echo",
         "rover1/base_link",
         "rover1/laser_link",
@@ -41,7 +40,6 @@ def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_off
     )
     observed.until_says("xyz        [0.1000, 0.0000, 0.2000] m")
     missing = start(
-        "tfcompose",
         "echo",
         "rover2/base_link",
         "rover2/laser_link",

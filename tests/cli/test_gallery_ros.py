@@ -21,7 +21,6 @@ def test_a_demo_runs_without_hardware(
 ) -> None:
     for _ in range(4):
         up = start(
-            "tfcompose",
             "up",
             ROOT / f"robots/{robot}.yaml",
             "-p",

@@ -32,10 +32,10 @@ def test_two_hosts_start_their_shares_and_each_receives_the_entire_tree(
     file.write_text(
         ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8"
     )
-    main = start("tfcompose", "up", file, "-o", tmp_path / "a")
+    main = start("up", file, "-o", tmp_path / "a")
     main.until_says("expecting arm_drive (/arm_drive)")
     main.until_says("live  drive")
-    jetson = start("tfcompose", "up", file, "--host", "jetson", "-o", tmp_path / "b")
+    jetson = start("up", file, "--host", "jetson", "-o", tmp_path / "b")
     assert until(
         lambda: (
             "tree complete: 3 edges" in main.output and "tree complete: 3 edges" in jetson.output
@@ -94,9 +94,9 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
     )
     text = text.replace("robot: rover", "robot: rover\nros: {discovery: localhost}")
     file.write_text(f"{text}guard: {{mode: strict, fence: {fence}}}\n", "utf-8")
-    main = start("tfcompose", "up", file, "-o", tmp_path / "a")
+    main = start("up", file, "-o", tmp_path / "a")
     main.until_says("live  drive")
-    jetson = start("tfcompose", "up", file, "--host", "jetson", "-o", tmp_path / "b")
+    jetson = start("up", file, "--host", "jetson", "-o", tmp_path / "b")
     assert until(
         lambda: (
             "tree complete: 3 edges" in main.output and "tree complete: 3 edges" in jetson.output
@@ -123,10 +123,10 @@ def test_a_share_that_is_live_on_another_machine_is_refused(
     file.write_text(
         ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8"
     )
-    assert start("tfcompose", "build", file, "-o", tmp_path / "a").process.wait(60) == 0
-    elsewhere = start("tfcompose.launcher.exec", tmp_path / "a" / "plan.json", "drive")
+    assert start("build", file, "-o", tmp_path / "a").process.wait(60) == 0
+    elsewhere = start("exec", tmp_path / "a" / "plan.json", "drive")
     elsewhere.until_says("simulated at")
-    up = start("tfcompose", "up", file, "-o", tmp_path / "b", "--settle", 10)
+    up = start("up", file, "-o", tmp_path / "b", "--settle", 10)
     assert up.process.wait(60) == 1
     up.until_says("ended with exit code 1")
     (found,) = [line for line in up.output.splitlines() if "error[TF807]" in line]

@@ -90,7 +90,7 @@ def test_the_tree_is_complete_everybody_publishes_their_own_and_the_description_
     (tmp_path / "mesh.stl").write_text("solid\nendsolid\n")
     path = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
     monkeypatch.chdir(tmp_path)
-    up = start("tfcompose", "up", AMENT_PREFIX_PATH=str(tmp_path / "prefix"), PYTHONPATH=path)
+    up = start("up", AMENT_PREFIX_PATH=str(tmp_path / "prefix"), PYTHONPATH=path)
     up.until_says("tree complete")  # so everybody publishes
     heard, nodes = description()
     code = up.end()

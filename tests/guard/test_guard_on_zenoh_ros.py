@@ -78,7 +78,6 @@ def test_a_live_guard_names_owners_and_strangers_on_zenoh(
     slam = peer("/robot1/slam", "map", "odom")
     peer("/drive", "odom", "base_link")
     robot = start(
-        "tfcompose",
         "up",
         tmp_path / "robot.yaml",
         "--no-live",

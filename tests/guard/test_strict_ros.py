@@ -323,7 +323,7 @@ def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_la
     (tmp_path / "robot.yaml").write_text(
         LISTENING.format(python=sys.executable, file=tmp_path / "ear.py"), encoding="utf-8"
     )
-    up = start("tfcompose", "up", tmp_path / "robot.yaml")
+    up = start("up", tmp_path / "robot.yaml")
     with open_node("outside", "/test") as node:
         fixed, moving = TFPublisher(node, static=True), TFPublisher(node, static=False)
         fixed.publish(one("odom", "dock"))
@@ -341,7 +341,7 @@ def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_la
         assert until(lambda: heard_by(up).keys() >= full), up.output
         assert heard_by(up)["dock_2"] <= sent
         assert heard_by(up)["ear"] == 1, "its own came back to it"
-        start("tfcompose", "restart", "ear__").process.wait(60)
+        start("restart", "ear__").process.wait(60)
         assert until(lambda: heard_by(up).keys() >= full), up.output
         assert heard_by(up)["ear"] == 1
         known = {"/tfcompose_guard", "/test/outside"}

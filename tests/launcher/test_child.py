@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from tests.support.waiting import TIMEOUT_S
 from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Command, Lines, Pipe, spawn
 from tfcompose.launcher.children import Reaper
+from tfcompose.launcher.program import HERE
 from tfcompose.launcher.supervisor import Signals
 
 
@@ -107,13 +108,7 @@ def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
 def test_an_own_process_that_is_ordered_to_end_while_it_starts_ends_by_its_own_rules(
     number: int, seconds: float, tmp_path: Path
 ) -> None:
-    argv = (
-        sys.executable,
-        "-m",
-        "tfcompose.launcher.publishers.static",
-        str(tmp_path / "plan.json"),
-        "static",
-    )
+    argv = (*HERE, "static", str(tmp_path / "plan.json"), "static")
     popen = spawn(Command(argv, dict(os.environ), tmp_path, own=True), ())
     time.sleep(seconds)
     popen.send_signal(number)

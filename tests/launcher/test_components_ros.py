@@ -23,6 +23,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.foundation.findings import Finding
+from tfcompose.launcher.program import HERE
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import (
     AllReady,
@@ -415,7 +416,7 @@ def test_without_a_launcher_the_guard_loads_also_into_a_container_that_was_start
     file.write_text(write_plan(plan_of(compiled.robot)))
 
     def started(name: str) -> Any:
-        return processes.start([sys.executable, "-m", "tfcompose.launcher.exec", str(file), name])
+        return processes.start([*HERE, "exec", str(file), name])
 
     started("guard")
     for count in (2, 4):

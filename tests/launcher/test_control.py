@@ -1,5 +1,6 @@
 """The control socket: whatever is asked for, the robot goes on."""
 
+import io
 import json
 import os
 from collections.abc import Iterator
@@ -99,7 +100,9 @@ def plan_file(folder: Path, kind: str) -> str:
     )
 
 
-@pytest.mark.parametrize("kind", ["device", "NUL", "nothing", "pipe", "folder", "large", "bytes"])
+@pytest.mark.parametrize(
+    "kind", ["device", "NUL", "nothing", "pipe", "folder", "large", "bytes", "blocks"]
+)
 def test_a_plan_that_cannot_be_read_is_refused_at_once(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,3 +113,23 @@ def test_a_plan_that_cannot_be_read_is_refused_at_once(
     )
     assert isinstance(refused, Refusal)
     assert (event, commands) == (None, None)
+
+
+class _Waiting(io.BytesIO):
+    """A file whose reader would wait, as that of /proc/kmsg: reading it gives nothing."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        assert size == 0, "no more is read than the file's size"
+        return None  # type: ignore[return-value]
+
+
+def test_a_plan_whose_reader_would_wait_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "plan.json").touch()
+    monkeypatch.setattr(os, "fdopen", lambda *_: _Waiting())
+    request = UpdateRequest(str(tmp_path / "plan.json"), str(tmp_path))
+    refused, *_ = answer(
+        request, initial(PLAN), tmp_path / "old.json", {}, lambda base, *_, **__: dict(base)
+    )
+    assert isinstance(refused, Refusal)

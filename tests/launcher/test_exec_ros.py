@@ -12,6 +12,7 @@ from tests.support import processes
 from tests.support.processes import Started
 from tests.support.robots import ROVER
 from tests.support.waiting import until
+from tfcompose.launcher.program import anywhere
 
 pytestmark = pytest.mark.ros
 
@@ -41,18 +42,18 @@ def units(domain: object, tmp_path: Path) -> Path:
     return tmp_path / "systemd"
 
 
-def module_of(unit: Path) -> list[str]:
-    """Return what follows ``python -m`` in the unit's command."""
+def arguments_of(unit: Path) -> list[str]:
+    """Return what follows the program in the unit's command."""
     (line,) = re.findall(r"^ExecStart=(.*)$", unit.read_text("utf-8"), re.MULTILINE)
     words = shlex.split(line)
-    assert words[:2] == [sys.executable, "-m"]
-    return words[2:]
+    assert words[:3] == anywhere(sys.executable)
+    return words[3:]
 
 
 def test_a_foreign_process_is_its_own_supervised_process_with_the_plans_environment(
     units: Path, start: Callable[..., Started]
 ) -> None:
-    hello = start(*module_of(units / "rover-hello.service"))
+    hello = start(*arguments_of(units / "rover-hello.service"))
     assert until(lambda: "good day" in hello.output)
     assert until(
         lambda: Path(f"/proc/{hello.process.pid}/exe").readlink() != Path(sys.executable).resolve()
@@ -73,7 +74,7 @@ def test_what_cannot_be_started_is_reported(
         .replace('["sh", ', '["no-such-program", ')
     )
     plan.write_text(text, "utf-8")
-    one = start("tfcompose.launcher.exec", plan, name)
+    one = start("exec", plan, name)
     assert one.process.wait(60) == code
     assert until(lambda: shown in "".join(one.errors)), one.errors
     assert "Traceback" not in "".join(one.errors)

@@ -41,8 +41,8 @@ import resource, sys
 from pathlib import Path
 from tfcompose.cli.console import Console
 from tfcompose.model.plan.file import read_plan
-from tfcompose.launcher.control import listen
 from tfcompose.launcher.output import Logs
+from tfcompose.launcher.run_files import RunFiles
 from tfcompose.launcher.output import NonBlockingOutput
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
 from tfcompose.launcher.supervisor import Session, supervise
@@ -53,7 +53,7 @@ place = RuntimeDir(sys.argv[2], file.parent / "place", file.parent / "log")
 lock = Lock(place)
 plan = read_plan(file.read_text(), str(file))
 output, logs = NonBlockingOutput(1), Logs(place.logs)
-session = Session(file, lock.run, None, listen(place), output)
+session = Session(file, RunFiles(place, lock, file), None, output)
 code = supervise(plan, file, report=Console(plan, output, colour=False, keep=logs.write), session=session)
 output.close()
 sys.exit(code)
@@ -67,7 +67,7 @@ time.time = lambda: right() - 3600 * os.path.exists("back")
 #: The robot of this run of the tests alone: what it leaves behind is ended, and what others run is
 #: not.
 NAME = f"rover{os.getpid()}@0"
-PYTHON = ("${python}", "-I", "-S", "-c")
+PYTHON = (sys.executable, "-I", "-S", "-c")
 SLEEPER = (
     "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True);"
     " time.sleep(180)"

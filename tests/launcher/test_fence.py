@@ -19,6 +19,7 @@ from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.preflight import LAUNCH, commands_of
 from tfcompose.model.plan import (
+    PROGRAM,
     FenceWay,
     GuardPolicy,
     Plan,
@@ -255,7 +256,7 @@ def test_an_owner_whose_command_names_a_profile_by_itself_is_not_started(
 
 
 def test_another_rmw_is_fenced_off_by_remapping(tmp_path: Path) -> None:
-    static = PlanProcess("static", "static", argv=("${python}", "-m", "x", "${plan}", "static"))
+    static = PlanProcess("static", "static", argv=(PROGRAM, "static", "${plan}", "static"))
     commands, found = inspect(
         tmp_path, SLAM, static, GUARD, RMW_IMPLEMENTATION="rmw_cyclonedds_cpp"
     )

@@ -13,6 +13,7 @@ from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.model.plan import (
+    PROGRAM,
     LifecycleState,
     Plan,
     PlanEdge,
@@ -54,9 +55,7 @@ try:
 except BaseException:
     pass
 """
-GUARD = PlanProcess(
-    "guard", "guard", ("${python}", "-m", "tfcompose.guard", "${plan}", "guard"), nodes=("/guard",)
-)
+GUARD = PlanProcess("guard", "guard", (PROGRAM, "guard", "${plan}", "guard"), nodes=("/guard",))
 
 
 def node(
@@ -79,7 +78,7 @@ def script(name: str, text: str, ready: Ready | None, **more: Any) -> PlanProces
 
 def simulated(ready: Ready) -> PlanProcess:
     """Return the owner of odom → base_link, which stands still there."""
-    argv = ("${python}", "-m", "tfcompose.launcher.publishers.simulate", "${plan}", "drive")
+    argv = (PROGRAM, "simulate", "${plan}", "drive")
     owns = (("odom", "base_link"),)
     still = Simulation("fixed", 20.0, pose=Pose())
     return PlanProcess(

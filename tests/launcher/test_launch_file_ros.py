@@ -85,7 +85,7 @@ def test_its_nodes_have_the_plans_namespace_remappings_clock_and_arguments_and_e
         filter(None, (str(package / "ws"), os.environ.get("AMENT_PREFIX_PATH")))
     )
     words = ("up", package / "robot.yaml", "-o", package / "build")
-    up = start("tfcompose", *words, AMENT_PREFIX_PATH=paths)
+    up = start(*words, AMENT_PREFIX_PATH=paths)
     for output in (
         "I am /rover/a /rover/loud True 2.5",
         "I am /rover/b /rover/loud True 0.0",

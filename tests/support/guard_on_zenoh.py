@@ -12,7 +12,7 @@ from pathlib import Path
 #: Read by each Python that starts.
 _SITE = """
 import sys
-if "tfcompose.guard" in sys.orig_argv:
+if "guard" in sys.orig_argv:
     import atexit
     import os
     import tfcompose.tf.ros.graph as graph

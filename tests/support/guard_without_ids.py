@@ -7,7 +7,7 @@ from pathlib import Path
 #: Read by each Python that starts.
 _SITE = """
 import sys
-if "tfcompose.guard" in sys.orig_argv:
+if "guard" in sys.orig_argv:
     import dataclasses
     import tfcompose.tf.ros.graph as graph
     gid_of = graph.gid_of

@@ -17,7 +17,7 @@ from tfcompose.model.messages import GUARD_EVENTS
 from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.model.plan.file import write_plan
 
-PYTHON = ("${python}", "-I", "-S", "-c")
+PYTHON = (sys.executable, "-I", "-S", "-c")
 SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(180)"
 #: What tfcompose's own processes do once they handle signals: until then these are blocked.
 LISTEN = "import signal; signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())"

@@ -21,7 +21,7 @@ def never(own: Own, _: Stop) -> None:
 
 def test_wrong_arguments_end_with_code_2_and_the_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert start(["plan.json"], "static", never) == 2
-    assert "usage: python -m tfcompose.launcher.publishers.static " in _last_error(capsys)
+    assert "usage: tfcompose static " in _last_error(capsys)
 
 
 def test_a_missing_plan_ends_with_code_2_and_its_name(capsys: pytest.CaptureFixture[str]) -> None:

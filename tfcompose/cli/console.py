@@ -17,6 +17,7 @@ from tfcompose.model.messages import (
     AllReady,
     AllStarted,
     Ended,
+    FilesRestored,
     FindingShown,
     LogLine,
     OwnerLive,
@@ -254,6 +255,13 @@ class Console:
     @_write.register
     def _(self, notice: RecoveredShown) -> None:
         self._say(f"{self._paint('over', GREEN)}  {notice.text}")
+
+    @_write.register
+    def _(self, notice: FilesRestored) -> None:
+        text = f"the files of this run were removed, and are in {notice.folder} again"
+        if notice.why:
+            text = f"the files of this run were removed, and cannot be written again: {notice.why}"
+        self._say(self._paint(text, YELLOW))
 
     @_write.register
     def _(self, notice: Stopping) -> None:

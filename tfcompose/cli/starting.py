@@ -43,10 +43,16 @@ from tfcompose.cli.terminal import (
 )
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.launcher.child import end_with
-from tfcompose.launcher.control import listen
 from tfcompose.launcher.output import Logs, NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of
-from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
+from tfcompose.launcher.run_files import RunFiles
+from tfcompose.launcher.runtime_dir import (
+    Lock,
+    RuntimeDirError,
+    goes_with_logout,
+    runtime_dir_of,
+    user_name,
+)
 from tfcompose.launcher.supervisor import ENDING, Session, supervise
 from tfcompose.model.messages import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
 from tfcompose.tf.ros.environment import (
@@ -90,7 +96,7 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
         if hidden := hidden_run(place):
             fail(hidden)
         copy = copy_plan(plan, file, place, alone=True)
-        session = Session(copy, lock.run, file.absolute().parent, listen(place))
+        session = Session(copy, RunFiles(place, lock, copy), file.absolute().parent)
         warnings = warnings_before_start(place, plan, session.run_id)
         for one in warnings:
             warn(one)
@@ -224,6 +230,12 @@ def _detach(
     plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace
 ) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
+    if goes_with_logout(place):
+        user = user_name()
+        warn(
+            f"{user} does not linger: a logout removes {place.folder}, and may end the robot; to"
+            f" keep them: loginctl enable-linger {user}"
+        )
     pid = _fork(plan, place, lock, session, arguments.duration)
     return _follow(plan, place, pid, arguments)
 
@@ -259,8 +271,8 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
         finally:
             sys.stderr.flush()
             os._exit(code)
-    if session.listener:
-        session.listener.close()
+    if session.files:
+        session.files.listener.close()
     return pid
 
 

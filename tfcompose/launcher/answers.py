@@ -150,17 +150,23 @@ def _update(
 def _plain_file(file: Path) -> bytes:
     """Return what a plain file holds; a pipe or a device is not waited for.
 
+    No more is read than the file's size: the kernel's own files, such as ``/proc/kmsg``, which a
+    reader waits for, have none.
+
     Raises:
         OSError: if it is none, or is too large.
         ValueError: if its name holds NUL.
     """
     descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(descriptor, "rb") as stream:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode):
             raise OSError("it is not a plain file")
-        data = stream.read(MOST_PLAN_BYTES + 1)
-    if len(data) > MOST_PLAN_BYTES:
-        raise OSError(f"it is larger than {MOST_PLAN_BYTES:,} bytes")
+        if found.st_size > MOST_PLAN_BYTES:
+            raise OSError(f"it is larger than {MOST_PLAN_BYTES:,} bytes")
+        data = stream.read(found.st_size)
+    if data is None:
+        raise BlockingIOError("reading it would wait")
     return data
 
 

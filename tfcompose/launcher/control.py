@@ -152,6 +152,13 @@ class Control:
         for client in [client for client in self._clients if client.listens]:
             self._send(client, line)
 
+    def listen(self, listener: socket.socket) -> None:
+        """Take requests at another socket from now on; clients that are connected stay."""
+        self._selector.unregister(self._listener)
+        self._listener.close()
+        self._listener = listener
+        self._selector.register(listener, selectors.EVENT_READ, self._accept)
+
     def close(self) -> None:
         """Send what is left, and leave."""
         for client in list(self._clients):

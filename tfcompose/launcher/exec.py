@@ -1,4 +1,4 @@
-"""One process of a plan, started as ``tfcompose up`` starts it: ``python -m tfcompose.launcher.exec PLAN_FILE NAME``.
+"""One process of a plan, started as ``tfcompose up`` starts it: ``tfcompose exec PLAN_FILE NAME``.
 
 This program becomes the process, so that whoever supervises it (systemd, a container) supervises
 that one. Exit codes: 1 something that it needs is missing, 2 the arguments or the plan are not
@@ -32,7 +32,7 @@ _ARGUMENTS = 2
 def command_of(argv: Sequence[str], base: Mapping[str, str]) -> Command | int:
     """Return what is executed, or an exit code after saying why nothing is."""
     if len(argv) != _ARGUMENTS:
-        return _fail("usage: python -m tfcompose.launcher.exec PLAN_FILE NAME", 2)
+        return _fail("usage: tfcompose exec PLAN_FILE NAME", 2)
     file, name = Path(argv[0]), argv[1]
     try:
         plan = read_plan(file.read_text("utf-8"), str(file))
@@ -86,7 +86,3 @@ def _text(found: Finding) -> str:
 def _fail(what: str, code: int) -> int:
     sys.stderr.write(f"{what}\n")
     return code
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -151,8 +151,11 @@ class Notifier:
         self._control: Control | None = None
 
     def listen(self, listener: socket, answer: Callable[[Request], object]) -> None:
-        """Take requests of other commands at the control socket."""
-        self._control = Control(listener, self._selector, answer)
+        """Take requests of other commands at the control socket, in place of the one before."""
+        if self._control:
+            self._control.listen(listener)
+        else:
+            self._control = Control(listener, self._selector, answer)
 
     def close(self) -> None:
         """Let all go who listen."""

@@ -13,7 +13,6 @@ import json
 import os
 import re
 import shutil
-import sys
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -22,7 +21,9 @@ from typing import TYPE_CHECKING, Protocol
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
+from tfcompose.launcher.program import HERE, without_current_folder
 from tfcompose.launcher.schedule import refused_schedule
+from tfcompose.model.plan import PROGRAM
 from tfcompose.model.plan.components import load_request
 from tfcompose.model.plan.fleet import missing_zenoh
 from tfcompose.model.variables import REMAPPED
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
     from tfcompose.model.plan import Plan, PlanProcess, RosSettings
 
-_PLACEHOLDER = re.compile(r"\$\{(python|plan|build_dir|params_file)\}")
+_PLACEHOLDER = re.compile(r"\$\{(plan|build_dir|params_file)\}")
 _ROS_EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
 _LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
 _OUTPUT = "OVERRIDE_LAUNCH_PROCESS_OUTPUT"
@@ -112,6 +113,8 @@ def _command_of(
         return trouble
     own = process.kind != "run"
     env = environment(base, ros, own=own) | own_env(process, *files)
+    if process.argv[:1] == (PROGRAM,):
+        env = without_current_folder(env)
     argv = filled_in(process, *files)
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
@@ -224,7 +227,9 @@ def filled_in(
     process: PlanProcess, plan_file: Path, build_dir: Path | None = None
 ) -> tuple[str, ...]:
     """Return the process's ``argv`` with the placeholders replaced; both paths are absolute."""
-    return tuple(_filled(word, process, plan_file, build_dir) for word in process.argv)
+    is_ours = process.argv[:1] == (PROGRAM,)
+    start, words = (HERE, process.argv[1:]) if is_ours else ((), process.argv)
+    return (*start, *(_filled(word, process, plan_file, build_dir) for word in words))
 
 
 def own_env(
@@ -240,7 +245,6 @@ def _filled(
     text: str, process: PlanProcess, plan_file: Path, build_dir: Path | None = None
 ) -> str:
     values = {
-        "python": sys.executable,
         "plan": str(plan_file),
         "build_dir": str(build_dir or plan_file.parent),
     }

@@ -8,13 +8,15 @@ ROS_HOME/log, else ~/.ros/log), in ``tfcompose/ROBOT@DOMAIN``.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
+import pwd
 import stat
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 #: Where systemd makes a folder for each user who is logged in, also for services and cron, which
 #: lack the variable.
 USERS = Path("/run/user")
+#: What logind knows of users who are logged in, and of those whose folder stays after they leave.
+LOGGED_IN, LINGERING = Path("/run/systemd/users"), Path("/var/lib/systemd/linger")
 #: How the folder of a plan's copy begins.
 _PLAN = "plan-"
 
@@ -99,24 +103,43 @@ class Lock:
     def __init__(self, directory: RuntimeDir) -> None:
         """Take the lock, or raise BlockingIOError."""
         directory.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        self.fd = os.open(directory.folder / "lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
-        try:
-            _take(self.fd)
-        except BaseException:
-            os.close(self.fd)
-            raise
+        self.fd = _open_lock(directory)
         self.run = f"{directory.name}:{os.urandom(6).hex()}"
         self.sign()
 
     def sign(self) -> None:
-        """Write down who holds it: this process."""
-        text = json.dumps(encode(Holder(os.getpid(), time.time(), self.run)))
-        os.ftruncate(self.fd, 0)
-        os.pwrite(self.fd, text.encode(), 0)
+        """Write down who holds it: this process, since now."""
+        self._holder = Holder(os.getpid(), time.time(), self.run)
+        self._write_holder()
+
+    def renew(self, directory: RuntimeDir) -> None:
+        """Hold the lock of that directory instead, for the same run.
+
+        Raises:
+            OSError: if it cannot be made; BlockingIOError if another process holds it.
+        """
+        before, self.fd = self.fd, _open_lock(directory)
+        os.close(before)
+        self._write_holder()
 
     def close(self) -> None:
         """Give it back."""
         os.close(self.fd)
+
+    def _write_holder(self) -> None:
+        os.ftruncate(self.fd, 0)
+        os.pwrite(self.fd, json.dumps(encode(self._holder)).encode(), 0)
+
+
+def _open_lock(directory: RuntimeDir) -> int:
+    """Return the descriptor of the lock, once this process holds it."""
+    descriptor = os.open(directory.folder / "lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+    try:
+        _take(descriptor)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
 
 
 def _is_held(descriptor: int) -> bool:
@@ -197,7 +220,7 @@ def _runtime_folder(env: Mapping[str, str]) -> Path:
     if given.startswith("/") and _is_ours(Path(given)):
         folder = Path(given) / "tfcompose"
     else:
-        folder = Path(tempfile.gettempdir()) / f"tfcompose-{os.getuid()}"
+        folder = _temporary_folder()
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
     except OSError as error:
@@ -207,6 +230,54 @@ def _runtime_folder(env: Mapping[str, str]) -> Path:
             f"{folder} is not a folder that only this user can open; set XDG_RUNTIME_DIR to one"
         )
     return folder
+
+
+def _temporary_folder() -> Path:
+    """Return the folder of runs where there is no runtime directory of the user's."""
+    return Path(tempfile.gettempdir()) / f"tfcompose-{os.getuid()}"
+
+
+def substitute_of(directory: RuntimeDir) -> RuntimeDir:
+    """Return the same robot's directory where commands look while the user's folder is gone.
+
+    Raises:
+        OSError: if the folder for it is not one that only this user can open.
+    """
+    folder = _temporary_folder()
+    make_private(folder)
+    if not _is_ours(folder):
+        raise PermissionError(errno.EPERM, "another user can open it", str(folder))
+    return replace(directory, folder=folder / directory.name)
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder, and those above it, for this user alone; but not what the system makes for users.
+
+    Raises:
+        OSError: if it cannot be made.
+    """
+    for missing in reversed([one for one in (folder, *folder.parents) if not one.exists()]):
+        if missing.parent == USERS:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(missing))
+        missing.mkdir(mode=0o700, exist_ok=True)
+
+
+def goes_with_logout(directory: RuntimeDir) -> bool:
+    """Return whether logind removes the directory when the user's last session ends."""
+    number = str(os.getuid())
+    return (
+        directory.folder.is_relative_to(USERS / number)
+        and (LOGGED_IN / number).exists()
+        and not (LINGERING / user_name()).exists()
+    )
+
+
+def user_name() -> str:
+    """Return this user's name; its number where there is none."""
+    try:
+        return pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return str(os.getuid())
 
 
 def _is_ours(folder: Path) -> bool:

@@ -17,11 +17,12 @@ import time
 from collections import deque
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, final
 
 from tfcompose.foundation.findings import Note
 from tfcompose.foundation.signals import take_interrupt
-from tfcompose.launcher.answers import answer
+from tfcompose.launcher.answers import answer as answer_to
 from tfcompose.launcher.child import subreaper
 from tfcompose.launcher.children import Children, GuardPipes
 from tfcompose.launcher.components import writer_of
@@ -45,29 +46,38 @@ from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.output import Notifier
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.state import initial
-from tfcompose.model.messages import Ended, FindingShown, Load, NotLoaded, Unload
+from tfcompose.model.messages import (
+    Ended,
+    FilesRestored,
+    FindingShown,
+    Load,
+    NotLoaded,
+    Unload,
+    UpdateRequest,
+)
 from tfcompose.model.plan.codec import encode
 from tfcompose.model.plan.components import load_file
 from tfcompose.tf.ros.environment import child_environment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
-    from socket import socket
     from types import FrameType, TracebackType
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.launcher.answers import Answer, Outcome
+    from tfcompose.launcher.answers import Answer
     from tfcompose.launcher.child import Command
     from tfcompose.launcher.events import Action, Event
     from tfcompose.launcher.output import NonBlockingOutput
     from tfcompose.launcher.preflight import Environment
+    from tfcompose.launcher.run_files import RunFiles
     from tfcompose.launcher.state import State, Times
     from tfcompose.model.messages import Notice, Request
     from tfcompose.model.plan import Plan
 
 #: The loop checks its children at least this often, whatever signals say; seconds.
 LONGEST_SLEEP_S = 1.0
+#: It checks this often whether the run's files are there; seconds.
+FILES_CHECK_S = 0.5
 #: What ends a plan.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -77,19 +87,31 @@ _PREPARED = ("static", "joints", "simulate")
 
 @dataclass(slots=True)
 class Session:
-    """The plan's file, the run's id, the control socket, and an output that does not wait.
+    """The plan's file, the run's files, and an output that does not wait.
 
-    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With an id,
+    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With files,
     what the run's processes leave behind is ended with it, also what left their groups.
     ``refresh`` is called now and then.
     """
 
     plan_file: Path
-    run_id: str = ""
+    files: RunFiles | None = None
     base: Path | None = None
-    listener: socket | None = None
     output: NonBlockingOutput | None = None
     refresh: Callable[[], None] | None = None
+
+    @property
+    def run_id(self) -> str:
+        """The run's id; empty without files."""
+        return self.files.run_id if self.files else ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What commands are made with: the launcher's environment, and what makes a process's of it."""
+
+    base: Mapping[str, str]
+    environment: Environment
 
 
 def supervise(  # noqa: PLR0913 (all but two are named, and most have what a user wants as default)
@@ -121,9 +143,9 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
         report(Ended(1))
         return 1
     with contextlib.ExitStack() as stack:
-        decide = partial(answer, base=base, environment=environment)
+        known = _Known(base, environment)
         supervisor = _Supervisor(
-            state, commands, report, session or Session(plan_file), decide, stack
+            state, commands, report, session or Session(plan_file), known, stack
         )
         return supervisor.run(duration_s)
 
@@ -135,7 +157,7 @@ class _Supervisor:
         commands: dict[str, Command],
         report: Callable[[Notice], None],
         session: Session,
-        decide: Callable[..., Outcome],
+        known: _Known,
         stack: contextlib.ExitStack,
     ) -> None:
         self._state = state
@@ -144,17 +166,19 @@ class _Supervisor:
         self._exit_code: int | None = None
         self._due: float | None = None
         self._check_at = 0.0
-        self._loads: dict[str, Path] = {}
+        self._files_at = 0.0
+        self._loads: dict[str, tuple[Path, str]] = {}
         selector = stack.enter_context(selectors.DefaultSelector())
         self._selector = selector
         self._signals = stack.enter_context(Signals())
         selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
         self._session = session
-        self._decide = decide
+        self._known = known
+        self._lost_files = ""
         lost = partial(self._events.append, OutputLost())
         self._notifier = Notifier(selector, report, lost, session.output, session.refresh)
-        if session.listener:
-            self._notifier.listen(session.listener, self._answer)
+        if session.files:
+            self._notifier.listen(session.files.listener, self._answer)
         self._notify = self._notifier.notify
         stack.callback(self._notifier.close)
         if session.run_id:
@@ -180,6 +204,9 @@ class _Supervisor:
             if is_due:
                 self._children.find_strays()
                 self._check_at = time.monotonic() + LONGEST_SLEEP_S
+            if time.monotonic() >= self._files_at:
+                self._restore_files()
+                self._files_at = time.monotonic() + FILES_CHECK_S
             if end is not None and time.monotonic() >= end:
                 self._handle(TimeUp())
             elif self._events or (self._due or math.inf) <= time.monotonic():
@@ -197,10 +224,20 @@ class _Supervisor:
             self._children.prepare(process, self._commands[process.name])
 
     def _answer(self, request: Request) -> Answer:
-        answer, event, planned = self._decide(request, self._state, self._session.plan_file)
+        answer, event, planned = answer_to(
+            request,
+            self._state,
+            self._session.plan_file,
+            self._known.base,
+            self._known.environment,
+        )
         if planned:
             self._children.dismiss()
             self._session.plan_file, self._commands = planned
+            if self._session.files:
+                self._session.files.keep(self._session.plan_file)
+            if isinstance(request, UpdateRequest):
+                self._session.base = Path(request.base)
         if event:
             self._handle(event)
         return answer
@@ -214,6 +251,7 @@ class _Supervisor:
 
     def _sleep_s(self, end: float | None) -> float:
         due = [at for at in (self._due, end) if at is not None]
+        due += [self._files_at] if self._session.files else []
         return min(LONGEST_SLEEP_S, max(0.0, min(due, default=float("inf")) - time.monotonic()))
 
     def _handle(self, event: Event) -> None:
@@ -235,7 +273,7 @@ class _Supervisor:
             case LoadComponent(name, number, again):
                 self._load(name, number, again=again)
             case UnloadComponent(name, number):
-                self._children.order(Unload(name, number, str(self._loads[name])))
+                self._unload(name, number)
             case Notify(notice):
                 self._notify(notice)
             case Order(order):
@@ -247,7 +285,36 @@ class _Supervisor:
             case _:
                 pass
 
+    def _restore_files(self) -> None:
+        """Put back what was removed of the run's files; a process that starts reads the plan."""
+        session = self._session
+        if session.files is None:
+            return
+        try:
+            if not session.files.restore():
+                return
+        except OSError as error:
+            why = str(error)
+            if why != self._lost_files:
+                self._notify(FilesRestored("", why))
+            self._lost_files = why
+            return
+        self._lost_files = ""
+        self._notifier.listen(session.files.listener, self._answer)
+        if session.plan_file != session.files.plan_file:
+            session.plan_file = session.files.plan_file
+            self._commands, _ = commands_of(
+                self._state.plan,
+                self._state.plan.managed,
+                session.plan_file,
+                self._known.base,
+                self._known.environment,
+                session.base,
+            )
+        self._notify(FilesRestored(str(session.files.folder)))
+
     def _start(self, name: str) -> None:
+        self._restore_files()
         state = self._state
         guard = None
         try:
@@ -262,15 +329,28 @@ class _Supervisor:
 
     def _load(self, name: str, number: int, *, again: bool) -> None:
         """Write what the container is asked beside the plan, and have the guard ask it."""
-        request = self._commands[name].load
-        file = self._loads[name] = load_file(self._session.plan_file.parent, name)
+        text = json.dumps(encode(self._commands[name].load), ensure_ascii=False)
         try:
-            file.parent.mkdir(exist_ok=True)
-            file.write_text(json.dumps(encode(request), ensure_ascii=False), encoding="utf-8")
+            file = self._write_request(name, text)
         except OSError as error:
             self._events.append(NotLoaded(name, number, str(error)))
         else:
             self._children.order(Load(name, number, str(file), again))
+
+    def _unload(self, name: str, number: int) -> None:
+        file, text = self._loads[name]
+        if not file.is_file():
+            with contextlib.suppress(OSError):  # the guard says that it cannot read it
+                file = self._write_request(name, text)
+        self._children.order(Unload(name, number, str(file)))
+
+    def _write_request(self, name: str, text: str) -> Path:
+        self._restore_files()
+        file = load_file(self._session.plan_file.parent, name)
+        self._loads[name] = file, text
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+        return file
 
     def _writer(self, process: str, line: str) -> str:
         return writer_of(self._state, process, line)

@@ -347,6 +347,14 @@ class RecoveredShown:
 
 
 @dataclass(frozen=True, slots=True)
+class FilesRestored:
+    """The files of the run were removed; they are in ``folder`` again, or nowhere, for the reason ``why``."""
+
+    folder: str
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Stopping:
     """Everything is being stopped, for this reason."""
 
@@ -373,6 +381,7 @@ Notice = (
     | Waiting
     | FindingShown
     | RecoveredShown
+    | FilesRestored
     | Stopping
     | Ended
 )

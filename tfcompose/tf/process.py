@@ -1,6 +1,6 @@
 """What every process of tfcompose's own begins with: arguments, signals, the plan, the word to go on, and its output.
 
-Publishers and the guard are such processes: ``python -m MODULE PLAN_FILE PROCESS_NAME``. This
+Publishers and the guard are such processes: ``tfcompose KIND PLAN_FILE PROCESS_NAME``. This
 module imports no ROS.
 """
 
@@ -116,10 +116,7 @@ def read_own(argv: Sequence[str], kind: str) -> Own:
     words = list(argv)
     at = words.index("--ros-args") if "--ros-args" in words else len(words)
     if at != _ARGUMENTS:
-        module = kind if kind == "guard" else f"launcher.publishers.{kind}"
-        raise _unfit(
-            f"usage: python -m tfcompose.{module} PLAN_FILE PROCESS_NAME [--ros-args …]", ""
-        )
+        raise _unfit(f"usage: tfcompose {kind} PLAN_FILE PROCESS_NAME [--ros-args …]", "")
     file, name = words[:at]
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)

@@ -97,7 +97,7 @@ def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
     edges = [edge(f"base_link frame_{n}", "static", Pose((n, 0.0, 0.0))) for n in range(150)]
     other = [edge("odom base_link", "wheels")]
     both = PlanProcess("static", "static"), PlanProcess("wheels", "external")
-    process = start("tfcompose.launcher.publishers.static", write(edges + other, *both), "static")
+    process = start("static", write(edges + other, *both), "static")
     process.until_says("150 edges on /tf_static")
     ((received, transforms),) = listeners.tf(1, static=True)
     assert [(t.parent, t.child, t.xyz[0]) for t in transforms] == [
@@ -115,9 +115,7 @@ def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
 def test_joint_states_move_the_wheels_and_what_mimics_them(
     start: Callable[..., Any], listeners: Listeners, rover: Any
 ) -> None:
-    start("tfcompose.launcher.publishers.joints", rover, "joints").until_says(
-        "4 edges on /tf, from /rover/joint_states"
-    )
+    start("joints", rover, "joints").until_says("4 edges on /tf, from /rover/joint_states")
     subscription = TFSubscription(listeners.node, static=False)
     message = JointState(name=["left", "gripper", "right"], position=[0.7, math.nan, -1.2])
     message.header.stamp.sec, message.header.stamp.nanosec = 12, 34
@@ -140,7 +138,7 @@ def test_joint_states_move_the_wheels_and_what_mimics_them(
 def test_joint_states_that_hold_some_joints_move_those(
     start: Callable[..., Any], listeners: Listeners, rover: Any
 ) -> None:
-    start("tfcompose.launcher.publishers.joints", rover, "joints").until_says("edges")
+    start("joints", rover, "joints").until_says("edges")
     subscription = TFSubscription(listeners.node, static=False)
     before = time.time_ns()
     found = _answer(listeners, subscription, JointState(name=["right"], position=[1.0]))
@@ -153,7 +151,7 @@ def test_joint_states_that_hold_some_joints_move_those(
 def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
     start: Callable[..., Any], listeners: Listeners, rover: Any
 ) -> None:
-    process = start("tfcompose.launcher.publishers.joints", rover, "joints")
+    process = start("joints", rover, "joints")
     process.until_says("edges")
     publisher = listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
     subscription = TFSubscription(listeners.node, static=False)
@@ -177,7 +175,7 @@ def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
 def test_drivers_that_send_their_own_joints_each_move_them_all(
     start: Callable[..., Any], listeners: Listeners, rover: Any
 ) -> None:
-    start("tfcompose.launcher.publishers.joints", rover, "joints").until_says("edges")
+    start("joints", rover, "joints").until_says("edges")
     subscription = TFSubscription(listeners.node, static=False)
     drivers = [
         listeners.node.create_publisher(JointState, "/rover/joint_states", 10) for _ in range(2)
@@ -202,7 +200,7 @@ def test_joints_that_no_joint_state_speaks_of_are_named_once_with_who_sends_the_
 ) -> None:
     right = JointState(name=["right"], position=[1.0])
     publisher = listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
-    process = start("tfcompose.launcher.publishers.joints", rover, "joints")
+    process = start("joints", rover, "joints")
 
     def has_reported() -> bool:
         publisher.publish(right)  # from before its start on, so that it is heard in its first 5 s
@@ -216,7 +214,7 @@ def test_joints_that_no_joint_state_speaks_of_are_named_once_with_who_sends_the_
 def test_without_any_joint_state_it_says_that_nobody_publishes_them(
     start: Callable[..., Any], rover: Any
 ) -> None:
-    process = start("tfcompose.launcher.publishers.joints", rover, "joints")
+    process = start("joints", rover, "joints")
     process.until_says(
         "no joint state after 5 s for left, right: nobody publishes /rover/joint_states\n"
     )
@@ -226,7 +224,7 @@ def test_publish_frequency_is_reported_and_leaves_nothing_out_in_silence(
     start: Callable[..., Any], listeners: Listeners, rover: Any
 ) -> None:
     process = start(
-        "tfcompose.launcher.publishers.joints",
+        "joints",
         rover,
         "joints",
         "--ros-args",
@@ -254,7 +252,7 @@ def test_a_parameter_of_another_type_is_refused_with_a_sentence(
     start: Callable[..., Any], rover: Any
 ) -> None:
     process = start(
-        "tfcompose.launcher.publishers.joints",
+        "joints",
         rover,
         "joints",
         "--ros-args",
@@ -274,9 +272,7 @@ def test_another_description_changes_nothing_and_is_reported_with_its_publisher(
     write: Callable[..., Any],
     name: Literal["static", "joints"],
 ) -> None:
-    process = start(
-        f"tfcompose.launcher.publishers.{name}", write([], PlanProcess(name, name)), name
-    )
+    process = start(name, write([], PlanProcess(name, name)), name)
     process.until_says("edge")
     same = latch(listeners.node, "/rover/robot_description", "<robot name='rover'/>")
     other = latch(listeners.node, "/rover/robot_description", "<robot name='stranger'/>")
@@ -298,9 +294,7 @@ def test_the_description_is_latched(
     write: Callable[..., Any],
     name: Literal["static", "joints"],
 ) -> None:
-    start(
-        f"tfcompose.launcher.publishers.{name}", write([], PlanProcess(name, name)), name
-    ).until_says("edge")
+    start(name, write([], PlanProcess(name, name)), name).until_says("edge")
     subscription = Subscription(listeners.node, String, "/rover/robot_description", LATCHED)
     (received,) = take(listeners.node, subscription, 1)
     assert deserialize_message(received.data, String).data == "<robot name='rover'/>"
@@ -313,9 +307,7 @@ def test_the_description_is_left_to_the_joints_process_where_there_is_one(
     write: Callable[..., Any],
 ) -> None:
     file = write([edge("a b")], PlanProcess("static", "static"), PlanProcess("joints", "joints"))
-    start("tfcompose.launcher.publishers.static", file, "static").until_says(
-        "1 edge on /tf_static"
-    )
+    start("static", file, "static").until_says("1 edge on /tf_static")
     subscription = Subscription(listeners.node, String, "/rover/robot_description", LATCHED)
     listeners.tf(1, static=True)
     assert take_for(listeners.node, subscription, 0.5) == []
@@ -331,9 +323,7 @@ def test_a_body_drives_on_a_circle(
     file = write(
         [edge("odom base_link", "wheels")], PlanProcess("wheels", "simulate", simulate=circle)
     )
-    start("tfcompose.launcher.publishers.simulate", file, "wheels").until_says(
-        "1 edge on /tf, simulated at 50 Hz"
-    )
+    start("simulate", file, "wheels").until_says("1 edge on /tf, simulated at 50 Hz")
     transforms = [transform for _, (transform,) in listeners.tf(30)]
     angles = []
     for transform in transforms:
@@ -356,9 +346,7 @@ def test_the_rate_does_not_drift(
 ) -> None:
     pose = Pose((1.0, 2.0, 3.0), normalised((0.0, 0.0, 1.0, 1.0)))
     process = PlanProcess("map", "simulate", simulate=Simulation("fixed", 25.0, pose=pose))
-    start(
-        "tfcompose.launcher.publishers.simulate", write([edge("map odom", "map")], process), "map"
-    ).until_says("simulated")
+    start("simulate", write([edge("map odom", "map")], process), "map").until_says("simulated")
     transforms = [transform for _, (transform,) in listeners.tf(51)]
     assert {(t.parent, t.child, t.xyz, t.quat_xyzw) for t in transforms} == {
         ("map", "odom", pose.xyz, pose.quat_xyzw)
@@ -377,7 +365,7 @@ def test_simulated_joint_states_are_published(
 ) -> None:
     simulated = Simulation("joints", 50.0, joints={"left": 0.5, "right": -1.0})
     file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
-    start("tfcompose.launcher.publishers.simulate", file, "wheels").until_says(
+    start("simulate", file, "wheels").until_says(
         "2 joints on /rover/joint_states, simulated at 50 Hz"
     )
     subscription = Subscription(listeners.node, JointState, "/rover/joint_states", JOINT_STATES)
@@ -393,7 +381,7 @@ def test_swept_joints_move_within_their_limits_and_the_others_stay(
         "joints", 50.0, joints={"lift": 0.2, "grip": 0.5}, sweep={"lift": Sweep(1.0, 0.1, 0.5)}
     )
     file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
-    start("tfcompose.launcher.publishers.simulate", file, "wheels").until_says(
+    start("simulate", file, "wheels").until_says(
         "2 joints on /rover/joint_states, simulated at 50 Hz"
     )
     subscription = Subscription(listeners.node, JointState, "/rover/joint_states", JOINT_STATES)
@@ -426,7 +414,7 @@ def test_simulated_time_comes_from_the_clock_topic(
     circle = Simulation("circle", 10.0, radius=1.0, speed=1.0)
     process = PlanProcess("wheels", "simulate", simulate=circle)
     start(
-        "tfcompose.launcher.publishers.simulate",
+        "simulate",
         write([edge("odom base", "wheels")], process, clock="sim"),
         "wheels",
     )
@@ -450,19 +438,16 @@ def test_simulated_time_comes_from_the_clock_topic(
         assert math.atan2(found.xyz[1], found.xyz[0]) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("module", ["launcher.publishers.simulate", "guard"])
+@pytest.mark.parametrize("kind", ["simulate", "guard"])
 def test_that_simulated_time_does_not_come_is_reported_once(
     start: Callable[..., Any],
     listeners: Listeners,
     edge: Callable[..., Any],
     write: Callable[..., Any],
-    module: str,
+    kind: str,
 ) -> None:
-    kind = module.rpartition(".")[2]
     process = PlanProcess(kind, kind, simulate=Simulation("fixed", 10.0))  # type: ignore[arg-type]
-    started = start(
-        f"tfcompose.{module}", write([edge("odom base", kind)], process, clock="sim"), kind
-    )
+    started = start(kind, write([edge("odom base", kind)], process, clock="sim"), kind)
     started.until_says(
         "no time on /clock after 5 s: the plan's clock is sim, and nobody publishes it\n"
     )
@@ -478,7 +463,7 @@ def test_joint_states_without_a_time_get_simulated_time(
 ) -> None:
     left = edge("base left", "joints", None, Joint("left", "continuous", Y))
     file = write([left], PlanProcess("joints", "joints"), clock="sim")
-    start("tfcompose.launcher.publishers.joints", file, "joints").until_says("1 edge on /tf")
+    start("joints", file, "joints").until_says("1 edge on /tf")
     subscription = TFSubscription(listeners.node, static=False)
     states = listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
     clock = listeners.node.create_publisher(Clock, "/clock", 10)
@@ -506,10 +491,7 @@ def test_every_process_ends_before_its_next_message_and_silently(
     processes = [PlanProcess(k, k, simulate=simulated) for k in ("static", "joints", "simulate")]
     file = write([edge("map odom", "simulate"), edge("a b")], *processes, clock=clock)
 
-    running = [
-        start(f"tfcompose.launcher.publishers.{process.kind}", file, process.name)
-        for process in processes
-    ]
+    running = [start(process.kind, file, process.name) for process in processes]
     for each in running:
         each.until_says("edge")
     for each in running:
@@ -522,7 +504,7 @@ def test_an_interrupt_during_the_start_ends_silently_too(
     start: Callable[..., Any], write: Callable[..., Any]
 ) -> None:
     file = write([], PlanProcess("static", "static"))
-    process = start("tfcompose.launcher.publishers.static", file, "static", PYTHONVERBOSE="1")
+    process = start("static", file, "static", PYTHONVERBOSE="1")
     imports = ("import 'tfcompose.launcher.publishers.description'", "import 'rclpy'")
     end = time.monotonic() + UNTIL_S
     while not any(one in line for line in process.errors for one in imports):
@@ -544,7 +526,7 @@ def test_a_node_is_called_as_the_plan_says_and_its_topics_move_with_it(
         "static", "static", nodes=("/fleet/r1/frames",), remap={"/tf_static": "tf_static"}
     )
     start(
-        "tfcompose.launcher.publishers.static",
+        "static",
         write([edge("a b")], process),
         "static",
         "--ros-args",

@@ -444,7 +444,7 @@ def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_that_differs_from
     start: Callable[..., Started], nodes: FakeNodes
 ) -> None:
     """The example's stand-ins; without the profile the plan expects a camera's driver."""
-    up = start("tfcompose", "up", ROBOT, "--profile", "demo")
+    up = start("up", ROBOT, "--profile", "demo")
     up.until_says("all ready")
     assert finds_nothing(ROBOT, "--profile", "demo")
     assert finds_nothing()
@@ -470,7 +470,7 @@ def test_ctrl_c_ends_the_observation_and_prints_what_was_found(
     nodes.moving(node := nodes.node("drive"), "odom base_link", stamp=lambda _: 0)
 
     def is_named(seconds: float) -> None:
-        process = start("tfcompose", "doctor", "--for", "600")
+        process = start("doctor", "--for", "600")
         assert until(lambda: node.count_subscribers("/tf"))
         time.sleep(seconds)  # it is to have looked for so long
         code = process.end(signal.SIGINT)
@@ -495,7 +495,7 @@ def test_ctrl_c_before_anything_came_is_no_finding(
     }
 
     def is_none(_: float) -> None:
-        process = start("tfcompose", *words, *more.get(words[0], []))
+        process = start(*words, *more.get(words[0], []))
         assert until(lambda: process.process.poll() is not None or has_ports(process.process))
         code = process.end(signal.SIGINT)
         process.close()

@@ -50,7 +50,7 @@ def rover(
     )
     plan = write(edges, PlanProcess("static", "static"), drive)
     for module, name in (("static", "static"), ("simulate", "drive")):
-        started = start(f"tfcompose.launcher.publishers.{module}", plan, name)
+        started = start(module, plan, name)
         started.until_says("edge")
 
 
@@ -152,7 +152,7 @@ def test_when_the_owner_falls_silent_it_says_so_and_ends(
         "--timeout",
     ]
     for timeout in TIMEOUTS_S:
-        owner = start("tfcompose.launcher.publishers.simulate", plan, "drive")
+        owner = start("simulate", plan, "drive")
         owner.until_says("edge")
         words = [*command, str(timeout)]
         with processes.start(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

@@ -33,7 +33,7 @@ def running(
     drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0))
     plan = write(edges, PlanProcess("static", "static"), drive)
     for module, name in (("static", "static"), ("simulate", "drive")):
-        start(f"tfcompose.launcher.publishers.{module}", plan, name).until_says("edge")
+        start(module, plan, name).until_says("edge")
     return plan
 
 

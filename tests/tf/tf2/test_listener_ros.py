@@ -58,7 +58,7 @@ def rover(
     )
     plan = write(edges, PlanProcess("static", "static"), drive)
     for module, name in (("static", "static"), ("simulate", "drive")):
-        start(f"tfcompose.launcher.publishers.{module}", plan, name).until_says("edge")
+        start(module, plan, name).until_says("edge")
 
 
 @pytest.fixture

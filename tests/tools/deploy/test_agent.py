@@ -1,6 +1,7 @@
 """What the agent does on a host, with the files of one: no ssh, and no systemd."""
 
 import base64
+import json
 import os
 import subprocess
 import sys
@@ -11,15 +12,18 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tests.support.user_files import write_namesakes
 from tests.support.waiting import until
+from tfcompose import __version__
+from tfcompose.launcher.program import ANYWHERE
 from tfcompose.model.plan import Plan, RosSettings
 from tfcompose.tools.deploy.agent import KEPT, UNIT, Agent, HostError
-from tfcompose.tools.deploy.connection import START
+from tfcompose.tools.deploy.connection import START, Settings, agent_command, agent_input
 from tfcompose.tools.deploy.release import Release
 from tfcompose.tools.exporters.supervisors import SOURCING
 
 SETTINGS = {"name": "rover.brain", "unit": "tfcompose-rover.brain.service", "python": "python3", "setup": [],
-            "sourcing": SOURCING}  # fmt: skip
+            "sourcing": SOURCING, "program": ANYWHERE}  # fmt: skip
 
 
 @pytest.fixture
@@ -139,6 +143,21 @@ def test_a_python_that_is_too_old_says_so(version: str) -> None:
         "runs\n" if runs else "",
         not runs,
     ), done
+
+
+def test_an_agent_takes_no_module_from_the_folder_it_is_started_in(tmp_path: Path) -> None:
+    write_namesakes(tmp_path)
+    settings = Settings("rover.brain", "tfcompose-rover.brain.service", sys.executable)
+    requests = '["clock", {}]\n["probe", {}]\n'
+    done = processes.run(
+        ["/bin/sh", "-c", agent_command(sys.executable)],
+        stdin=agent_input(settings).decode() + requests,
+        cwd=tmp_path,
+        env={**os.environ, "HOME": str(tmp_path)},
+    )
+    clock, probe = map(json.loads, done.stdout.splitlines())
+    assert clock["answer"]
+    assert (probe["answer"]["tfcompose"], done.stderr) == (__version__, "")
 
 
 @pytest.mark.slow

@@ -27,6 +27,7 @@ import yaml
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, offences, until
+from tfcompose.launcher.program import HERE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -392,13 +393,7 @@ def test_a_robot_that_its_own_launch_file_started_is_verified(
     assert until(lambda: not verified(tmp_path), 60), verified(tmp_path)
     # Another state publisher beside tfcompose's own is one too many.
     for name in ("static", "drive"):
-        exec_ = [
-            sys.executable,
-            "-m",
-            "tfcompose.launcher.exec",
-            str(tmp_path / "build" / "plan.json"),
-            name,
-        ]
+        exec_ = [*HERE, "exec", str(tmp_path / "build" / "plan.json"), name]
         processes.start(exec_, stderr=subprocess.DEVNULL)
     assert until(lambda: bool(verified(tmp_path, r"TF801.*robot_state_publisher")), 60)
 
@@ -426,9 +421,9 @@ def test_ros2_launch_starts_the_tree_of_the_plan_with_stock_nodes(
     )
     (tmp_path / "robot.yaml").write_text(LAUNCHED.format(domain=domain.id), "utf-8")
     assert (
-        start(
-            "tfcompose", "export", "launch", tmp_path / "robot.yaml", "-o", tmp_path / "build"
-        ).process.wait(60)
+        start("export", "launch", tmp_path / "robot.yaml", "-o", tmp_path / "build").process.wait(
+            60
+        )
         == 0
     )
     command = [

@@ -7,7 +7,7 @@ import re
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.model.plan import known_at_launch
+from tfcompose.model.plan import PROGRAM, known_at_launch
 from tfcompose.model.robot import AsInFile
 
 if TYPE_CHECKING:
@@ -16,13 +16,6 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Process, Robot
 
 
-#: The modules behind tfcompose's own processes.
-MODULES = {
-    "static": "tfcompose.launcher.publishers.static",
-    "joints": "tfcompose.launcher.publishers.joints",
-    "simulate": "tfcompose.launcher.publishers.simulate",
-    "guard": "tfcompose.guard",
-}
 #: The file of parameters, which is named once.
 _PARAMS_FILE = "${params_file}"
 _TF_TOPICS = frozenset({"/tf", "/tf_static"})
@@ -41,7 +34,7 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
             for name, value in _own_params(process)
             for word in ("-p", f"{name}:={json.dumps(value)}")
         ]
-        own = ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
+        own = (PROGRAM, process.kind, "${plan}", process.name)
         return (*own, "--ros-args", *arguments) if arguments else own
     if process.launch is not None:
         return (f"${{launch:{process.launch}}}", *process.argv)

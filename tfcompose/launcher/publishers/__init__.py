@@ -1,5 +1,5 @@
 """tfcompose's own publishers: static edges, moving joints, simulations, and the robot's description.
 
-Each is a process of the plan: ``python -m tfcompose.launcher.publishers.static PLAN_FILE
-PROCESS_NAME``, ``.joints``, ``.simulate``.
+Each is a process of the plan: ``tfcompose static PLAN_FILE PROCESS_NAME``, ``joints``,
+``simulate``.
 """

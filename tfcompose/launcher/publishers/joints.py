@@ -1,11 +1,7 @@
-"""The process that turns joint states into edges on /tf, and names the joints that none speaks of.
-
-``python -m tfcompose.launcher.publishers.joints PLAN_FILE PROCESS_NAME``
-"""
+"""The process that turns joint states into edges on /tf, and names the joints that none speaks of."""
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -13,7 +9,7 @@ from tfcompose.foundation.text import counted, listed
 from tfcompose.tf.process import ready, say, start, wait_for_go
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from tfcompose.foundation.signals import Stop
     from tfcompose.launcher.publishers.joint_mover import JointMover
@@ -21,6 +17,11 @@ if TYPE_CHECKING:
 
 MISSING_AFTER_S = 5.0
 _NAMED_AT_MOST = 8
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run the process that PLAN_FILE PROCESS_NAME names, and return the exit code."""
+    return start(argv, "joints", joints)
 
 
 def joints(own: Own, stop: Stop) -> None:
@@ -99,7 +100,3 @@ class _Missing:
             if names
             else f"nobody publishes {self._topic}"
         )
-
-
-if __name__ == "__main__":
-    sys.exit(start(sys.argv[1:], "joints", joints))

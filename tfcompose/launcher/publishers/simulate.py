@@ -1,13 +1,11 @@
 """The process that stands in for an owner: its edges, or joint states, at the plan's rate and by the plan's clock.
 
-``python -m tfcompose.launcher.publishers.simulate PLAN_FILE PROCESS_NAME``. How what it simulates
-moves are pure functions, in seconds, metres and radians.
+How what it simulates moves are pure functions, in seconds, metres and radians.
 """
 
 from __future__ import annotations
 
 import math
-import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -27,6 +25,11 @@ if TYPE_CHECKING:
     from tfcompose.tf.process import Own
 
 _SECOND_NS = 1_000_000_000
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run the process that PLAN_FILE PROCESS_NAME names, and return the exit code."""
+    return start(argv, "simulate", simulate)
 
 
 def simulate(own: Own, stop: Stop) -> None:
@@ -177,7 +180,3 @@ def swept(sweep: Sweep, start: float, time_s: float) -> float:
     return middle + half * math.sin(
         phase + math.asin(max(-1.0, min(1.0, (start - middle) / half)))
     )
-
-
-if __name__ == "__main__":
-    sys.exit(start(sys.argv[1:], "simulate", simulate))

@@ -1,11 +1,7 @@
-"""The process that latches the fixed edges on /tf_static, and the description where nobody else sends it.
-
-``python -m tfcompose.launcher.publishers.static PLAN_FILE PROCESS_NAME``
-"""
+"""The process that latches the fixed edges on /tf_static, and the description where nobody else sends it."""
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -14,8 +10,15 @@ from tfcompose.tf.process import ready, say, start, wait_for_go
 from tfcompose.tf.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tfcompose.foundation.signals import Stop
     from tfcompose.tf.process import Own
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run the process that PLAN_FILE PROCESS_NAME names, and return the exit code."""
+    return start(argv, "static", static)
 
 
 def static(own: Own, stop: Stop) -> None:
@@ -65,7 +68,3 @@ def static(own: Own, stop: Stop) -> None:
 def _joints_of(own: Own) -> str:
     """Return the name of the process that sends the description in this one's place, where there is one."""
     return f"{own.process.name.removesuffix('static')}joints"
-
-
-if __name__ == "__main__":
-    sys.exit(start(sys.argv[1:], "static", static))

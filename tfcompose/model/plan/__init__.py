@@ -8,6 +8,7 @@ messages too.
 
 from tfcompose.model.plan.plan import (
     DESCRIPTION,
+    PROGRAM,
     SILENT_AT_LEAST_S,
     SILENT_PERIODS,
     SLOW_BELOW,
@@ -60,6 +61,7 @@ from tfcompose.model.plan.plan import (
 
 __all__ = [
     "DESCRIPTION",
+    "PROGRAM",
     "SILENT_AT_LEAST_S",
     "SILENT_PERIODS",
     "SLOW_BELOW",

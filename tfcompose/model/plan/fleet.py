@@ -6,12 +6,13 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, finding
+from tfcompose.model.plan.plan import PROGRAM
 
 if TYPE_CHECKING:
     from tfcompose.model.plan.plan import PlanProcess
 
 #: What the command of tfcompose's own sharing begins with.
-SHARE_COMMAND = ("${python}", "-m", "tfcompose", "fleet", "share")
+SHARE_COMMAND = (PROGRAM, "fleet", "share")
 #: What installs what it needs.
 INSTALL = "pip install 'tfcompose[fleet]'"
 

@@ -168,10 +168,11 @@ class PlanEdge:
         return parent == self.parent or parent in self.switched
 
 
-#: In an ``argv``, ``${python}``, ``${plan}``, ``${build_dir}`` and ``${params_file}`` stand for
-#: what only the starting machine knows. As its first word ``${executable:PACKAGE/NAME}`` is a
-#: package's program, and ``${launch:PACKAGE/FILE}`` a package's launch file; the words after that
-#: are the launch file's arguments, ``name:=value``.
+#: In an ``argv``, ``${plan}``, ``${build_dir}`` and ``${params_file}`` stand for what only the
+#: starting machine knows. As its first word ``${tfcompose}`` is this program,
+#: ``${executable:PACKAGE/NAME}`` a package's, and ``${launch:PACKAGE/FILE}`` a package's launch
+#: file; the words after that are the launch file's arguments, ``name:=value``.
+PROGRAM = "${tfcompose}"
 _AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 
 
@@ -448,7 +449,7 @@ def switch_text(switch: dict[str, Any]) -> str:
     )
 
 
-VERSION: Literal[1] = 1
+VERSION: Literal[2] = 2
 
 #: The file beside the plan that holds the whole robot's description.
 DESCRIPTION = "robot.full.urdf"
@@ -467,7 +468,7 @@ class Plan:
     processes may name; empty: the file does not say how they are reached.
     """
 
-    version: Literal[1] = field(default=VERSION, kw_only=True)
+    version: Literal[2] = field(default=VERSION, kw_only=True)
     robot: str
     spec_digest: str
     description: str = field(default=DESCRIPTION, kw_only=True)

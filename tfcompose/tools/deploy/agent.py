@@ -43,9 +43,12 @@ KEPT = 5
 UNIT = "unit"
 #: Larger files are not sent back to be compared.
 MOST_TEXT = 200_000
-#: Prints what the host's Python has, with the setup files sourced.
+#: Prints what the host's Python has, with the setup files sourced; modules of the current folder
+#: come last.
 _PROBE = """
-import json, os, sys
+import os, sys
+sys.path.sort(key=["", os.getcwd()].__contains__)
+import json
 from importlib.util import find_spec
 try:
     from tfcompose import __version__ as version
@@ -76,6 +79,7 @@ class Agent:
         self.python: str = settings["python"]
         self.setup: list[str] = settings["setup"]
         self.sourcing: str = settings["sourcing"]
+        self.program: str = settings["program"]
         self.gone = gone
         self.lock: int | None = None
         self.trial: dict[str, Any] | None = None
@@ -228,9 +232,7 @@ class Agent:
         """Return what keeps the release from being started on this host, as findings."""
         folder = self.base / "releases" / release
         python = self._python_of(folder)
-        done = self._program(
-            [python, "-m", "tfcompose.tools.deploy.rehearse", str(folder / "plan.json"), host]
-        )
+        done = self._program([*self._start(python), "rehearse", str(folder / "plan.json"), host])
         try:
             found: list[dict[str, Any]] = json.loads(done.stdout.splitlines()[-1])
         except (ValueError, IndexError):
@@ -409,9 +411,7 @@ class Agent:
             and not (self.units / self.unit).is_file()
         )
         self._be_of(system=self.system or system)
-        command = self._command(
-            [self._python_of(self.base / "current"), "-m", "tfcompose", *words]
-        )
+        command = self._command([*self._start(self._python_of(self.base / "current")), *words])
         os.execvpe(command[0], command, self._environment())  # noqa: S606 (no shell: these are words)
 
     def _unit_of(self, release: str) -> str:
@@ -430,9 +430,10 @@ class Agent:
         python = self._executable()
         wheels = sorted(map(str, (folder / "wheels").glob("*.whl")))
         for words in (
-            [python, "-m", "venv", "--system-site-packages", str(folder / "venv")],
+            [python, "-I", "-m", "venv", "--system-site-packages", str(folder / "venv")],
             [
                 str(folder / "venv/bin/python"),
+                "-I",
                 "-m",
                 "pip",
                 "install",
@@ -454,6 +455,10 @@ class Agent:
         own = folder / "venv/bin/python"
         return str(own) if own.exists() else self._executable()
 
+    def _start(self, python: str) -> list[str]:
+        """Return the words that start tfcompose with that Python."""
+        return [python, "-c", self.program]
+
     def _command(self, words: list[str]) -> list[str]:
         files = [str(Path(file).expanduser()) for file in self.setup]
         return ["/bin/bash", "-c", self.sourcing, "bash", *files, "--", *words] if files else words
@@ -465,7 +470,7 @@ class Agent:
 
     def _tfcompose(self, words: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
         python = self._python_of(self.running or self.base / "current")
-        return self._program([python, "-m", "tfcompose", *words], seconds)
+        return self._program([*self._start(python), *words], seconds)
 
     def _environment(self) -> dict[str, str]:
         """Return the environment in which the run is found: that of the unit, where it differs from a login's."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import asyncssh
 
 from tfcompose.foundation.findings import Finding, finding
+from tfcompose.launcher.program import ANYWHERE
 from tfcompose.tools.exporters.supervisors import SOURCING
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ class Settings:
     """What the agent is given first. ``name`` is ROBOT.HOST, ``unit`` the unit's file name.
 
     ``sourcing`` is the line of bash that sources the files before ``--``, and becomes the command
-    behind it.
+    behind it; ``program`` is the code with which Python starts tfcompose.
     """
 
     name: str
@@ -49,6 +50,19 @@ class Settings:
     setup: tuple[str, ...] = ()
     system: bool = False
     sourcing: str = SOURCING
+    program: str = ANYWHERE
+
+
+def agent_command(python: str) -> str:
+    """Return the shell's command that starts the agent; it takes no module from a user's folder."""
+    word = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
+    return f"exec {word} -I -c {shlex.quote(START)}"
+
+
+def agent_input(settings: Settings) -> bytes:
+    """Return what the agent reads before any request: its program and its settings."""
+    agent = Path(__file__).with_name("agent.py").read_bytes()
+    return f"{len(agent)}\n".encode() + agent + f"{json.dumps(asdict(settings))}\n".encode()
 
 
 def settings_of(robot: str, name: str, host: PlanHost, *, system: bool = False) -> Settings:
@@ -179,16 +193,12 @@ async def connected(
             f" {error.strerror if isinstance(error, OSError) and error.strerror else error}",
             at,
         )
-    agent = Path(__file__).with_name("agent.py").read_bytes()
     python = settings.python
-    word = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
     try:
         process = await connection.create_process(
-            f"exec {word} -c {shlex.quote(START)}", encoding=None, window=2**21, max_pktsize=2**15
+            agent_command(python), encoding=None, window=2**21, max_pktsize=2**15
         )
-        process.stdin.write(
-            f"{len(agent)}\n".encode() + agent + f"{json.dumps(asdict(settings))}\n".encode()
-        )
+        process.stdin.write(agent_input(settings))
         there = Host(name, connection, process, at)
         await there.ask("clock", 2 * CONNECT_S)
     except (OSError, asyncssh.Error, LostError, RefusedError) as error:

@@ -1,4 +1,4 @@
-"""Whether a plan's share could be started on this machine: ``python -m tfcompose.tools.deploy.rehearse PLAN HOST``.
+"""Check of whether a plan's share could be started on this machine: ``tfcompose rehearse PLAN HOST``.
 
 The agent runs it on a host, with the environment that the unit has, before anything changes. It
 prints the findings as one line of JSON.
@@ -10,12 +10,16 @@ import json
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, RejectedError
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import share_of
 from tfcompose.tf.ros.environment import child_environment, ros_trouble
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 def hindrances(file: Path, host: str) -> list[Finding]:
@@ -35,9 +39,12 @@ def hindrances(file: Path, host: str) -> list[Finding]:
     )
 
 
-if __name__ == "__main__":
-    found = hindrances(Path(sys.argv[1]), sys.argv[2])
-    sys.stdout.write(
-        json.dumps([{"code": one.code, "message": one.message, "help": one.help} for one in found])
-        + "\n"
-    )
+def main(argv: Sequence[str]) -> int:
+    """Print what keeps the plan that PLAN_FILE HOST names from being started here; return 0."""
+    file, host = argv
+    findings = [
+        {"code": finding.code, "message": finding.message, "help": finding.help}
+        for finding in hindrances(Path(file), host)
+    ]
+    sys.stdout.write(f"{json.dumps(findings)}\n")
+    return 0

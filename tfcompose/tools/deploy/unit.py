@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tfcompose.launcher.program import anywhere
 from tfcompose.tools.exporters.supervisors import quoted, sourced
 
 #: How long everything on a host has to end: the launcher ends processes one after the other.
@@ -69,9 +70,7 @@ class Unit:
         at = f"{self.base}/current"
         python = f"{at}/venv/bin/python" if self.has_wheels else self.python
         words = [
-            python,
-            "-m",
-            "tfcompose",
+            *anywhere(python),
             "up",
             f"{at}/plan.json",
             "--host",

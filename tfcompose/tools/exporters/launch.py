@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 from tfcompose.foundation.numbers import number
+from tfcompose.launcher.program import ANYWHERE_PARTS
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 _EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
 _LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
-_PLACEHOLDER = re.compile(r"\$\{(?:executable:|launch:|plan\})")
+_PLACEHOLDER = re.compile(r"\$\{(?:executable:|launch:|plan\}|tfcompose\})")
 _MOVED = ("-r", "--params-file")
 #: What the launch file needs of which module.
 _IMPORTS = {
@@ -64,10 +65,14 @@ _IMPORTS = {
 #: Functions that a launch file has where it calls them.
 _HELPERS = {
     "process": (
-        '''
+        f'''
 def process(name, **more):
     """One of tfcompose's own, or one that only the plan knows how to start."""
-    command = [sys.executable, "-m", "tfcompose.launcher.exec", str(BUILD / "plan.json"), name]
+    start = (
+        "{ANYWHERE_PARTS[0]}"
+        "{ANYWHERE_PARTS[1]}"
+    )
+    command = [sys.executable, "-c", start, "exec", str(BUILD / "plan.json"), name]
     return ExecuteProcess(cmd=command, name=name, output="screen", **more)
 '''
     ),
@@ -713,7 +718,6 @@ def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
 #: What a word of the plan stands for in the launch file.
 _WORDS = {
     "${build_dir}": "str(BUILD)",
-    "${python}": "sys.executable",
     "${params_file}": "str({file})",
 }
 

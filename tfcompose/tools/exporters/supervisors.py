@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from tfcompose.launcher.program import anywhere
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
 
@@ -69,7 +70,7 @@ def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str
 
 def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:
     """Return the words that start the process as ``tfcompose up`` does."""
-    return [python, "-m", "tfcompose.launcher.exec", plan_file, process.name]
+    return [*anywhere(python), "exec", plan_file, process.name]
 
 
 def restart_of(process: PlanProcess) -> str:
@@ -148,9 +149,7 @@ def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
     """
     edge = plan.edges_of(process.name)[0]
     words = [
-        "python3",
-        "-m",
-        "tfcompose",
+        *anywhere("python3"),
         "echo",
         edge.parent,
         edge.child,

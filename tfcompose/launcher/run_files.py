@@ -1,0 +1,140 @@
+"""Files of a run in its runtime directory, put back when somebody removes them.
+
+They are the lock, the control socket, and the folder with the plan. The folder ``/run/user/UID``
+goes when the user's last session ends, unless the user lingers; cleaners remove others. Then a
+process that starts again finds no plan, and ``ps`` and ``down`` find no robot. So the launcher
+keeps what the files hold. Where it may not make the folder again, the files are in the one for
+temporary files until it may: there commands look for them, too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from typing import TYPE_CHECKING
+
+from tfcompose.launcher.control import listen
+from tfcompose.launcher.runtime_dir import make_private, substitute_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from socket import socket
+
+    from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
+
+
+class RunFiles:
+    """The files of the run whose lock this process holds.
+
+    ``listener`` is the control socket; who uses it closes it. ``plan_file`` is the plan; what is
+    in its folder is kept, if that is in the runtime directory.
+    """
+
+    def __init__(self, place: RuntimeDir, lock: Lock, plan_file: Path) -> None:
+        self._home = self._place = place
+        self._lock = lock
+        self._kept: dict[str, bytes] = {}
+        self.listener = self._listen(place)
+        self.keep(plan_file)
+
+    @property
+    def run_id(self) -> str:
+        """The run's id."""
+        return self._lock.run
+
+    @property
+    def folder(self) -> Path:
+        """Where they are now."""
+        return self._place.folder
+
+    def keep(self, plan_file: Path) -> None:
+        """Keep what belongs to this plan from now on."""
+        self.plan_file = plan_file
+        folder, self._kept = plan_file.parent, {}
+        if folder.is_relative_to(self._place.folder):
+            self._kept = {
+                str(file.relative_to(folder)): file.read_bytes()
+                for file in folder.rglob("*")
+                if file.is_file()
+            }
+
+    def restore(self) -> bool:
+        """Put back what is missing, and return whether anything was.
+
+        ``listener`` and ``plan_file`` are others afterwards.
+
+        Raises:
+            OSError: if there is no folder for them.
+        """
+        if self._place is not self._home and self._home.folder.parent.parent.is_dir():
+            before = self._place
+            with contextlib.suppress(OSError):
+                self._put(self._home)
+                shutil.rmtree(before.folder, ignore_errors=True)
+                return True
+        if self._are_there():
+            return False
+        try:
+            self._put(self._home)
+        except OSError:
+            self._put(substitute_of(self._home))
+        return True
+
+    def _are_there(self) -> bool:
+        folder = self.plan_file.parent
+        try:
+            return (
+                _identity(self._place.folder / "lock") == _identity(self._lock.fd)
+                and _identity(self._place.socket) == self._socket
+                and all((folder / name).is_file() for name in self._kept)
+            )
+        except OSError:
+            return False
+
+    def _put(self, place: RuntimeDir) -> None:
+        make_private(place.folder)
+        if not _is_same(place.folder / "lock", self._lock.fd):
+            self._lock.renew(place)
+        if self._place is not place or not self._has_socket(place):
+            self.listener = self._listen(place)
+        if self._kept:
+            folder = place.folder / self.plan_file.parent.relative_to(self._place.folder)
+            for name, data in self._kept.items():
+                _write(folder / name, data)
+            self.plan_file = folder / self.plan_file.name
+        self._place = place
+
+    def _listen(self, place: RuntimeDir) -> socket:
+        listener = listen(place)
+        self._socket = _identity(place.socket)
+        return listener
+
+    def _has_socket(self, place: RuntimeDir) -> bool:
+        try:
+            return _identity(place.socket) == self._socket
+        except OSError:
+            return False
+
+
+def _identity(file: Path | int) -> tuple[int, int]:
+    """Return what tells a file from another one that has its path later."""
+    found = os.fstat(file) if isinstance(file, int) else file.lstat()
+    return found.st_dev, found.st_ino
+
+
+def _is_same(file: Path, descriptor: int) -> bool:
+    try:
+        return _identity(file) == _identity(descriptor)
+    except OSError:
+        return False
+
+
+def _write(file: Path, data: bytes) -> None:
+    """Write a file that is missing; who reads it meanwhile finds all of it or none."""
+    if file.is_file():
+        return
+    make_private(file.parent)
+    new = file.with_name(f".{file.name}.{os.getpid()}")
+    new.write_bytes(data)
+    new.replace(file)

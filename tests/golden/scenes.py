@@ -58,8 +58,8 @@ from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.drivers import SentPoses, not_taken
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
+from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.launcher.preflight import commands_of
-from tfcompose.launcher.schedule import refused_schedule
 from tfcompose.model.files import Target
 from tfcompose.model.messages import Alive, Clear, Found, GateShut, Live, ProcessRequest
 from tfcompose.model.plan import (
@@ -507,12 +507,10 @@ def launcher() -> Iterator[Finding]:
             )[1]
             yield from (_without(one, folder) for one in found)
     held = PlanProcess("lidar", "run", schedule=Schedule((4095,)))
-    yield refused_schedule(held) or AN_EXAMPLE
+    yield from refused_settings(held) or [AN_EXAMPLE]
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
-        yield (
-            refused_schedule(replace(held, schedule=Schedule(policy="fifo", priority=80)))
-            or AN_EXAMPLE
-        )
+        real_time = replace(held, schedule=Schedule(policy="fifo", priority=80))
+        yield from refused_settings(real_time) or [AN_EXAMPLE]
 
 
 def _without(found: Finding, folder: str) -> Finding:

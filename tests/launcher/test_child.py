@@ -15,6 +15,9 @@ from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Command, Lines, 
 from tfcompose.launcher.children import Reaper
 from tfcompose.launcher.program import HERE
 from tfcompose.launcher.supervisor import Signals
+from tfcompose.model.plan import PlanProcess
+
+ON_A_TERMINAL = PlanProcess("p", "run", emulate_tty=True)
 
 
 @given(st.text(alphabet="ab\né", max_size=60), st.integers(1, 7))
@@ -148,7 +151,9 @@ def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last
         "os._exit(3)  # nothing is flushed: a terminal has its lines already\n"
     )
     popen = spawn(
-        Command((sys.executable, "-I", "-c", code), dict(os.environ), tmp_path, emulate_tty=True),
+        Command(
+            (sys.executable, "-I", "-c", code), dict(os.environ), tmp_path, process=ON_A_TERMINAL
+        ),
         (),
     )
     assert popen.stdout
@@ -164,5 +169,5 @@ def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last
 def test_a_program_that_cannot_be_started_leaves_no_pseudo_terminal_open(tmp_path: Path) -> None:
     before = sorted(Path("/proc/self/fd").iterdir())
     with pytest.raises(OSError, match="nowhere"):
-        spawn(Command(("/nowhere/program",), {}, tmp_path, emulate_tty=True), ())
+        spawn(Command(("/nowhere/program",), {}, tmp_path, process=ON_A_TERMINAL), ())
     assert sorted(Path("/proc/self/fd").iterdir()) == before

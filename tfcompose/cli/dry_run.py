@@ -11,17 +11,18 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import printable
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.text import counted
-from tfcompose.model.plan import StopRule
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import describe_share
 from tfcompose.model.plan.topics import partition_of, private_topics
+from tfcompose.model.process_keys import EXTRA_ARGUMENTS, SUPERVISION_KEYS, SURROUNDING_KEYS
 from tfcompose.tf.ros.environment import FASTDDS_PROFILE, child_environment
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
-    from tfcompose.model.plan import Component, Plan, PlanProcess
+    from tfcompose.model.plan import Plan, PlanProcess
+    from tfcompose.model.process_keys import ProcessKey
 
 
 def dry_run(arguments: Namespace) -> int:
@@ -91,14 +92,13 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
         yield f"  nodes    {', '.join(nodes)}"
     for name, value in _environment(plan, process).items():
         yield f"  env      {name}={_quoted(value)}"
-    if process.cwd is not None:
-        yield f"  folder   {process.cwd}"
+    yield from _settings(SURROUNDING_KEYS, process)
     for old, new in process.remap.items():
         yield f"  remap    {old} → {new}"
     if process.params_file is not None:
         yield f"  params   {process.params_file}"
         yield from (f"    | {line}" for line in files.get(process.params_file, "").splitlines())
-    yield from _component(process.component)
+    yield from _component(process)
     yield from _times(process)
     for edge in plan.edges_of(process.name):
         rate = f", {edge.rate:g} Hz" if edge.rate else ""
@@ -114,12 +114,19 @@ def _what(process: PlanProcess) -> Iterator[str]:
         yield f"  command  {' '.join(map(_quoted, (*process.prefix, *process.argv)))}"
 
 
-def _component(component: Component | None) -> Iterator[str]:
+def _component(process: PlanProcess) -> Iterator[str]:
     """Yield what a component is given."""
+    component = process.component
     for name, value in component.params.items() if component else ():
         yield f"  param    {name}: {json.dumps(value)}"
-    for name, value in component.extra_arguments.items() if component else ():
-        yield f"  extra    {name}: {json.dumps(value)}"
+    yield from _settings((EXTRA_ARGUMENTS,), process)
+
+
+def _settings(keys: Iterable[ProcessKey], process: PlanProcess) -> Iterator[str]:
+    """Yield what is said of the process by these keys."""
+    for key in keys:
+        for label, text in key.lines_of(process):
+            yield f"  {label:<8} {text}"
 
 
 def _fence(plan: Plan, process: PlanProcess) -> str:
@@ -146,38 +153,7 @@ def _times(process: PlanProcess) -> Iterator[str]:
         )
         late = f", late after {ready.timeout_s:g} s" if ready.timeout_s is not None else ""
         yield f"  ready    {ready.kind} {what}{late}".rstrip()
-    if process.restart != "no":
-        delay = (
-            f", {process.restart_delay:g} s after its end"
-            if process.restart_delay is not None
-            else ""
-        )
-        yield (
-            f"  restart  {process.restart}, {counted(process.restart_limit, 'time')} in a"
-            f" row{delay}"
-        )
-    if process.required is not None:
-        yield (
-            "  required its end ends everything"
-            if process.required
-            else "  optional the rest goes on when it fails"
-        )
-    if process.stop != StopRule():
-        patience = "" if process.stop.timeout_s is None else f", {process.stop.timeout_s:g} s"
-        kills_s = process.stop.kill_timeout_s
-        patience += "" if kills_s is None else f", {kills_s:g} s from SIGTERM to SIGKILL"
-        yield f"  stop     {process.stop.signal}{patience}"
-    if process.output != "both" or process.emulate_tty:
-        yield (
-            "  output  "
-            f" {process.output}{', from a pseudo-terminal' if process.emulate_tty else ''}"
-        )
-    schedule = process.schedule
-    if schedule:
-        cpus = f"CPU {', '.join(map(str, schedule.cpus))}" if schedule.cpus else "any CPU"
-        yield f"  schedule {cpus}, {schedule.policy}" + (
-            f" {schedule.priority}" if schedule.priority else ""
-        )
+    yield from _settings(SUPERVISION_KEYS, process)
     if process.host is not None:
         yield f"  host     {process.host}"
 

@@ -283,7 +283,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF908", "other_ros_settings", "environment", "warning"),
         Code("TF909", "ros_settings_contradict", "environment", "error"),
         Code("TF910", "written_otherwise", "environment", "error"),
-        Code("TF911", "schedule_refused", "environment", "error"),
+        Code("TF911", "setting_refused", "environment", "error"),
         Code("TF912", "not_deployable", "environment", "error"),
         Code("TF913", "host_unreachable", "environment", "error"),
         Code("TF914", "host_unfit", "environment", "error"),

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.signals import SIGNALS
-from tfcompose.launcher.schedule import apply_schedule
+from tfcompose.launcher.kernel_settings import apply_settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import IO
 
-    from tfcompose.model.plan import Schedule
+    from tfcompose.model.plan import PlanProcess
     from tfcompose.model.plan.components import LoadRequest
 
 #: A line longer than this comes in pieces; bytes.
@@ -64,21 +64,20 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 class Command:
     """Program and arguments, environment, and folder.
 
-    ``own`` says that it is one of tfcompose's; ``schedule`` is how the kernel schedules it.
-    ``fence`` is a file that must be there first, and what it holds. ``load`` is what a container
-    is asked instead of starting anything. ``emulate_tty`` gives it pseudo-terminals in place of
-    pipes. ``missing`` says, of a process that the run goes on without, why it cannot be started.
+    ``process`` is that of the plan, whose settings hold for it; ``own`` says that it is one of
+    tfcompose's. ``fence`` is a file that must be there first, and what it holds. ``load`` is what
+    a container is asked instead of starting anything. ``missing`` says, of a process that the run
+    goes on without, why it cannot be started.
     """
 
     argv: tuple[str, ...]
     env: dict[str, str]
     folder: Path
     own: bool = False
-    schedule: Schedule | None = None
+    process: PlanProcess | None = None
     fence: tuple[Path, str] | None = None
     missing: str = ""
     load: LoadRequest | None = None
-    emulate_tty: bool = False
 
 
 class Lines:
@@ -243,12 +242,12 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != launcher:  # it died before the line above
             os._exit(1)
-        if command.schedule:
-            apply_schedule(command.schedule)
+        if command.process:
+            apply_settings(command.process)
         if command.own:
             signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
 
-    if command.emulate_tty:
+    if command.process and command.process.emulate_tty:
         return _on_terminals(command, before_the_program, pass_fds)
     return subprocess.Popen(
         command.argv,

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.launcher.kernel_settings import apply_settings
 from tfcompose.launcher.preflight import commands_of
-from tfcompose.launcher.schedule import apply_schedule
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.variables import JOINS
 from tfcompose.tf.ros.environment import child_environment
@@ -66,8 +66,8 @@ def main(argv: Sequence[str]) -> int:
         return command
     try:
         os.chdir(command.folder)
-        if command.schedule:
-            apply_schedule(command.schedule)
+        if command.process:
+            apply_settings(command.process)
         os.execve(command.argv[0], command.argv, command.env)  # noqa: S606 (this is what it is for)
     except OSError as error:
         return _fail(f"{argv[1]} cannot be started: {error}", 1)

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Protocol
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
+from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.launcher.program import HERE, without_current_folder
-from tfcompose.launcher.schedule import refused_schedule
 from tfcompose.model.plan import PROGRAM
 from tfcompose.model.plan.components import load_request
 from tfcompose.model.plan.fleet import missing_zenoh
@@ -89,6 +89,7 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
             missing.append(command)
         else:
             commands[process.name] = command
+            found += [] if command.missing else refused_settings(process)
     if way == "partition":
         commands, wrong = by_partition(plan, commands, plan_file.absolute().parent)
         found += wrong
@@ -141,14 +142,11 @@ def _command_of(
             else Command((program, *argv[1:]), env, folder, own)
         )
     if isinstance(command, Command):
-        command = replace(command, emulate_tty=process.emulate_tty)
+        command = replace(command, process=process)
     if isinstance(command, Command) and process.prefix:
         runner = executable_of(process, process.prefix[0], folder, env)
         words = (runner, *process.prefix[1:], *command.argv) if isinstance(runner, str) else ()
         command = replace(command, argv=words) if isinstance(runner, str) else runner
-    if isinstance(command, Command) and process.schedule:
-        refused = refused_schedule(process)
-        command = refused or replace(command, schedule=process.schedule)
     if isinstance(command, NotFound) and process.required is False:
         return Command(argv, env, folder, missing=not_found([command]).message)
     return command

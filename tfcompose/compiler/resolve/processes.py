@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.compiler.resolve.poses import pose_of
 from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
-from tfcompose.model.plan import Ready, Schedule, Simulation, StopRule, Sweep
+from tfcompose.model.plan import Ready, Simulation, Sweep
 from tfcompose.model.robot import (
     BUILT_IN,
     GUARD,
@@ -25,23 +25,30 @@ from tfcompose.model.robot import (
     Process,
 )
 from tfcompose.spec.language.habits import habit
-from tfcompose.spec.language.process import RUNNING, SIMULATIONS, SWEEP, keys_of
+from tfcompose.spec.language.process import (
+    RUNNING,
+    SIMULATIONS,
+    SWEEP,
+    ReadySpec,
+    ScheduleSpec,
+    StopSpec,
+    keys_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
     from tfcompose.foundation.findings import Span
-    from tfcompose.model.plan import ProcessKind, SchedulingPolicy
+    from tfcompose.model.plan import ProcessKind
+    from tfcompose.model.process_keys import Way
     from tfcompose.model.robot import Edge, Joint, Robot
     from tfcompose.spec.language import Validated
     from tfcompose.spec.language.process import (
         ContainerSpec,
         ProcessSpec,
-        ReadySpec,
         Run,
         Simulate,
         Started,
-        Way,
     )
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path, Source
@@ -240,20 +247,18 @@ _FIELDS = frozenset(one.name for one in fields(Process) if one.init)
 
 def how(declared: Started | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:
     """Return the fields of a process that runs in this way, by the keys that have their names."""
-    found = {key: getattr(declared, key) for key in _FIELDS & keys_of(way)}
-    stop, ready, schedule = (found.pop(key, None) for key in ("stop", "ready", "schedule"))
-    if schedule:
-        usual: SchedulingPolicy = "fifo" if schedule.priority else "other"
-        found["schedule"] = Schedule(
-            schedule.cpus, schedule.policy or usual, schedule.priority or 0
-        )
+    stated: dict[str, Any] = {}
+    for key in _FIELDS & keys_of(way):
+        value = getattr(declared, key)
+        if isinstance(value, ReadySpec):
+            stated[key] = _ready(value, namespace)
+        elif isinstance(value, (ScheduleSpec, StopSpec)):
+            stated[key] = value.planned()
+        elif value is not None:
+            stated[key] = value
     if declared.namespace is not None:
-        found["namespace"] = namespace
-    if stop:
-        found["stop"] = StopRule(stop.signal, stop.timeout, stop.kill_timeout)
-    if ready:
-        found["ready"] = _ready(ready, namespace)
-    return found
+        stated["namespace"] = namespace
+    return stated
 
 
 def program(run: Run, *, shell: bool) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from tfcompose.compiler.urdf.inertia import of_primitives
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.plan import switch_text
+from tfcompose.model.process_keys import PROCESS_KEYS
 from tfcompose.model.robot import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
 from tfcompose.spec.language.preset import Chosen
 
@@ -250,19 +251,7 @@ def _has_driven_frames(sensor: Sensor) -> bool:
 
 
 #: What a driver's further processes have in common with its first.
-_INHERITED = frozenset(
-    {
-        "env",
-        "cwd",
-        "host",
-        "log_level",
-        "restart",
-        "max_restarts",
-        "restart_delay",
-        "stop",
-        "schedule",
-    }
-)
+_INHERITED = frozenset({"host", *(row.name for row in PROCESS_KEYS if row.is_shared)})
 #: In an argument, the file that holds the parameters of a process.
 PARAMS_FILE = "${params_file}"
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.model.process_keys import PROCESS_KEYS
+
 if TYPE_CHECKING:
     from collections.abc import Collection
 
@@ -17,7 +19,7 @@ _OPTION = "it is an option of the sensor: options: {WORD: …}; tfcompose preset
 _MASS = "it belongs under inertial: {mass: 2 kg}"
 
 #: By the word: the key that has its meaning, where that is known, and what to write.
-_HABITS: dict[str, tuple[tuple[str, str], ...]] = {
+_OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
     word: meanings
     for words, meanings in (
         ("pose origin transform", (("xyz", _POSE),)),
@@ -115,28 +117,10 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
             "depends_on requires wait_for needs",
             (("after", "what it waits for is after: {NAME: ready}"),),
         ),
-        ("respawn", (("restart", "restart: on-failure, or always, starts it again"),)),
-        ("respawn_delay", (("restart_delay", "how long after its end is restart_delay: 2 s"),)),
-        ("respawn_max_retries", (("max_restarts", "how often in a row is max_restarts: 5"),)),
-        ("launch_prefix", (("prefix", "a program that runs it is prefix: [nice, -n, '10']"),)),
-        ("sigterm_timeout", (("stop", "how long it may take to end is stop: {timeout: 5 s}"),)),
-        (
-            "sigkill_timeout",
-            (("stop", "the time from SIGTERM to SIGKILL is stop: {kill_timeout: 10 s}"),),
-        ),
-        (
-            "cpus cpu_affinity affinity",
-            (("schedule", "its processors are schedule: {cpus: [2, 3]}"),),
-        ),
-        (
-            "priority sched_priority",
-            (("schedule", "a real-time priority is schedule: {priority: 80}"),),
-        ),
         ("if condition unless", (("when", "whether it is there is when: ${args.sim}"),)),
         (
-            "env environment additional_env",
+            "env environment",
             (
-                ("env", "variables are env: {NAME: value}"),
                 (
                     "processes",
                     (
@@ -248,6 +232,17 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
         ),
     )
     for word in words.split()
+}
+#: Keys of a process that another format calls so, by the word.
+_OF_PROCESSES: dict[str, tuple[tuple[str, str], ...]] = {
+    word: ((row.name, advice),)
+    for row in PROCESS_KEYS
+    for words, advice in row.habits
+    for word in words.split()
+}
+_HABITS = {
+    word: _OF_PROCESSES.get(word, ()) + _OF_THE_LANGUAGE.get(word, ())
+    for word in _OF_THE_LANGUAGE.keys() | _OF_PROCESSES.keys()
 }
 
 

@@ -2,11 +2,19 @@
 
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    create_model,
+)
 from pydantic_core import PydanticCustomError
 from typing_extensions import TypeAliasType
 
@@ -23,15 +31,31 @@ from tfcompose.foundation.units import (
 )
 from tfcompose.model.plan import (
     LifecycleState,
-    LogLevel,
-    OutputPlace,
-    PlanProcess,
     ReadyKind,
-    RestartPolicy,
+    Schedule,
     SchedulingPolicy,
     SimulationKind,
     StartCondition,
+    StopRule,
     StopSignal,
+)
+from tfcompose.model.process_keys import (
+    ALL,
+    EXTRA_ARGUMENTS,
+    LOADED,
+    NODE_KEYS,
+    NOT_OWN,
+    NOT_SIMULATED,
+    OF_NODES,
+    OWN,
+    REMAPPED,
+    SUPERVISION_KEYS,
+    SURROUNDING_KEYS,
+    Folder,
+    Integer,
+    ProcessKey,
+    Seconds,
+    Way,
 )
 from tfcompose.spec.language.expressions import inserted
 from tfcompose.spec.language.node_preset import ClaimSpec
@@ -52,9 +76,6 @@ from tfcompose.spec.language.values import (
     short,
 )
 from tfcompose.spec.load import Path
-
-#: What a process of the plan is where nothing is said.
-DEFAULTS = PlanProcess("", "run")
 
 
 def _inserted(value: Any) -> Any:
@@ -236,6 +257,11 @@ class ScheduleSpec(Checked):
         None, "the priority of fifo and rr, 1 to 99", 80
     )
 
+    def planned(self) -> Schedule:
+        """Return the schedule as the plan has it."""
+        usual: SchedulingPolicy = "fifo" if self.priority else "other"
+        return Schedule(self.cpus, self.policy or usual, self.priority or 0)
+
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
         """Yield also a priority of a policy that has none, and one that is missing."""
@@ -262,11 +288,15 @@ class ScheduleSpec(Checked):
 class StopSpec(Spec):
     """How a process is stopped: a first signal to its whole group, then firmer ones."""
 
-    signal: StopSignal = key(DEFAULTS.stop.signal, "the first signal")
+    signal: StopSignal = key(StopRule().signal, "the first signal")
     timeout: Duration | None = key(None, "how long until the next, firmer one", "5 s")
     kill_timeout: Duration | None = key(
         None, "how long from SIGTERM to SIGKILL; default: timeout", "10 s"
     )
+
+    def planned(self) -> StopRule:
+        """Return the rule as the plan has it."""
+        return StopRule(self.signal, self.timeout, self.kill_timeout)
 
 
 def _is_regular(value: str) -> str:
@@ -367,86 +397,82 @@ Isolation = Literal["shared", "isolated"]
 Executor = Literal["single", "multi"]
 
 RUNNING = frozenset({"run", "simulate", "external", "component"})
-Way = Literal["run", "simulate", "external", "component", "container", "built-in"]
-"""How a process runs, by the key that says so; built-in: one of tfcompose's own."""
-#: To which processes a key applies, if not only to those that ``run``.
-ALL: tuple[Way, ...] = ("run", "simulate", "external", "component", "container", "built-in")
-NOT_OWN: tuple[Way, ...] = ("run", "simulate", "external", "component", "container")
-REMAPPED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
-NOT_EXTERNAL: tuple[Way, ...] = ("run", "simulate", "container", "built-in")
-NOT_SIMULATED: tuple[Way, ...] = ("run", "external", "component", "container")
-OF_NODES: tuple[Way, ...] = ("run", "external", "component")
-PROGRAM: tuple[Way, ...] = ("run", "container")
-KEPT_ALIVE: tuple[Way, ...] = ("run", "simulate", "component", "container")
-STARTED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
-ENDED: tuple[Way, ...] = ("run", "simulate", "container")
-LOADED: tuple[Way, ...] = ("component",)
-OWN: tuple[Way, ...] = ("built-in",)
+#: How the language writes what a row of the table holds, where that is not its type.
+_ANNOTATIONS: dict[Any, Any] = {
+    bool: Boolean,
+    Seconds: Duration,
+    Folder: Text,
+    dict[str, str]: dict[VariableName, Word],
+    dict[str, Any]: Parameters,
+    tuple[str, ...]: Prefix,
+    Schedule: ScheduleSpec,
+    StopRule: StopSpec,
+}
 
 
-class Supervised(Checked):
-    """What every process has: its place, its start, and what follows its end."""
+def _annotation_of(row: ProcessKey) -> Any:
+    """Return the annotation of a row's key."""
+    kind = row.type
+    if isinstance(kind, Integer):
+        bounds = Field(ge=kind.lowest, le=kind.highest)
+        annotation: Any = Annotated[int, Strict(), bounds, Integral]
+    else:
+        annotation = _ANNOTATIONS.get(kind, kind)
+    return annotation | None if row.default is None else annotation
 
-    params: Parameters = key({}, _PARAMS, {"use_sim_time": False}, to=NOT_SIMULATED)
-    log_level: LogLevel | None = key(None, "the level of its nodes' loggers", to=PROGRAM)
-    remap: dict[RosName, RosName] = key(
-        {}, "topics, services and actions under other names", {"scan": "front/scan"}, to=REMAPPED
-    )
-    env: dict[VariableName, Word] = key(
-        {}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL
-    )
-    cwd: Text | None = key(
-        None,
-        "the folder that it runs in, relative to this file; default: where up is called",
-        "maps",
-        to=PROGRAM,
-    )
-    output: OutputPlace = key(
-        DEFAULTS.output,
-        "where its output goes: to the terminal of up and into its log, or to one of them",
-        to=STARTED,
-    )
-    emulate_tty: Boolean = key(
-        DEFAULTS.emulate_tty,
-        "true: it writes to a pseudo-terminal, line by line and in colours",
-        to=PROGRAM,
-    )
-    host: Text | None = key(None, "the computer that it runs on", "jetson", to=ALL)
-    required: Boolean | None = key(
-        None,
-        "true: its end stops everything, unless another process waits until it is done; false: the"
-        " rest goes on when it fails; default: its failure stops everything",
-        to=KEPT_ALIVE,
-    )
-    restart: RestartPolicy = key(
-        DEFAULTS.restart, "when it is started again after it has ended", to=KEPT_ALIVE
-    )
-    max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Integral] | None = key(
-        None, "how often in a row it is started again before it is given up", 5, to=KEPT_ALIVE
-    )
-    restart_delay: Duration | None = key(
-        None,
-        "how long after its end it is started again; default: 1 s, doubled each time, up to 30 s",
-        to=KEPT_ALIVE,
-    )
-    prefix: Prefix = key(
-        (),
-        "a program that runs it, with its arguments: gdb, valgrind, nice, …",
-        ["nice", "-n", "10"],
-        to=PROGRAM,
-    )
-    schedule: ScheduleSpec | None = key(
-        None,
-        "its processors and real-time priority",
-        {"cpus": [2, 3], "priority": 80},
-        to=NOT_EXTERNAL,
-    )
-    stop: StopSpec | None = key(
-        None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"}, to=ENDED
-    )
-    ready: Ready | None = key(None, "when it counts as ready", {"topic": "scan"}, to=NOT_SIMULATED)
-    after: dict[str, StartCondition] = key(
-        {}, "what must have happened before it is started", {"base_drive": "ready"}, to=ALL
+
+def _key(row: ProcessKey) -> Any:
+    return key(row.default, row.help, *row.examples, to=row.to)
+
+
+def _keys(rows: Iterable[ProcessKey]) -> dict[str, Any]:
+    """Return the keys of some rows, as ``create_model`` takes them."""
+    return {row.name: (_annotation_of(row), _key(row)) for row in rows}
+
+
+if TYPE_CHECKING:
+
+    class Supervised(Checked):
+        """What the compiler reads by its name of what every process has."""
+
+        params: Parameters
+        env: dict[str, str]
+        host: Text | None
+        required: bool | None
+
+else:
+    Supervised = create_model(
+        "Supervised",
+        __base__=Checked,
+        __module__=__name__,
+        __doc__="What every process has: its place, its start, and what follows its end.",
+        params=(Parameters, key({}, _PARAMS, {"use_sim_time": False}, to=NOT_SIMULATED)),
+        **_keys(NODE_KEYS),
+        remap=(
+            dict[RosName, RosName],
+            key(
+                {},
+                "topics, services and actions under other names",
+                {"scan": "front/scan"},
+                to=REMAPPED,
+            ),
+        ),
+        **_keys(SURROUNDING_KEYS),
+        host=(Text | None, key(None, "the computer that it runs on", "jetson", to=ALL)),
+        **_keys(SUPERVISION_KEYS),
+        ready=(
+            Ready | None,
+            key(None, "when it counts as ready", {"topic": "scan"}, to=NOT_SIMULATED),
+        ),
+        after=(
+            dict[str, StartCondition],
+            key(
+                {},
+                "what must have happened before it is started",
+                {"base_drive": "ready"},
+                to=ALL,
+            ),
+        ),
     )
 
 
@@ -482,12 +508,7 @@ class Started(Supervised):
     container: Text | None = key(
         None, "the container that loads the component", "perception", to=LOADED
     )
-    extra_arguments: Parameters = key(
-        {},
-        "what the container is told about the component",
-        {"use_intra_process_comms": True},
-        to=LOADED,
-    )
+    extra_arguments: Parameters = _key(EXTRA_ARGUMENTS)
     shell: OnlyTrue | None = key(None, "true: run is one string, which /bin/sh reads", True)
     node: Annotated[NamedNode, short("name", NamedNode)] | None = key(
         None,
@@ -542,7 +563,7 @@ class Started(Supervised):
                     "TF102", "a component without a container", "container: NAME", on_key=True
                 ),
             )
-        for name in ("container", "extra_arguments") if "component" not in data else ():
+        for name in ("container", EXTRA_ARGUMENTS.name) if "component" not in data else ():
             if name in data:
                 advice = "component: PACKAGE/CLASS"
                 yield (

@@ -10,7 +10,6 @@ even with ``Recreate``.
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -18,26 +17,30 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import OWN_KINDS
+from tfcompose.model.process_keys import PROCESS_KEYS
 from tfcompose.tools.exporters.supervisors import (
     INSIDE,
-    STOP_S,
     after,
     command_of,
     distinct,
+    exported_of,
     gaps_of,
     outside_of,
     plain_name,
     plain_names,
     probe_of,
+    settings_of,
     waiting_s,
     yaml_text,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Mapping
+    from collections.abc import Mapping
 
     from tfcompose.model.plan import Plan, PlanProcess
+    from tfcompose.model.process_keys import Exported
 
+_KUBERNETES = tuple(key.kubernetes for key in PROCESS_KEYS)
 #: How much a ConfigMap takes, in bytes
 #: (https://kubernetes.io/docs/concepts/configuration/configmap/).
 MOST_BYTES = 1_000_000
@@ -86,19 +89,16 @@ def kubernetes(
     """
     robot = cluster_name(plan.robot)
     names = plain_names(plan, lambda name: cluster_name(f"{robot}-{name}"))
-    awaited = {
-        name for process in plan.started for name, what in process.after.items() if what == "done"
-    }
+    exported = exported_of(plan)
     manifests = {"service": _service(robot)}
     if not cluster.folder:
         manifests["plan"] = _config_map(robot, texts)
     for process in plan.started:
         name = names[process.name]
-        pod = _pod(plan, process, _labels(robot, name), cluster, texts)
-        is_job = process.name in awaited
+        pod = _pod(plan, exported[process.name], _labels(robot, name), cluster, texts)
         manifests[name] = (
-            _job(name, robot, pod, process.restart_limit)
-            if is_job
+            _job(name, robot, pod, _settings(exported[process.name], "job"))
+            if exported[process.name].awaited
             else _stateful_set(name, robot, pod)
         )
     files = [File(f"{name}.yaml", yaml_text(manifest)) for name, manifest in manifests.items()]
@@ -107,15 +107,18 @@ def kubernetes(
         "kind": "Kustomization",
         "resources": [file.path for file in files],
     }
-    return (File("kustomization.yaml", yaml_text(kustomization)), *files), _gaps(plan, awaited)
+    return (File("kustomization.yaml", yaml_text(kustomization)), *files), _gaps(plan)
 
 
-def _gaps(plan: Plan, awaited: Container[str]) -> list[str]:
+def _settings(exported: Exported, section: str) -> dict[str, Any]:
+    settings = settings_of(_KUBERNETES, exported)
+    return {setting.name: setting.value for setting in settings if setting.section == section}
+
+
+def _gaps(plan: Plan) -> list[str]:
     """Return what Kubernetes does otherwise, one sentence each."""
-    gaps = gaps_of(plan) + outside_of(plan, INSIDE)
+    gaps = gaps_of(plan, _KUBERNETES) + outside_of(plan, INSIDE)
     for process in plan.started:
-        if process.name not in awaited and process.kind == "run" and process.restart != "always":
-            gaps.append(f"{process.name} is started again whenever it ends")
         for name, what in after(plan, process).items():
             if not _waiting_for(plan, name, what):
                 gaps.append(
@@ -180,22 +183,23 @@ def _stateful_set(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
     return _manifest("StatefulSet", "apps/v1", name, robot, {"spec": spec})
 
 
-def _job(name: str, robot: str, pod: dict[str, Any], restart_limit: int) -> dict[str, Any]:
+def _job(name: str, robot: str, pod: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
     """Return a workload that ends; its name changes with its content, because a job cannot be changed."""
     content = pod["metadata"]["annotations"][_CONTENT]
     template = {**pod, "spec": {**pod["spec"], "restartPolicy": "OnFailure"}}
-    spec = {"backoffLimit": restart_limit, "template": template}
+    spec = {**settings, "template": template}
     return _manifest("Job", "batch/v1", f"{name}-{content[:8]}", robot, {"spec": spec})
 
 
 def _pod(
     plan: Plan,
-    process: PlanProcess,
+    exported: Exported,
     labels: dict[str, str],
     cluster: Cluster,
     texts: Mapping[str, str],
 ) -> dict[str, Any]:
     """Return the template of the process's pod, on the network and in the shared memory of its node, as DDS needs."""
+    process = exported.process
     common = {
         "image": cluster.image,
         "env": [
@@ -217,18 +221,14 @@ def _pod(
         **common,
         "args": [_kept(word) for word in command],
         **_probes(plan, process),
+        **_settings(exported, "container"),
     }
-    stop_s = STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
-    if process.stop.signal != "SIGTERM":
-        signal = process.stop.signal.removeprefix("SIG")
-        words = ["sh", "-c", f"kill -s {signal} 1; sleep {stop_s / 2:g}"]
-        container["lifecycle"] = {"preStop": {"exec": {"command": words}}}
     spec = {
         "hostNetwork": True,
         "hostIPC": True,
         "dnsPolicy": "ClusterFirstWithHostNet",
         **({"nodeSelector": _node_selector(plan, process.host)} if process.host else {}),
-        "terminationGracePeriodSeconds": math.ceil(stop_s),
+        **_settings(exported, "pod"),
         **({"initContainers": waits} if waits else {}),
         "containers": [container],
         "volumes": [{"name": "plan", **_volume(plan, process, labels[_ROBOT], cluster, texts)}],

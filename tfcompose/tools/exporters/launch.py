@@ -6,7 +6,6 @@ import graphlib
 import io
 import json
 import re
-import shlex
 import tokenize
 from itertools import pairwise
 from keyword import iskeyword
@@ -18,6 +17,7 @@ from tfcompose.launcher.program import ANYWHERE_PARTS
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
+from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, PythonCode
 from tfcompose.tools.exporters.code import Code, call, items, keyword
 from tfcompose.tools.exporters.launch_values import (
     LaunchValues,
@@ -367,24 +367,21 @@ class _Export:
             )
         if _is_launch(process):
             return self._included(process)
-        delay = 1.0 if process.restart_delay is None else process.restart_delay
-        again = [] if process.restart == "no" else ["respawn=True", f"respawn_delay={delay}"]
-        again += (
-            [f"respawn_max_retries={process.max_restarts}"]
-            if again and process.max_restarts is not None
-            else []
-        )
-        ends = ("on_exit=Shutdown()",) if process.required else ()
-        more = [*again, *ends, *self._condition(process)]
         if _is_node(process):
-            return self._node(process, more)
+            return self._node(process, [*self._settings(process), *self._condition(process)])
         if _is_command(process):
             words = self._filled(process, process.argv)
             for index, text in self._texts_of(process, "args").items():
                 words[int(index)] = text_code(text)
-            run = [items(words, "cmd"), f"name={process.name!r}", *self._surroundings(process)]
-            return call("ExecuteProcess", *run, *more)
-        return call("process", repr(process.name), *more)
+            return call(
+                "ExecuteProcess",
+                items(words, "cmd"),
+                f"name={process.name!r}",
+                *self._settings(process),
+                *self._condition(process),
+            )
+        settings = self._settings(process, is_own=False)
+        return call("process", repr(process.name), *settings, *self._condition(process))
 
     def _file(self, process: PlanProcess) -> str:
         """Return Python that gives the process's parameter file."""
@@ -402,23 +399,33 @@ class _Export:
             name: text_code(text) for name, text in self._texts_of(process, "env").items()
         }
 
-    def _surroundings(self, process: PlanProcess) -> Iterator[Code | str]:
-        """Yield the keywords that any process takes."""
-        env = self._environment(process)
-        if process.cwd is not None:
-            yield f"cwd={_filled(process.cwd, '')}"
-        if env:
-            yield _mapping(env, "additional_env")
-        if process.prefix:
-            yield f"prefix={shlex.join(process.prefix)!r}"
-        stop = process.stop
-        kill_timeout_s = stop.timeout_s if stop.kill_timeout_s is None else stop.kill_timeout_s
-        for word, value in (("sigterm", stop.timeout_s), ("sigkill", kill_timeout_s)):
-            if value is not None:
-                yield f"{word}_timeout={number(value)!r}"
-        if process.emulate_tty:
-            yield "emulate_tty=True"
-        yield f"output={_OUTPUTS[process.output]}"
+    def _settings(self, process: PlanProcess, *, is_own: bool = True) -> Iterator[Code | str]:
+        """Yield the keywords of a process's keys; ``is_own``: launch starts its program itself."""
+        for key in PROCESS_KEYS:
+            dialect = key.launch
+            if dialect is None or (dialect.is_own and not is_own):
+                continue
+            for name, value, _ in dialect.settings(process):
+                code = self._python(process, value, self._texts_of(process, key.name))
+                if str(code) != "{}":
+                    yield keyword(name, code)
+
+    def _python(
+        self, process: PlanProcess, value: Any, texts: Mapping[str, Text] | None = None
+    ) -> Code | str:
+        """Return a value as Python; ``texts`` are what the launch file makes itself of a mapping."""
+        if isinstance(value, PythonCode):
+            return str(value)
+        if isinstance(value, str):
+            return _filled(value, self._file(process))
+        if isinstance(value, list):
+            return items([self._python(process, item) for item in value])
+        if isinstance(value, dict):
+            made = {name: text_code(text) for name, text in (texts or {}).items()}
+            return _mapping(
+                {name: self._python(process, item) for name, item in value.items()} | made
+            )
+        return repr(value)
 
     def _node(self, process: PlanProcess, more: list[Code | str]) -> Code:
         package = _EXECUTABLE.fullmatch(process.argv[0])
@@ -444,7 +451,7 @@ class _Export:
             *([items(words, "arguments")] if words else []),
             *([items(self._filled(process, ros_words), "ros_arguments")] if ros_words else []),
             *([items(given, "parameters")] if given else []),
-            *self._surroundings(process), *more,
+            *more,
         ]  # fmt: skip
         if loaded := self._loaded_by(process):
             components = [
@@ -465,24 +472,20 @@ class _Export:
         if process.component is None:
             raise ValueError(f"{process.name} is no component")
         found = process.component
-        params = {name: self._value(process, value) for name, value in found.params.items()}
+        params = {name: self._python(process, value) for name, value in found.params.items()}
         params |= {
             name: parameter_code(text) for name, text in self._texts_of(process, "params").items()
         }
-        extra = {name: repr(value) for name, value in found.extra_arguments.items()}
+        extra = EXTRA_ARGUMENTS.launch.settings(process) if EXTRA_ARGUMENTS.launch else ()
+        more = [keyword(name, self._python(process, value)) for name, value, _ in extra]
         also, conditions = self._comes_with_container(process), self.values.conditions
         needed = also and conditions.get(process.name) != conditions.get(found.container)
         condition = self._condition(process) if needed else []
         return call(
             "ComposableNode", f"package={found.package!r}", f"plugin={found.plugin!r}", *_named(process),
             *self._remapped(process), *([items([_mapping(params)], "parameters")] if params else []),
-            *([items([_mapping(extra)], "extra_arguments")] if extra else []), *condition,
+            *more, *condition,
         )  # fmt: skip
-
-    def _value(self, process: PlanProcess, value: Any) -> Code | str:
-        if isinstance(value, list):
-            return items([self._value(process, one) for one in value])
-        return _filled(value, self._file(process)) if isinstance(value, str) else repr(value)
 
     def _remapped(self, process: PlanProcess) -> Iterator[Code]:
         remap: dict[str, Code | str] = {old: repr(new) for old, new in process.remap.items()}
@@ -529,10 +532,6 @@ def _named(process: PlanProcess) -> Iterator[str]:
     yield f"namespace={namespace or '/'!r}"
 
 
-#: Where a process's output goes, as launch says it: its words for screen and log are others.
-_OUTPUTS = {"both": "'both'", "screen": "{'both': 'screen'}", "log": "{'both': 'log'}"}
-
-
 def _variable_name(name: str, taken: Collection[str]) -> str:
     plain = re.sub(r"\W", "_", name)
     plain = plain if plain.isidentifier() and not iskeyword(plain) else f"process_{plain}"
@@ -541,8 +540,8 @@ def _variable_name(name: str, taken: Collection[str]) -> str:
     return plain
 
 
-def _mapping(values: Mapping[str, Code | str], name: str = "") -> Code:
-    """Return a dict, or a keyword with one."""
+def _mapping(values: Mapping[str, Code | str]) -> Code:
+    """Return a dict."""
     several = (
         (
             f"{key!r}: {value}"
@@ -551,7 +550,7 @@ def _mapping(values: Mapping[str, Code | str], name: str = "") -> Code:
         )
         for key, value in values.items()
     )
-    return Code(f"{name}={{" if name else "{", tuple(several), "}")
+    return Code("{", tuple(several), "}")
 
 
 def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
@@ -577,23 +576,15 @@ def _unlike(process: PlanProcess) -> Iterator[str]:
             f"{', '.join(process.lifecycle)} of {process.name} is not brought into its lifecycle"
             " state"
         )
-    if _is_launch(process):
-        if process.restart != "no":
-            yield f"{process.name} is not started again: it is a launch file"
-        if process.required:
-            yield f"{process.name} is required: its end does not end the others here"
-        return
-    if process.kind == "run" and process.restart != "no":
-        whatever = "whatever its exit code, and " if process.restart == "on-failure" else ""
-        count = process.max_restarts
-        limit = (
-            "without a limit"
-            if count is None
-            else f"with a limit of {count} in all, and not in a row"
-        )
-        yield f"{process.name} is started again {whatever}{limit}"
-    if process.stop.signal != "SIGINT":
-        yield f"{process.name} is ended by SIGINT, and not by {process.stop.signal}"
+    for key in PROCESS_KEYS:
+        if key.launch is None or not key.is_set(process):
+            continue
+        if not _is_launch(process):
+            yield from key.launch.gaps(process)
+        elif key.launch.of_file:
+            yield from key.launch.of_file(process)
+        else:
+            yield f"{process.name} is a launch file, which has no {key.name} here"
 
 
 def _variables(plan: Plan) -> Iterator[tuple[str, str]]:
@@ -691,14 +682,23 @@ def _is_launch(process: PlanProcess) -> bool:
 
 def _is_node(process: PlanProcess) -> bool:
     """Return whether launch can start the process as one node, and not only as a process."""
-    return bool(_package(process)) and len(process.nodes) == 1 and not process.schedule
+    return bool(_package(process)) and len(process.nodes) == 1 and not _needs_launcher(process)
+
+
+def _needs_launcher(process: PlanProcess) -> bool:
+    """Return whether the process has a key that launch does not have."""
+    return any(
+        key.launch and key.launch.is_external and key.is_set(process) for key in PROCESS_KEYS
+    )
 
 
 def _is_command(process: PlanProcess) -> bool:
     """Return whether the process's command is one that launch can start as it is."""
     words = (*process.argv, *process.env.values())
     return (
-        process.kind == "run" and not process.schedule and not any(map(_PLACEHOLDER.search, words))
+        process.kind == "run"
+        and not _needs_launcher(process)
+        and not any(map(_PLACEHOLDER.search, words))
     )
 
 

@@ -16,16 +16,17 @@ import yaml
 from tfcompose.launcher.program import anywhere
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
+from tfcompose.model.process_keys import PROCESS_KEYS, Exported
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from tfcompose.model.plan import Plan, PlanProcess
+    from tfcompose.model.process_keys import Dialect, Setting
 
 
-#: How long a process has to end, in seconds: SIGINT and SIGTERM, five each, in the launcher's
-#: hands.
-STOP_S = 10.0
+_SYSTEMD = tuple(key.systemd for key in PROCESS_KEYS)
+_COMPOSE = tuple(key.compose for key in PROCESS_KEYS)
 
 _NO_NAME = re.compile(r"[^A-Za-z0-9_.]+")
 
@@ -73,9 +74,17 @@ def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:
     return [*anywhere(python), "exec", plan_file, process.name]
 
 
-def restart_of(process: PlanProcess) -> str:
-    """Return when it is started again: tfcompose's own after each failure, for here no launcher ends everything."""
-    return process.restart if process.kind == "run" else "on-failure"
+def exported_of(plan: Plan) -> dict[str, Exported]:
+    """Return the processes as another supervisor starts them, by their names."""
+    awaited = {
+        name for process in plan.started for name, what in process.after.items() if what == "done"
+    }
+    return {process.name: Exported(process, process.name in awaited) for process in plan.processes}
+
+
+def settings_of(dialects: Iterable[Dialect], exported: Exported) -> list[Setting]:
+    """Return what the keys of a process are to another supervisor."""
+    return [setting for dialect in dialects for setting in dialect.settings(exported)]
 
 
 def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
@@ -102,8 +111,12 @@ def waiting_s(process: PlanProcess, what: str) -> float:
     return ready.number if what == "ready" and ready and ready.kind == "time" else 0.0
 
 
-def gaps_of(plan: Plan) -> list[str]:
-    """Return what a supervisor that knows nothing of ROS does not do of the plan, one sentence each."""
+def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
+    """Return what a supervisor that knows nothing of ROS does not do of the plan, one sentence each.
+
+    ``dialects`` are what the keys of a process are to it.
+    """
+    exported = exported_of(plan)
     gaps = []
     if plan.guard.on_violation != "report":
         gaps.append(
@@ -117,8 +130,8 @@ def gaps_of(plan: Plan) -> list[str]:
     for process in plan.processes:
         if process.kind == "external":
             gaps.append(f"{process.name} is external, and not started")
-        if process.required:
-            gaps.append(f"{process.name} is required: its end does not end the others here")
+        for dialect in dialects:
+            gaps += dialect.gaps(exported[process.name])
         component = process.component
         for name in process.after:
             if component and name != component.container:
@@ -226,9 +239,7 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     done is ``Type=oneshot``. One that is ready so many seconds after its start has only started,
     for systemd, when a sleep of so many has ended.
     """
-    awaited = {
-        name for process in plan.started for name, what in process.after.items() if what == "done"
-    }
+    exported = exported_of(plan)
     names = {
         name: f"{plain_name(plan.robot)}-{plain}.service"
         for name, plain in plain_names(plan).items()
@@ -236,11 +247,11 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     units = [
         File(
             names[process.name],
-            _unit_text(plan, process, machine, names, done=process.name in awaited),
+            _unit_text(plan, exported[process.name], machine, names),
         )
         for process in plan.started
     ]
-    gaps = gaps_of(plan)
+    gaps = gaps_of(plan, _SYSTEMD)
     for process in plan.started:
         for name, what in process.after.items():
             other = plan.process(name)
@@ -276,24 +287,19 @@ def _settling_s(plan: Plan, process: PlanProcess) -> float:
     )
 
 
-def _unit_text(
-    plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str], *, done: bool
-) -> str:
+def _unit_text(plan: Plan, exported: Exported, machine: Machine, names: Mapping[str, str]) -> str:
     """Return the unit of a process; ``names`` are those of all units, by process."""
+    process = exported.process
     target = _target_name(plan)
     before = [names[name] for name in after(plan, process)]
-    kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
-    restart = restart_of(process)
+    kind = "oneshot" if exported.awaited else "exec" if process.kind == "run" else "notify"
     settling_s = _settling_s(plan, process)
+    settings = settings_of(_SYSTEMD, exported)
     unit = [
         f"Description={_plain(process.name)} of robot {plan.robot}",
         f"PartOf={target}",
         *(f"{key}={' '.join(before)}" for key in ("After", "Wants") if before),
-        *(
-            []
-            if restart == "no"
-            else ["StartLimitIntervalSec=300", f"StartLimitBurst={process.restart_limit + 1}"]
-        ),
+        *(f"{key}={value}" for key, value, section in settings if section == "Unit"),
     ]
     service = [
         f"Type={kind}",
@@ -307,12 +313,7 @@ def _unit_text(
         f"WorkingDirectory={_plain(machine.folder)}",
         f"ExecStart={_exec(process, machine)}",
         *([f"ExecStartPost=/bin/sleep {settling_s:g}"] if settling_s else []),
-        f"Restart={'on-failure' if done and restart == 'always' else restart}",
-        f"RestartSec={1 if process.restart_delay is None else process.restart_delay:g}",
-        f"KillSignal={process.stop.signal}",
-        "KillMode=mixed",
-        f"TimeoutStopSec={STOP_S if process.stop.timeout_s is None else process.stop.timeout_s:g}",
-        f"SuccessExitStatus={process.stop.signal} 130",
+        *(f"{key}={value}" for key, value, section in settings if section == "Service"),
     ]
     parts = (("Unit", unit), ("Service", service), ("Install", [f"WantedBy={target}"]))
     return "\n".join("\n".join([f"[{name}]", *lines, ""]) for name, lines in parts)
@@ -364,11 +365,12 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     the same host.
     """
     names = plain_names(plan)
+    exported = exported_of(plan)
     services = {
-        names[process.name]: _compose_service(plan, process, machine, names)
+        names[process.name]: _compose_service(plan, exported[process.name], machine, names)
         for process in plan.started
     }
-    gaps = gaps_of(plan)
+    gaps = gaps_of(plan, _COMPOSE)
     for process in plan.started:
         for name, what in process.after.items():
             other = plan.process(name)
@@ -392,16 +394,16 @@ def _profile(plan: Plan, process: PlanProcess) -> str | None:
 
 
 def _compose_service(
-    plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str]
+    plan: Plan, exported: Exported, machine: Machine, names: Mapping[str, str]
 ) -> dict[str, Any]:
     """Return the service of a process; ``names`` are those of all services, by process."""
+    process = exported.process
     profile = _profile(plan, process)
     waits = {
         name: what
         for name, what in after(plan, process).items()
         if _profile(plan, plan.process(name)) in (None, profile)
     }
-    stop_s = STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
     domain = "${ROS_DOMAIN_ID:-0}" if plan.ros.domain_id is None else str(plan.ros.domain_id)
     service: dict[str, Any] = {
         **({"profiles": [profile]} if profile else {}),
@@ -415,9 +417,7 @@ def _compose_service(
             {"type": "bind", "source": machine.folder, "target": INSIDE, "read_only": True}
         ],
         "working_dir": INSIDE,
-        "restart": _restart(process),
-        "stop_signal": process.stop.signal,
-        "stop_grace_period": f"{round(stop_s * 1000)}ms",
+        **{key: value for key, value, _ in settings_of(_COMPOSE, exported)},
     }
     if waits:
         service["depends_on"] = {
@@ -444,18 +444,6 @@ def _discovery(plan: Plan) -> dict[str, str]:
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
     )
     return discovery | middleware_variables(plan.ros, {})
-
-
-def _restart(process: PlanProcess) -> str:
-    restart = restart_of(process)
-    most = process.restart_limit
-    return (
-        f"on-failure:{most}"
-        if restart == "on-failure" and most
-        else "no"
-        if restart == "on-failure"
-        else restart
-    )
 
 
 def _kept(text: str) -> str:

@@ -7,7 +7,6 @@ import math
 import os
 import posixpath
 import re
-import shlex
 import signal
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.numbers import number
+from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, Folder, Seconds
 from tfcompose.tools.importers.confinement import MOST_CPU_S
 from tfcompose.tools.importers.launch_substitutions import marks, scalar_of, shown, without_marks
 from tfcompose.tools.importers.programs import (
@@ -45,10 +45,6 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import Draft
 
 _MOST_WALL_S = 60.0
-#: How long launch waits for the end of a process after each signal, unless it is told.
-_LAUNCH_STOP_S = 5.0
-#: The delay that exports write for a process without ``restart_delay``, whose first delay it is.
-_FIRST_DELAY_S = 1.0
 #: Programs whose arguments are read: they have their values.
 _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
@@ -353,11 +349,7 @@ class _Work:
             self._node(record | ({"params": []} if words else {}), span)
             return
         program = replace(self._program(record, span), plugin=plugin)
-        extra: dict[str, Any] = {}
-        for one in record["extra"]:
-            extra |= one if isinstance(one, dict) else {}
-        keys = {"extra_arguments": extra} if extra else {}
-        name = add_program(self.draft, replace(program, keys=keys), self.target) or ""
+        name = add_program(self.draft, program, self.target) or ""
         self._started(record, name)
         self._components.append((name, record["container"], span))
 
@@ -430,24 +422,21 @@ class _Work:
         keys: dict[str, Any] = {}
         if record.get("lifecycle"):
             keys["lifecycle"] = record["lifecycle"]
-        if record.get("cwd"):
-            keys["cwd"] = path_from(self.target, record["cwd"])
-        if record.get("required"):
-            keys["required"] = True
-        if record.get("respawn"):
-            keys |= _restarts(record)
-        if record.get("prefix"):
-            try:
-                keys["prefix"] = shlex.split(record["prefix"])
-            except ValueError:
-                todo.append(f"the prefix {record['prefix']}")
+        for row in (*PROCESS_KEYS, EXTRA_ARGUMENTS):
+            value = row.launch.read(record, todo) if row.launch else None
+            if value is not None:
+                keys[row.name] = self._in_language(value)
         if record.get("only_env"):
             todo.append("env replaces the environment: here its variables are added to it")
-        keys |= _output(record.get("output"))
-        if record.get("emulate_tty"):
-            keys["emulate_tty"] = True
-        keys |= _stop(record, todo)
         return keys
+
+    def _in_language(self, value: Any) -> Any:
+        """Return a key's value as a robot file has it."""
+        if isinstance(value, dict):
+            return {name: self._in_language(item) for name, item in value.items()}
+        if isinstance(value, Folder):
+            return path_from(self.target, value)
+        return _seconds(value) if isinstance(value, Seconds) else value
 
     def _describe(self, program: Program, span: Span) -> None:
         params: dict[str, Any] = {}
@@ -628,46 +617,3 @@ def _is_finite(value: Any) -> bool:
 def _description(value: str) -> Description:
     found = marks(value)
     return Description(found[0]["file"], found[0]["args"]) if found else Description(text=value)
-
-
-def _output(given: str | list[str] | None) -> dict[str, str]:
-    """Return the key for where launch sends a process's output, by its word for it or by the places.
-
-    With the word ``screen`` people want to see it: so they do by default here, and have it in the
-    log beside.
-    """
-    if given is None or isinstance(given, str):
-        return {"output": "log"} if given in {"log", "own_log"} else {}
-    if "screen" not in given:
-        return {"output": "log"}
-    return {"output": "screen"} if given == ["screen"] else {}
-
-
-def _stop(record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
-    """Return how long launch waits for an end after SIGINT, and after SIGTERM."""
-    times: dict[str, float] = {}
-    for key in ("sigterm_timeout", "sigkill_timeout"):
-        try:
-            times[key] = float(record.get(key, _LAUNCH_STOP_S))
-        except ValueError:
-            times[key] = math.nan
-        if not (math.isfinite(times[key]) and times[key] >= 0):
-            todo.append(f"{key} {record[key]}")
-            del times[key]
-    if len(times) < 2 or set(times.values()) == {_LAUNCH_STOP_S}:  # noqa: PLR2004 (both are known)
-        return {}
-    timeout_s, kill_s = times["sigterm_timeout"], times["sigkill_timeout"]
-    stop = {"timeout": _seconds(timeout_s)} if timeout_s != _LAUNCH_STOP_S else {}
-    return {"stop": stop | ({"kill_timeout": _seconds(kill_s)} if kill_s != timeout_s else {})}
-
-
-def _restarts(record: dict[str, Any]) -> dict[str, Any]:
-    """Return how a process that respawns is started again."""
-    keys: dict[str, Any] = {"restart": "always"}
-    retries = record.get("respawn_max_retries", -1)
-    if retries >= 0:
-        keys["max_restarts"] = int(retries)
-    delay_s = record.get("respawn_delay", 0.0)
-    if math.isfinite(delay_s) and delay_s > 0 and delay_s != _FIRST_DELAY_S:
-        keys["restart_delay"] = _seconds(delay_s)
-    return keys

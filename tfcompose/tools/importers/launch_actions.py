@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from tfcompose.model.process_keys import KeywordKind, launch_keywords
 from tfcompose.tools.importers.launch_substitutions import (
     MODULE,
     PACKAGE,
@@ -595,35 +596,34 @@ class ExecuteProcess(Action):
     def common(self, context: Context) -> dict[str, Any]:
         """Return what any process can be told."""
         given = self.kwargs
-        env = {**context.variables, **_texts(given.get("additional_env"), context)}
-        env |= _texts(given.get("env"), context)
+        variables = [given.get(keyword.name) for keyword in launch_keywords("variables")]
+        env = dict(context.variables)
+        for values in variables:
+            env |= _texts(values, context)
         what: dict[str, Any] = {
             "id": self.id,
             "env": env,
             "period": context.period_s,
             "after": dict(context.after),
         }
-        for key in ("cwd", "prefix", "sigterm_timeout", "sigkill_timeout"):
-            if given.get(key) is not None:
-                what[key] = text_of(given[key], context)
-        if given.get("output") is not None:
-            what["output"] = _output(given["output"], context)
-        for key in ("shell", "respawn", "emulate_tty"):
-            if given.get(key) is not None:
-                what[key] = (
-                    given[key] if isinstance(given[key], bool) else truth(given[key], context)
-                )
-        for key in ("respawn_delay", "respawn_max_retries"):
-            if given.get(key) is not None:
-                what[key] = float(text_of(given[key], context))
-        if given.get("env") is not None:
+        if variables[-1] is not None:
             what["only_env"] = True
-        ends = given.get("on_exit")
-        several = ends if isinstance(ends, (list, tuple)) else [ends]
-        what["required"] = any(isinstance(one, Shutdown) for one in several)
-        if any(one is not None and not isinstance(one, Shutdown) for one in several):
-            context.todo(self.at, "on_exit of a process")
+        kinds = {keyword.name: keyword.kind for keyword in launch_keywords(*_READERS)}
+        kinds["shell"] = "switch"
+        for name, kind in kinds.items():
+            if given.get(name) is not None:
+                what[name] = _READERS[kind](given[name], context)
+        for keyword in launch_keywords("shutdown"):
+            what[keyword.name] = self._ends_all(keyword.name, context)
         return what
+
+    def _ends_all(self, keyword: str, context: Context) -> bool:
+        """Return whether the process's end shuts everything down; name what else follows it."""
+        actions = self.kwargs.get(keyword)
+        actions = actions if isinstance(actions, (list, tuple)) else [actions]
+        if any(action is not None and not isinstance(action, Shutdown) for action in actions):
+            context.todo(self.at, f"{keyword} of a process")
+        return any(isinstance(action, Shutdown) for action in actions)
 
     def described(self, context: Context) -> str:
         return f"the process {plain(self.cmd)}"
@@ -649,6 +649,23 @@ def _output(given: Any, context: Context) -> str | list[str]:
     if word not in _OUTPUTS:
         raise FailedError(f"output={word!r}")
     return word
+
+
+def _switch(value: Any, context: Context) -> bool:
+    return value if isinstance(value, bool) else truth(value, context)
+
+
+def _number(value: Any, context: Context) -> float:
+    return float(text_of(value, context))
+
+
+#: What reads a keyword's value, by its kind.
+_READERS: dict[KeywordKind, Callable[[Any, Context], Any]] = {
+    "text": text_of,
+    "switch": _switch,
+    "number": _number,
+    "output": _output,
+}
 
 
 def _optional(value: Any, context: Context) -> str | None:
@@ -720,29 +737,27 @@ class ComposableNode(Action):
     """A node that a container loads; ``context.container`` is that, while it is visited."""
 
     def __init__(self, *, package: Any, plugin: Any = None, name: Any = None, namespace: Any = None,
-                 parameters: Any = None, remappings: Any = None, extra_arguments: Any = None,
-                 **kwargs: Any) -> None:  # fmt: skip
+                 parameters: Any = None, remappings: Any = None, **kwargs: Any) -> None:  # fmt: skip
         plugin = kwargs.pop("node_plugin", plugin)
         name, namespace = kwargs.pop("node_name", name), kwargs.pop("node_namespace", namespace)
         super().__init__(**kwargs)
         self.package, self.plugin, self.name, self.namespace = package, plugin, name, namespace
-        self.parameters, self.remappings, self.extra_arguments = (
-            parameters,
-            remappings,
-            extra_arguments,
-        )
+        self.parameters, self.remappings = parameters, remappings
 
     def execute(self, context: Context) -> None:
         if context.container is None:
             raise FailedError("no container loads it")
-        extra = parameters_of(self.extra_arguments, context, self.at)
+        more = {
+            keyword.name: parameters_of(self.kwargs.get(keyword.name), context, self.at)
+            for keyword in launch_keywords("parameters")
+        }
         context.record(
             "component", self.at, id=self.id, container=context.container, package=text_of(self.package, context),
             plugin=text_of(self.plugin, context), name=_optional(self.name, context),
             namespace=below(context.namespace, _optional(self.namespace, context)),
             params=[*context.params, *parameters_of(self.parameters, context, self.at)],
-            remap=[*context.remaps, *rules_of(self.remappings, context)], extra=extra, period=context.period_s,
-            after=dict(context.after),
+            remap=[*context.remaps, *rules_of(self.remappings, context)], period=context.period_s,
+            after=dict(context.after), **more,
         )  # fmt: skip
 
     def described(self, context: Context) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.urdf.read import read_xml
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.model.process_keys import launch_keywords
 from tfcompose.spec.load import load
 from tfcompose.tools.importers import launch_actions as actions
 from tfcompose.tools.importers import launch_conditions as conditions
@@ -420,19 +421,22 @@ def _global_parameter(one: Entity, _context: Context) -> list[Any]:
 
 
 def _common(entity: Entity) -> dict[str, Any]:
-    names = {"cwd": "cwd", "output": "output", "launch-prefix": "prefix", "respawn": "respawn",
-             "respawn_delay": "respawn_delay", "respawn_max_retries": "respawn_max_retries", "shell": "shell",
-             "emulate_tty": "emulate_tty", "sigterm_timeout": "sigterm_timeout",
-             "sigkill_timeout": "sigkill_timeout"}  # fmt: skip
+    attributes = {
+        keyword.attribute or keyword.name: keyword.name
+        for keyword in launch_keywords("text", "switch", "number", "output")
+    }
+    attributes["shell"] = "shell"
     given = {
-        word: value
-        for name, word in names.items()
-        if (value := _optional(entity, name)) is not None
+        name: value
+        for attribute, name in attributes.items()
+        if (value := _optional(entity, attribute)) is not None
     }
     env = [(_need(one, "name"), _need(one, "value")) for one in entity.all("env")]
-    given |= {"additional_env": env} if env else {}
-    if entity.get("on_exit") == "shutdown" or str(entity.get("required")).lower() == "true":
-        given["on_exit"] = [actions.Shutdown()]
+    given |= {launch_keywords("variables")[0].name: env} if env else {}
+    for keyword in launch_keywords("shutdown"):
+        is_required = str(entity.get(keyword.ros1)).lower() == "true"
+        if entity.get(keyword.name) == "shutdown" or is_required:
+            given[keyword.name] = [actions.Shutdown()]
     entity.get("clear_params")
     return given
 
@@ -476,7 +480,10 @@ def _component(entity: Entity, _context: Context) -> list[Any]:
         package=_need(entity, "pkg"), plugin=_need(entity, "plugin"), name=_optional(entity, "name"),
         namespace=_optional(entity, "namespace"), parameters=_parameters(entity),
         remappings=[(_need(rule, "from"), _need(rule, "to")) for rule in entity.all("remap")],
-        extra_arguments=[dict([_parameter(one)]) for one in entity.all("extra_arg")],
+        **{
+            keyword.name: [dict([_parameter(one)]) for one in entity.all(keyword.attribute)]
+            for keyword in launch_keywords("parameters")
+        },
     )  # fmt: skip
     return [component]
 

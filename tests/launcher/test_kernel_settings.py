@@ -17,8 +17,8 @@ from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.launcher.child import spawn
+from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.launcher.preflight import commands_of
-from tfcompose.launcher.schedule import refused_schedule
 from tfcompose.model.plan import Plan, PlanProcess, RosSettings, Schedule
 from tfcompose.tf.ros.environment import child_environment
 
@@ -35,13 +35,13 @@ ASKS = (
 )
 ASKS_AS_NOBODY = """
 import json, os
-from tfcompose.launcher.schedule import refused_schedule
+from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.model.plan import PlanProcess, Schedule
 if not os.getuid():
     os.setuid(65534)
 before = os.sched_getscheduler(0)
-found = refused_schedule(PlanProcess("p", "run", schedule=Schedule((), "{policy}")))
-print(json.dumps([found and found.message, os.sched_getscheduler(0) - before]))
+found = refused_settings(PlanProcess("p", "run", schedule=Schedule((), "{policy}")))
+print(json.dumps([[one.message for one in found], os.sched_getscheduler(0) - before]))
 """
 PROCESS = PlanProcess("p", "run", argv=(sys.executable, "-c", ASKS))
 
@@ -77,8 +77,9 @@ def test_what_the_kernel_refuses_is_a_finding_and_nothing_is_started(tmp_path: P
     _, found = commands(tmp_path, replace(PROCESS, schedule=Schedule((4095,))))
     expect(found[0], "TF911", "p", "CPU 4095")
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
-        refused = refused_schedule(replace(PROCESS, schedule=Schedule((min(before),), "fifo", 80)))
-    assert refused is not None
+        (refused,) = refused_settings(
+            replace(PROCESS, schedule=Schedule((min(before),), "fifo", 80))
+        )
     expect(refused, "TF911", "p", "fifo", "80")
     assert os.sched_getaffinity(0) == before
 
@@ -89,7 +90,7 @@ def test_what_asks_the_kernel_keeps_its_own_schedule_without_a_right_to_it(
 ) -> None:
     """A process without privileges cannot leave the policy idle, once it has it."""
     done = processes.run([sys.executable, "-c", ASKS_AS_NOBODY.format(policy=policy)], check=True)
-    assert json.loads(done.stdout) == [None, 0]
+    assert json.loads(done.stdout) == [[], 0]
 
 
 def test_a_prefix_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -1,0 +1,108 @@
+"""What the kernel is told of a process before its program begins, and whether it would refuse that.
+
+A setting is a row of ``SETTINGS``: the process's key, what sets it for the calling process, and
+what asks beforehand without leaving a trace in this one.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import Finding, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tfcompose.model.plan import PlanProcess, Schedule, SchedulingPolicy
+
+
+@dataclass(frozen=True, slots=True)
+class KernelSetting:
+    """A key of a process that the kernel follows.
+
+    ``apply`` has this process so, and what it becomes and starts; it raises OSError or ValueError
+    where the kernel refuses that. ``refusal`` returns why it would, by the process's name and the
+    value.
+    """
+
+    key: str
+    apply: Callable[[Any], None]
+    refusal: Callable[[str, Any], Finding | None]
+
+
+def apply_settings(process: PlanProcess) -> None:
+    """Have the kernel hold this process as the plan says of it, and what it becomes and starts.
+
+    Raises:
+        OSError: if the kernel refuses it.
+        ValueError: if it refuses a limit.
+    """
+    for setting, value in _set(process):
+        setting.apply(value)
+
+
+def refused_settings(process: PlanProcess) -> list[Finding]:
+    """Return what the kernel refuses of a process's keys; this process stays as it was."""
+    refusals = [setting.refusal(process.name, value) for setting, value in _set(process)]
+    return [refusal for refusal in refusals if refusal]
+
+
+def _set(process: PlanProcess) -> Iterator[tuple[KernelSetting, Any]]:
+    """Yield the settings that the process has, with their values."""
+    for setting in SETTINGS:
+        value = getattr(process, setting.key)
+        if value is not None:
+            yield setting, value
+
+
+# The schedule.
+
+_POLICIES: dict[SchedulingPolicy, int] = {
+    "other": os.SCHED_OTHER,
+    "batch": os.SCHED_BATCH,
+    "idle": os.SCHED_IDLE,
+    "fifo": os.SCHED_FIFO,
+    "rr": os.SCHED_RR,
+}
+
+
+def _apply_schedule(schedule: Schedule) -> None:
+    if schedule.cpus:
+        os.sched_setaffinity(0, schedule.cpus)
+    if schedule.policy != "other":
+        os.sched_setscheduler(0, _POLICIES[schedule.policy], os.sched_param(schedule.priority))
+
+
+def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
+    """Return what the kernel refuses of a schedule; a thread asks it, so that this one stays as it was."""
+    try:
+        with ThreadPoolExecutor(1) as thread:
+            lacking = set(schedule.cpus) - thread.submit(_cpus_with, schedule).result()
+    except PermissionError:
+        message = (
+            f"this user may not start {name} with policy {schedule.policy} and priority"
+            f" {schedule.priority}"
+        )
+        advice = (
+            "rtprio in /etc/security/limits.conf, LimitRTPRIO= in a systemd unit, or the"
+            " capability CAP_SYS_NICE"
+        )
+        return finding("TF911", message, None, help=advice)
+    except (OSError, ValueError, OverflowError):
+        lacking = set(schedule.cpus)
+    if not lacking:
+        return None
+    message = f"{name} cannot run on {', '.join(f'CPU {one}' for one in sorted(lacking))}"
+    return finding("TF911", message, None, help="CPUs count from 0; lscpu lists them")
+
+
+def _cpus_with(schedule: Schedule) -> set[int]:
+    """Have the kernel schedule this thread so, for good, and return the processors that it has then."""
+    _apply_schedule(schedule)
+    return os.sched_getaffinity(0)
+
+
+SETTINGS = (KernelSetting("schedule", _apply_schedule, _schedule_refusal),)

@@ -13,10 +13,10 @@ import pytest
 from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.model.plan import Plan, RosSettings
+from tfcompose.model.systemd import SOURCING
 from tfcompose.tools.deploy.agent import KEPT, UNIT, Agent, HostError
 from tfcompose.tools.deploy.connection import START
 from tfcompose.tools.deploy.release import Release
-from tfcompose.tools.exporters.supervisors import SOURCING
 
 SETTINGS = {"name": "rover.brain", "unit": "tfcompose-rover.brain.service", "python": "python3", "setup": [],
             "sourcing": SOURCING}  # fmt: skip

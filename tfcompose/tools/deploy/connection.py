@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import asyncssh
 
 from tfcompose.foundation.findings import Finding, finding
-from tfcompose.tools.exporters.supervisors import SOURCING
+from tfcompose.model.systemd import SOURCING
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span

@@ -13,13 +13,16 @@ from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
-from tfcompose.cli.documentation import FOLDER, TOPICS, for_terminal, page, topic
-from tfcompose.cli.parser import COMMANDS, parser_of
+from tfcompose.cli.documentation import FOLDER, for_terminal, page, topic, topics
+from tfcompose.cli.parser import all_commands, parser_of
 from tfcompose.foundation.catalogue import CATALOGUE
+from tfcompose.foundation.tool import shipped
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = {file.stem: file.read_text("utf-8") for file in FOLDER.glob("*.md")}
+COMMANDS, TOPICS = all_commands(), topics()
+FOLDERS = (FOLDER, *(tool.folder / "topics" for tool in shipped().tools))
+PAGES = {file.stem: file.read_text("utf-8") for folder in FOLDERS for file in folder.glob("*.md")}
 EVERYTHING = "\n".join((README, *PAGES.values()))
 
 

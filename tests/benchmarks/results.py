@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "tfcompose" / "data" / "topics").glob("*.md")))
+PAGES = (ROOT / "README.md", *sorted((ROOT / "tfcompose").glob("**/topics/*.md")))
 FOLDER = Path(__file__).with_name("results")
 #: A row's name, and its cells.
 Rows = dict[str, list[str]]

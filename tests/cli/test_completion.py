@@ -11,7 +11,8 @@ import pytest
 from tests.support.cli import tfcompose_in
 from tests.support.shell import PROMPT, Shell
 from tfcompose.cli.commands.completion import SCRIPTS
-from tfcompose.cli.parser import COMMANDS, GROUPS, summary_of
+from tfcompose.cli.parser import all_commands, all_groups
+from tfcompose.cli.tool_commands import summary_of
 from tfcompose.launcher.runtime_dir import Lock, runtime_dir_of
 from tfcompose.model.plan import Plan, PlanProcess, RosSettings
 from tfcompose.model.plan.file import write_plan
@@ -27,7 +28,7 @@ profiles: {demo: {}}
 """
 
 CASES = {
-    "": {*COMMANDS, "--help", "--version"},
+    "": {*all_commands(), "--help", "--version"},
     "li": {"lint"},
     "lint --sel": {"--select"},
     "lint --select TF61": {f"TF61{n}" for n in range(10)},
@@ -175,8 +176,9 @@ def test_there_is_a_script_for_each_shell_and_for_no_other(tmp_path: Path) -> No
 
 def test_help_groups_every_command_once_and_help_of_a_command_is_its_page(tmp_path: Path) -> None:
     text = tfcompose_in(tmp_path, "help").stdout
-    assert sum(map(len, GROUPS.values())) == len(COMMANDS)
-    assert all(text.count(f"  {summary_of(name)}\n") == 1 for name in COMMANDS)
+    commands = all_commands()
+    assert sum(map(len, all_groups().values())) == len(commands)
+    assert all(text.count(f"  {summary_of(command)}\n") == 1 for command in commands.values())
     options = tfcompose_in(tmp_path, "lint", "--help").stdout
     assert tfcompose_in(tmp_path, "help", "lint").stdout.startswith(options)
     assert tfcompose_in(tmp_path, "help", "nothing").returncode == 2

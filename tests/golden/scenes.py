@@ -44,7 +44,7 @@ from tests.support.tree_history import (
     sound_tree,
 )
 from tfcompose.cli import live, writing
-from tfcompose.cli.commands import echo, fleet
+from tfcompose.cli.commands import echo
 from tfcompose.cli.compiling import library
 from tfcompose.cli.parser import main
 from tfcompose.compiler.check.check import check
@@ -81,7 +81,6 @@ from tfcompose.model.plan.hosts import share_of
 from tfcompose.model.robot import Robot
 from tfcompose.model.robot.body import Asset
 from tfcompose.spec.language import set_value
-from tfcompose.spec.language.validate import validate_fleet
 from tfcompose.spec.load import Source, load
 from tfcompose.tf.bags import BagError
 from tfcompose.tf.live.publishers import Message, OtherRun, Publisher, Senders
@@ -91,8 +90,10 @@ from tfcompose.tf.ros import environment
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 from tfcompose.tools.deploy.connection import LostError, Settings, connected
 from tfcompose.tools.deploy.rollout import Rollout, target_of
+from tfcompose.tools.fleet import command as fleet
 from tfcompose.tools.fleet.check import check_fleet
 from tfcompose.tools.fleet.observe import EdgeStatus, LinkState, RobotStatus, problems_of
+from tfcompose.tools.fleet.spec import validate_fleet
 from tfcompose.tools.importers.draft import Draft
 from tfcompose.tools.importers.shell import add_script
 

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from tests.support.zenoh_peers import free_port, session
-from tfcompose.spec.language.validate import validate_fleet
 from tfcompose.spec.load import load
 from tfcompose.tf.ros.tf_codec import Transform, encode
 from tfcompose.tools.fleet.share import Sender
+from tfcompose.tools.fleet.spec import validate_fleet
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.spec.language.fleet import FleetSpec
+    from tfcompose.tools.fleet.spec import FleetSpec
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 

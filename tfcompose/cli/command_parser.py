@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from argparse import ArgumentParser, HelpFormatter
 from functools import partial
+from itertools import takewhile
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from tfcompose.cli.terminal import UNREADABLE, fail, size_of
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Iterable
 
 
 class Parser(ArgumentParser):
@@ -42,6 +44,12 @@ class Parser(ArgumentParser):
             arguments.given = pairs([*given, *arguments.given], ":=")
         return arguments
 
+    def lacks_option(self, argv: Iterable[str]) -> bool:
+        """Return whether an argument is an option that the parser does not have."""
+        options = takewhile(lambda argument: argument != "--", argv)
+        names = {argument.partition("=")[0] for argument in options if argument.startswith("--")}
+        return not names <= self._option_string_actions.keys()
+
     def _may_lack_the_first(self) -> bool:
         """Return whether required words follow an optional one: options must not part them then."""
         positional = [action for action in self._actions if not action.option_strings]
@@ -52,8 +60,8 @@ class Parser(ArgumentParser):
 _GIVEN = re.compile(r"[^\s=:-][^\s=:]*:=")
 
 
-class Command(Protocol):
-    """A module of ``commands``, or an object in one; its docstring is its line in the list, and below that its help."""
+class CommandModule(Protocol):
+    """Module of a command, or an object in one; its docstring is its line in the list, and below that its help."""
 
     __doc__: str | None
 
@@ -64,8 +72,8 @@ class Command(Protocol):
         """Do it and return the exit code."""
 
 
-def command_parser(name: str, command: Command) -> Parser:
-    """Return the parser of a command."""
+def command_parser(name: str, command: CommandModule) -> Parser:
+    """Return the parser of a command, without the options that tools add to it."""
     width = min(100, size_of(1)[0] - 2)
     parser = Parser(
         prog=f"tfcompose {name}",

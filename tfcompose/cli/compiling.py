@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 PRESETS = Path(__file__).parents[1] / "data" / "presets"
 #: A package names, under this group, the module whose folder holds its presets.
 PRESET_GROUP = "tfcompose.presets"
+#: A ROS package registers its presets under this resource type of the ament index.
+PRESET_INDEX = "share/ament_index/resource_index/tfcompose_presets"
 
 
 def library(read: Callable[[str], str] = read_text) -> Library:
@@ -71,22 +73,44 @@ class PresetFolders:
         return [f"{vendor}/{model}" for vendor, model in files if vendor != "nodes"]
 
     def packages(self) -> list[str]:
-        """Return the folders that installed Python packages bring."""
+        """Return the folders that installed Python and ROS packages bring."""
         return _preset_packages()
 
 
 @cache
 def _preset_packages() -> list[str]:
+    """Return the folders of presets of Python packages, then those of ROS packages, each by name."""
     from importlib.metadata import entry_points  # needed only where a preset is in no other folder
 
     folders: list[str] = []
-    for entry in entry_points(group=PRESET_GROUP):
+    for entry in sorted(entry_points(group=PRESET_GROUP), key=lambda entry: entry.name):
         try:
             spec = find_spec(entry.value)
         except ImportError:
             continue
         folders += (spec.submodule_search_locations or []) if spec else []
-    return folders
+    return [*dict.fromkeys(folders), *_ros_preset_packages()]
+
+
+def _ros_preset_packages() -> list[str]:
+    """Return the folders that ROS packages register in the ament index of the sourced workspaces.
+
+    A marker names the folder, relative to its prefix; an empty one stands for ``share/NAME/presets``.
+    Of a package in several workspaces that of the first one counts, as ROS has it.
+    """
+    folders: dict[str, str] = {}
+    for prefix in _ament_prefixes():
+        for marker in sorted(Path(prefix, PRESET_INDEX).glob("*")):
+            with contextlib.suppress(OSError, UnicodeDecodeError):
+                named = marker.read_text("utf-8").strip() or f"share/{marker.name}/presets"
+                folders.setdefault(marker.name, str(Path(prefix, named)))
+    return [folders[name] for name in sorted(folders)]
+
+
+def _ament_prefixes() -> tuple[str, ...]:
+    """Return the prefixes of the workspaces that are sourced, the one that overlays the others first."""
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return tuple(prefix for prefix in prefixes if prefix)
 
 
 def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) -> list[Source]:

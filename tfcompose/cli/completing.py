@@ -7,11 +7,12 @@ import re
 import shlex
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.command_parser import Command, command_parser
-from tfcompose.cli.documentation import TOPICS
+from tfcompose.cli.command_parser import CommandModule, command_parser
+from tfcompose.cli.documentation import topics
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
+from tfcompose.cli.tool_commands import add_all_options, find
 from tfcompose.foundation.findings import RejectedError
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ PATHS = frozenset({"FILE", "DIR", "FOLDER", "BAG", "PICTURE", "PLAN", "OLD", "NE
 
 
 def candidates(
-    commands: Mapping[str, Command], words: Sequence[str], at: int
+    commands: Mapping[str, CommandModule], words: Sequence[str], at: int
 ) -> tuple[list[str], bool]:
     """Return what ``words[at]`` can be, and whether it can also be a file.
 
@@ -45,8 +46,12 @@ def candidates(
     if before == ["help"]:
         from tfcompose.spec.language.reference import keys, paths
 
-        return _beginning(word, [*TOPICS, *commands, *(paths() if "." in word else keys())]), False
-    actions = command_parser(before[0], commands[before[0]])._actions  # noqa: SLF001 (argparse has no other way)
+        return _beginning(
+            word, [*topics(), *commands, *(paths() if "." in word else keys())]
+        ), False
+    parser = command_parser(before[0], commands[before[0]])
+    add_all_options(before[0], parser)
+    actions = parser._actions  # noqa: SLF001 (argparse has no other way)
     options = {text: action for action in actions for text in action.option_strings}
     option, equals, value = word.partition("=")
     joined = options.get(option) if equals else None
@@ -113,7 +118,11 @@ def _values(action: Action, before: Sequence[str]) -> list[str]:
     if isinstance(action.metavar, str) and action.metavar.islower():
         return action.metavar.split("|")
     source = _SOURCES.get((before[0], action.dest)) or _SOURCES.get(("", action.dest))
-    return source(before) if source else []
+    if source:
+        return source(before)
+    command = find(before[0])
+    sections = dict(command.command.completes) if command else {}
+    return _section(sections[action.dest], before) if action.dest in sections else []
 
 
 def _frames(before: Sequence[str]) -> list[str]:
@@ -209,8 +218,6 @@ _SOURCES: dict[tuple[str, str], Callable[[Sequence[str]], list[str]]] = {
     ("", "profiles"): _profiles,
     ("", "robot"): _robots,
     ("", "given"): _given,
-    ("deploy", "hosts"): _hosts,
-    ("export", "host"): _hosts,
     ("up", "host"): _hosts,
     ("", "a"): _frames,
     ("", "b"): _frames,

@@ -1,4 +1,4 @@
-"""The pages of topics and commands, which are Markdown in ``topics/``, and what the code knows better than a page."""
+"""Pages of topics and commands: Markdown in ``topics/``, and what the code knows better than a page."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 
 from tfcompose import __version__
 from tfcompose.cli.command_parser import command_parser
+from tfcompose.cli.tool_commands import ToolCommand, add_all_options
+from tfcompose.foundation.tool import installed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from tfcompose.cli.command_parser import Command
+    from tfcompose.cli.command_parser import CommandModule
 
 FOLDER = Path(__file__).parents[1] / "data" / "topics"
-#: What a page is about, in the order of reading.
+#: The topics of the core, in the order of reading, with what their pages are about.
 TOPICS = {
     "language": "the robot file, key by key",
     "poses": "positions, rotations, units, optical frames",
@@ -25,10 +27,7 @@ TOPICS = {
     "guard": "what is watched while the robot runs, and what a finding says",
     "strict": "holding back what a process does not own",
     "background": "robots without a terminal: ps, logs, restart, down",
-    "hosts": "a robot on several computers, and `deploy`",
     "rmw": "Fast DDS, Cyclone DDS or Zenoh",
-    "fleet": "poses between several robots, over Zenoh",
-    "exports": "systemd, docker compose, Kubernetes and launch files",
     "ci": "lint, diff and verify in CI; exit codes",
     "python": "the TF buffer in Python",
     "costs": "what it costs, measured",
@@ -37,17 +36,20 @@ TOPICS = {
 #: A link within the documentation.
 _LINK = re.compile(r"\[([^\]]+)\]\(#\w+\)")
 _COMMENT = re.compile(r"<!--.*?-->\n*", re.DOTALL)
-#: Commands with a page under another name.
-_PAGES = {"export": "exports"}
 
 
-def page(word: str, commands: Mapping[str, Command]) -> str | None:
+def topics() -> dict[str, str]:
+    """Return the topics of the core, then those of installed tools, with what their pages are about."""
+    of_tools = installed().topics()
+    return TOPICS | {name: topic.about for name, (_, topic) in of_tools.items()}
+
+
+def page(word: str, commands: Mapping[str, CommandModule]) -> str | None:
     """Return the page of a topic, a command's options with its page, or what a key means; None if there is none."""
     if word in commands:
-        options = command_parser(word, commands[word]).format_help()
-        about = _read(_PAGES.get(word, word))
+        options, about = _options(word, commands[word]), _about(word, commands[word])
         return f"{options}\n{about}" if about else options
-    if word in TOPICS:
+    if word in topics():
         return topic(word)
     from tfcompose.spec.language.reference import key_page
 
@@ -73,13 +75,28 @@ def for_terminal(markdown: str, columns: int) -> str:
 
 def topic(word: str) -> str:
     """Return the page of a topic as Markdown, with what the code knows."""
-    text = _read(word)
+    tool, _ = installed().topics().get(word, (None, None))
+    text = _read(word, FOLDER if tool is None else tool.folder / "topics")
     more = _GENERATED.get(word)
     return f"{text}\n{more()}" if more else text
 
 
-def _read(word: str) -> str:
-    file = FOLDER / f"{word}.md"
+def _options(name: str, command: CommandModule) -> str:
+    """Return the options of a command, with those that tools add to it."""
+    parser = command_parser(name, command)
+    add_all_options(name, parser)
+    return parser.format_help()
+
+
+def _about(name: str, command: CommandModule) -> str:
+    """Return the page of a command; a tool's is in the tool's folder."""
+    if isinstance(command, ToolCommand):
+        return _read(command.command.topic or name, command.tool.folder / "topics")
+    return _read(name, FOLDER)
+
+
+def _read(word: str, folder: Path) -> str:
+    file = folder / f"{word}.md"
     return _COMMENT.sub("", file.read_text("utf-8")) if file.is_file() else ""
 
 
@@ -114,7 +131,7 @@ _GENERATED: dict[str, Callable[[], str]] = {
 
 #: The heading of a model in the reference, to which the types of keys lead.
 _MODEL = re.compile(r"<h2>(\w+)</h2>")
-_CODE_CELL = re.compile(r"<td>(TF\d{3})</td>")
+_CODE_CELL = re.compile(r"<td>([A-Z]+\d{3})</td>")
 _STYLE = """
 :root { color-scheme: light dark; }
 body { margin: 0 auto; max-width: 60rem; padding: 1rem; font: 16px/1.5 system-ui, sans-serif; }
@@ -128,7 +145,7 @@ section { border-top: 1px solid #8886; margin-top: 2rem; }
 """
 
 
-def html(commands: Mapping[str, Command]) -> str:
+def html(commands: Mapping[str, CommandModule]) -> str:
     """Return all topics and commands as one page that needs no other file.
 
     Raises:
@@ -142,22 +159,25 @@ def html(commands: Mapping[str, Command]) -> str:
     from tfcompose.foundation.catalogue import CATALOGUE
 
     renderer = MarkdownIt("commonmark", {"html": False}).enable("table")
-    topics = {f"topic-{word}": renderer.render(topic(word)) for word in TOPICS}
-    topics["topic-language"] = _MODEL.sub(_with_id, topics["topic-language"])
-    topics["topic-codes"] = _CODE_CELL.sub(r'<td><a href="#\1">\1</a></td>', topics["topic-codes"])
-    topics["topic-codes"] += "\n".join(
+    names = topics()
+    about = {f"topic-{word}": renderer.render(topic(word)) for word in names}
+    about["topic-language"] = _MODEL.sub(_with_id, about["topic-language"])
+    about["topic-codes"] = _CODE_CELL.sub(r'<td><a href="#\1">\1</a></td>', about["topic-codes"])
+    about["topic-codes"] += "\n".join(
         f'<h2 id="{code}">{code} {entry.name}</h2>\n{renderer.render(code_page(code))}'
         for code, entry in CATALOGUE.items()
     )
     described = {}
     for name, command in commands.items():
-        options = escape(command_parser(name, command).format_help())
-        about = renderer.render(_read(name)) if name not in TOPICS else ""
-        described[f"command-{name}"] = f"<h1>tfcompose {name}</h1>\n<pre>{options}</pre>\n{about}"
-    names = "\n".join(
-        _links(title, parts) for title, parts in (("Topics", topics), ("Commands", described))
+        options = escape(_options(name, command))
+        text = _about(name, command) if name not in names else ""
+        described[f"command-{name}"] = (
+            f"<h1>tfcompose {name}</h1>\n<pre>{options}</pre>\n{renderer.render(text)}"
+        )
+    links = "\n".join(
+        _links(title, parts) for title, parts in (("Topics", about), ("Commands", described))
     )
-    parts = topics | described
+    parts = about | described
     sections = "\n".join(
         f'<section id="{part}">\n{text}</section>' for part, text in parts.items()
     )
@@ -165,7 +185,7 @@ def html(commands: Mapping[str, Command]) -> str:
         '<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n<meta name="viewport"'
         ' content="width=device-width">\n<title>tfcompose'
         f" {__version__}</title>\n<style>{_STYLE}</style>\n<h1>tfcompose"
-        f" {__version__}</h1>\n<nav>\n{names}\n</nav>\n{sections}\n</html>\n"
+        f" {__version__}</h1>\n<nav>\n{links}\n</nav>\n{sections}\n</html>\n"
     )
 
 

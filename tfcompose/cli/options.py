@@ -92,31 +92,6 @@ def add_robot(
     )
 
 
-def add_all_hosts(parser: ArgumentParser) -> None:
-    """Add --all-hosts and --file."""
-    parser.add_argument(
-        "--all-hosts",
-        action="store_true",
-        help="on every host that the robot is deployed to, by ssh",
-    )
-    parser.add_argument(
-        "--file",
-        metavar="FILE|PLAN",
-        help="with --all-hosts: the robot that has the hosts; default: robot.yaml",
-    )
-
-
-def on_all_hosts(arguments: Namespace) -> bool:
-    """Return whether the command is for all hosts.
-
-    Raises:
-        SystemExit: after saying that --file is for that alone.
-    """
-    if arguments.file and not arguments.all_hosts:
-        fail("--file goes with --all-hosts", UNREADABLE)
-    return bool(arguments.all_hosts)
-
-
 def add_processes(parser: ArgumentParser) -> None:
     """Add NAME …, the processes of a running robot, and --robot."""
     parser.add_argument(

@@ -1,7 +1,8 @@
-"""The command ``tfcompose``: its commands, how their options are read, and the exit code.
+"""The command ``tfcompose``: the commands of the core, how options are read, and the exit code.
 
-The parser loads the modules of all commands, which therefore import little at the top; a command
-imports what it needs when it runs.
+The parser loads the modules of the core's commands, which therefore import little at the top; a
+command imports what it needs when it runs. Commands of tools are looked up where a command is none
+of the core's: ``tool_commands`` finds them.
 """
 
 from __future__ import annotations
@@ -14,21 +15,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
-from tfcompose.cli.command_parser import Command, Parser, command_parser
+from tfcompose.cli import tool_commands
+from tfcompose.cli.command_parser import CommandModule, Parser, command_parser
 from tfcompose.cli.commands import (
     build,
     completion,
-    deploy,
     diff,
     doctor,
     down,
     echo,
     events,
     explain,
-    export,
-    fleet,
     graph,
-    importing,
     init,
     lint,
     logs,
@@ -42,7 +40,6 @@ from tfcompose.cli.commands import (
     tree,
     up,
     verify,
-    view,
     wait,
 )
 from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE
@@ -52,9 +49,9 @@ if TYPE_CHECKING:
     from typing import TextIO
 
 
-#: The commands by what they are for, in the order of the help.
-GROUPS: dict[str, dict[str, Command]] = {
-    "Write": {"init": init, "import": importing, "presets": presets, "schema": schema},
+#: The commands of the core by what they are for, in the order of the help.
+GROUPS: dict[str, dict[str, CommandModule]] = {
+    "Write": {"init": init, "presets": presets, "schema": schema},
     "Check": {
         "lint": lint,
         "build": build,
@@ -75,13 +72,33 @@ GROUPS: dict[str, dict[str, Command]] = {
         "start": steering.START,
         "wait": wait,
     },
-    "Look": {"view": view, "doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
-    "Ship": {"deploy": deploy, "export": export, "fleet": fleet},
+    "Look": {"doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
+    "Ship": {},
     "Help": {"help": manual, "completion": completion},
 }
-COMMANDS: dict[str, Command] = {
+COMMANDS: dict[str, CommandModule] = {
     name: command for group in GROUPS.values() for name, command in group.items()
 }
+
+
+def all_groups() -> dict[str, dict[str, CommandModule]]:
+    """Return the commands of the core and of all installed tools, by what they are for."""
+    groups = {title: dict(commands) for title, commands in GROUPS.items()}
+    helps = groups.pop("Help")
+    for tool_command in tool_commands.all_commands():
+        named = tool_command.command
+        groups.setdefault(named.group, {})[named.name] = tool_command
+    return {title: commands for title, commands in groups.items() if commands} | {"Help": helps}
+
+
+def all_commands() -> dict[str, CommandModule]:
+    """Return the commands of the core and of all installed tools, by name."""
+    return {name: command for group in all_groups().values() for name, command in group.items()}
+
+
+def find_command(name: str) -> CommandModule | None:
+    """Return a command of the core, or else of a tool; None if there is none of this name."""
+    return COMMANDS.get(name) or tool_commands.find(name)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -117,14 +134,15 @@ def _main(words: list[str]) -> int:
     if command in {"-V", "--version"}:
         sys.stdout.write(f"tfcompose {__version__}\n")
         return 0
-    return _run(command, words[1:]) if command in COMMANDS else _unknown(command)
+    module = find_command(command) if command else None
+    return _unknown(command) if module is None else _run(command, module, words[1:])
 
 
-def _run(name: str, words: list[str]) -> int:
+def _run(name: str, command: CommandModule, words: list[str]) -> int:
     gc.set_threshold(200_000, 50, 1000)  # a large build makes much, and little of it is garbage
     with RememberedInterrupt():
         try:
-            code = _run_command(name, words)
+            code = _run_command(name, command, words)
         except BaseException:
             if take_interrupt():  # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load
                 return INTERRUPTED
@@ -132,56 +150,72 @@ def _run(name: str, words: list[str]) -> int:
     return INTERRUPTED if take_interrupt() else code
 
 
-def _run_command(name: str, words: list[str]) -> int:
-    parser = parser_of(name)
-    if not {"-h", "--help"}.isdisjoint(
-        words
-    ):  # argparse would say nothing of a reader that is gone
-        sys.stdout.write(parser.format_help())
-        return 0
+def _run_command(name: str, command: CommandModule, words: list[str]) -> int:
     try:
+        parser = command_parser(name, command)
+        if not {"-h", "--help"}.isdisjoint(
+            words
+        ):  # argparse would say nothing of a reader that is gone
+            tool_commands.add_all_options(name, parser)
+            sys.stdout.write(parser.format_help())
+            return 0
+        options = tool_commands.add_options(name, parser, words)
         arguments = parser.parse_args(words)
-        arguments.commands = COMMANDS  # for those that are about commands
+        arguments.commands = all_commands  # for commands that are about commands
         if getattr(arguments, "show_args", False):
             from tfcompose.cli.args import show_args
 
             return show_args(arguments)
-        return COMMANDS[name].run(arguments)
+        for option in options:
+            code = option.run(name, arguments)
+            if code is not None:
+                return code
+        return command.run(arguments)
     except SystemExit as end:  # after a complaint
         return end.code if isinstance(end.code, int) else UNREADABLE
 
 
 def parser_of(name: str) -> Parser:
-    """Return the parser of one command."""
-    return command_parser(name, COMMANDS[name])
+    """Return the parser of one command, with the options that tools add to it.
 
-
-def summary_of(name: str) -> str:
-    """Return what a command does, in one line."""
-    return (COMMANDS[name].__doc__ or "").partition("\n")[0].removesuffix(".")
+    Raises:
+        KeyError: if there is no such command.
+    """
+    command = find_command(name)
+    if command is None:
+        raise KeyError(name)
+    parser = command_parser(name, command)
+    tool_commands.add_all_options(name, parser)
+    return parser
 
 
 def help_text() -> str:
     """Return what ``tfcompose --help`` prints."""
     from textwrap import fill
 
-    from tfcompose.cli.documentation import TOPICS
+    from tfcompose.cli.documentation import topics
 
-    topics = fill(", ".join(TOPICS), 76, initial_indent="  ", subsequent_indent="  ")
-    width = max(map(len, COMMANDS))
-    groups = (
-        f"{title}:\n" + "".join(f"  {name:<{width}}  {summary_of(name)}\n" for name in commands)
-        for title, commands in GROUPS.items()
+    names = fill(", ".join(topics()), 76, initial_indent="  ", subsequent_indent="  ")
+    groups = all_groups()
+    width = max(len(name) for commands in groups.values() for name in commands)
+    sections = (
+        f"{title}:\n"
+        + "".join(
+            f"  {name:<{width}}  {tool_commands.summary_of(command)}\n"
+            for name, command in commands.items()
+        )
+        for title, commands in groups.items()
     )
+    tool_commands.report_problems()
     return (
         "usage: tfcompose COMMAND [OPTION …]\n\n"
         "One YAML file says which frames a robot has and who publishes each TF edge.\n"
         "tfcompose checks it, builds it, starts it, and names any node that publishes\n"
         "an edge owned by another.\n\n"
-        + "\n".join(groups)
+        + "\n".join(sections)
         + "\noptions:\n  -V, --version  print the version\n"
         "  -h, --help     print this help; after a command: its options\n\n"
-        f"topics, for tfcompose help TOPIC:\n{topics}\n"
+        f"topics, for tfcompose help TOPIC:\n{names}\n"
     )
 
 
@@ -191,7 +225,13 @@ def _unknown(command: str) -> int:
         return UNREADABLE
     import difflib
 
-    near = difflib.get_close_matches(command, COMMANDS, 1, cutoff=0.7)
+    from tfcompose.foundation.tool import absent
+
+    tool_commands.report_problems()
+    if missing := absent("command", command):
+        sys.stderr.write(f"tfcompose: {missing}\n")
+        return UNREADABLE
+    near = difflib.get_close_matches(command, all_commands(), 1, cutoff=0.7)
     advice = f"did you mean {near[0]}?" if near else "tfcompose --help lists them"
     kind = "option" if command.startswith("-") else "command"
     sys.stderr.write(f"tfcompose: unknown {kind} {command}; {advice}\n")

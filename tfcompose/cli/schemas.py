@@ -1,10 +1,18 @@
-"""The JSON Schemas of all that users write, and of plan.json."""
+"""JSON Schemas of everything that users write, and of plan.json."""
 
 from __future__ import annotations
 
 import json
 
-LANGUAGES = ("robot", "overlay", "preset", "node", "plan", "fleet")
+from tfcompose.foundation.tool import installed
+
+#: The languages of the core.
+LANGUAGES = ("robot", "overlay", "preset", "node", "plan")
+
+
+def languages() -> tuple[str, ...]:
+    """Return the languages of the core and of all installed tools."""
+    return (*LANGUAGES, *installed().languages())
 
 
 def schema_text(language: str) -> str:

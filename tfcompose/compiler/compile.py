@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.check import check, silenced, with_replaced
+from tfcompose.compiler.check import check, rules_of_tools, silenced, with_replaced
 from tfcompose.compiler.resolve import Disk, Library, resolve
 from tfcompose.foundation.findings import Allow, Finding, RejectedError, without_duplicates
 from tfcompose.spec.language import (
@@ -91,7 +91,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
         return Compiled(None, error.findings)
     resolved = resolve(validated, library, read, disk)
     source, parts = validated.source, resolved.collected
-    found = without_duplicates([*validated.found, *resolved.found, *check(resolved.robot)])
+    found = without_duplicates([*validated.found, *resolved.found, *_checked(resolved.robot)])
     rules = {
         word: (level, source.at_key(("rules", word)))
         for word, level in levels_of(validated, resolved.robot.limits)
@@ -100,3 +100,9 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), sources)
+
+
+def _checked(robot: Robot) -> list[Finding]:
+    """Return what the rules find, those of the tools among them whose sections the robot's file has."""
+    rules, found = rules_of_tools(robot)
+    return [*check(robot), *check(robot, rules), *found]

@@ -7,7 +7,7 @@ import pytest
 from pydantic_core import core_schema
 
 from tfcompose.spec.language import calibration
-from tfcompose.spec.language.json_schema import LANGUAGES
+from tfcompose.spec.language.json_schema import model_of
 from tfcompose.spec.language.reading import UNKNOWN_KEYS, WORDS, read
 from tfcompose.spec.language.reference import key_page, keys, reference
 from tfcompose.spec.language.robot import RobotSpec
@@ -47,6 +47,7 @@ BOUNDS = {
     "tuple": set(),
 }
 
+LANGUAGES = {name: model_of(name) for name in ("robot", "preset", "node", "fleet")}
 ROOTS: dict[str, type[Spec]] = LANGUAGES | {
     name: kind
     for name, kind in vars(calibration).items()

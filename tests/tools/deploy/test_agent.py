@@ -17,10 +17,10 @@ from tests.support.waiting import until
 from tfcompose import __version__
 from tfcompose.launcher.program import ANYWHERE
 from tfcompose.model.plan import Plan, RosSettings
+from tfcompose.model.systemd import SOURCING
 from tfcompose.tools.deploy.agent import KEPT, UNIT, Agent, HostError
 from tfcompose.tools.deploy.connection import START, Settings, agent_command, agent_input
 from tfcompose.tools.deploy.release import Release
-from tfcompose.tools.exporters.supervisors import SOURCING
 
 SETTINGS = {"name": "rover.brain", "unit": "tfcompose-rover.brain.service", "python": "python3", "setup": [],
             "sourcing": SOURCING, "program": ANYWHERE}  # fmt: skip

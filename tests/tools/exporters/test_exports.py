@@ -22,8 +22,9 @@ from tfcompose.launcher.program import anywhere
 from tfcompose.model.plan import Plan, PlanProcess, StopRule
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import stand_ins, static_names
+from tfcompose.model.systemd import sourced
 from tfcompose.tools.exporters.launch import launch
-from tfcompose.tools.exporters.supervisors import Machine, compose, sourced, systemd
+from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 ROBOT = (Path(__file__).parents[3] / "robots" / "autonomous_robot.yaml").read_text("utf-8")
 

@@ -7,9 +7,9 @@ import pytest
 
 from tests.support import processes
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.spec.language.validate import validate_fleet
 from tfcompose.spec.load import load
 from tfcompose.tools.fleet.check import check_fleet
+from tfcompose.tools.fleet.spec import validate_fleet
 
 SOUND = """fleet: 1
 share:

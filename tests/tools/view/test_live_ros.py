@@ -15,11 +15,11 @@ import viser
 from tests.support.robots import EXTERNAL
 from tests.support.waiting import in_one_of_a_few, until
 from tests.tools.view.test_view import session_of
-from tfcompose.cli.live_view import Following, observers_of
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.foundation.geometry import Offset, Pose, offset_of
 from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan.file import write_plan
+from tfcompose.tools.view.live_view import Following, observers_of
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.reload import Files, ReloadedPanel
 from tfcompose.tools.view.server import started, stop

@@ -10,10 +10,10 @@ from tests.support.tables import for_each
 from tests.support.waiting import until
 from tfcompose.cli.parser import parser_of
 from tfcompose.cli.reading import read_text
-from tfcompose.cli.view_session import session_of
 from tfcompose.foundation.geometry import Pose
 from tfcompose.tools.view.reload import Files, ReloadedPanel, Watcher
 from tfcompose.tools.view.server import started, stop
+from tfcompose.tools.view.view_session import session_of
 
 TEXT = """tfcompose: 1
 robot: r

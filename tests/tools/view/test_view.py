@@ -23,7 +23,6 @@ from tests.support import processes
 from tests.support.browser import page_of
 from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
-from tfcompose.cli.commands import view
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.fixing import ChangedError, rewrite
 from tfcompose.cli.parser import parser_of
@@ -31,6 +30,7 @@ from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.geometry import Pose, offset_of, quat_from_rpy
 from tfcompose.model.plan.file import read_plan
+from tfcompose.tools.view import command
 from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.plan_robot import robot_of_plan
@@ -553,4 +553,4 @@ def test_ctrl_c_while_the_scene_is_made_ends_the_view_without_another_error(
     monkeypatch.setattr("tfcompose.tools.view.reload.ReloadedPanel", interrupted)
     arguments = parser_of("view").parse_args([str(rover), "--port", "0"])
     with pytest.raises(KeyboardInterrupt):
-        view.run(arguments)
+        command.run(arguments)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_all_hosts, add_robot, on_all_hosts, positive
+from tfcompose.cli.options import add_robot, positive
 from tfcompose.cli.terminal import FAILED, fail, warn
 
 if TYPE_CHECKING:
@@ -29,18 +29,10 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--leftovers", action="store_true", help="stop processes that earlier runs left behind"
     )
-    add_all_hosts(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Stop it; exit code 0 when it has ended, 1 where none runs or it does not end in time."""
-    if on_all_hosts(arguments):
-        from tfcompose.cli.all_hosts import run_on_all_hosts
-
-        leftovers = ["--leftovers"] if arguments.leftovers else []
-        return run_on_all_hosts(
-            arguments, "down", "--timeout", f"{arguments.timeout:g}", *leftovers
-        )
     from tfcompose.cli.runs import chosen_run, notices, request
     from tfcompose.model.messages import Done, DownRequest, Ended
 

@@ -9,7 +9,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_all_hosts, add_format, add_robot, on_all_hosts
+from tfcompose.cli.options import add_format, add_robot
 from tfcompose.cli.terminal import FAILED, coloured, fail, warn
 
 if TYPE_CHECKING:
@@ -22,15 +22,10 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
     add_format(parser, text="json: one object per line; default: text")
-    add_all_hosts(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print events until the robot ends; exit code 0, 1 where none runs, or the connection is lost before it ends."""
-    if on_all_hosts(arguments):
-        from tfcompose.cli.all_hosts import run_on_all_hosts
-
-        return run_on_all_hosts(arguments, "events", "--format", arguments.format)
     from tfcompose.cli.console import Console
     from tfcompose.cli.runs import chosen_run, notices
     from tfcompose.model.messages import Ended, notice_line

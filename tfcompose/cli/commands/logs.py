@@ -13,7 +13,7 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_all_hosts, add_robot, count, on_all_hosts
+from tfcompose.cli.options import add_robot, count
 from tfcompose.cli.terminal import coloured, fail, has_reader
 from tfcompose.compiler.render.text import PLAIN
 
@@ -43,21 +43,10 @@ def arguments(parser: ArgumentParser) -> None:
         "-t", "--times", action="store_true", help="print the time before each line"
     )
     add_robot(parser)
-    add_all_hosts(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the logs; exit code 0, 1 where there are none."""
-    if on_all_hosts(arguments):
-        from tfcompose.cli.all_hosts import run_on_all_hosts
-
-        options = [
-            option
-            for option, given in (("--follow", arguments.follow), ("--times", arguments.times))
-            if given
-        ]
-        options += [] if arguments.lines is None else ["--lines", str(arguments.lines)]
-        return run_on_all_hosts(arguments, "logs", *options, processes=arguments.name)
     from tfcompose.foundation.findings import did_you_mean
     from tfcompose.launcher.output import Follower, logged, read_logs
 

@@ -29,13 +29,16 @@ def run(arguments: Namespace) -> int:
     import sys
     from pathlib import Path
 
-    from tfcompose.cli.documentation import TOPICS, for_terminal, html, page
+    from tfcompose.cli.documentation import for_terminal, html, page, topics
     from tfcompose.cli.terminal import table_width
+    from tfcompose.cli.tool_commands import report_problems
     from tfcompose.foundation.findings import did_you_mean
 
+    commands = arguments.commands()
+    report_problems()
     if arguments.html:
         try:
-            Path(arguments.html).write_text(html(arguments.commands), "utf-8")
+            Path(arguments.html).write_text(html(commands), "utf-8")
         except ModuleNotFoundError:
             fail(
                 "--html needs the package markdown-it-py: pip install 'tfcompose[docs]'",
@@ -45,13 +48,13 @@ def run(arguments: Namespace) -> int:
             fail(f"{arguments.html} cannot be written: {error.strerror}", UNREADABLE)
         print(f"wrote {arguments.html}")
         return 0
-    text = page(arguments.word, arguments.commands)
+    text = page(arguments.word, commands)
     if text is None:
         from tfcompose.spec.language.reference import keys
 
-        known = [*TOPICS, *arguments.commands, *keys()]
+        known = [*topics(), *commands, *keys()]
         advice = did_you_mean(
-            arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(TOPICS)}"
+            arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(topics())}"
         )
         fail(f"no topic, command or key {arguments.word}; {advice}", UNREADABLE)
     columns = table_width(sys.stdout)

@@ -10,7 +10,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.options import add_all_hosts, add_format, add_robot, on_all_hosts
+from tfcompose.cli.options import add_format, add_robot
 from tfcompose.cli.terminal import FAILED, UNREADABLE, coloured, fail, table_width
 
 if TYPE_CHECKING:
@@ -24,15 +24,10 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser, "all of this user")
     add_format(parser)
-    add_all_hosts(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where no robot runs."""
-    if on_all_hosts(arguments):
-        from tfcompose.cli.all_hosts import run_on_all_hosts
-
-        return run_on_all_hosts(arguments, "ps", "--format", arguments.format)
     from tfcompose.cli.process_table import HEAD, TABLE, row, uptime
     from tfcompose.launcher.procfs import usage_of
 

@@ -1,7 +1,7 @@
 """Print the language as JSON Schema, or as a reference.
 
 Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors
-and nodes, of plan.json, or of a fleet. With --reference print every key of the language as
+and nodes, of plan.json, or of a file that a tool reads, such as fleet.yaml. With --reference print every key of the language as
 Markdown instead.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.schemas import LANGUAGES, schema_text
+from tfcompose.cli.schemas import languages, schema_text
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _WITHOUT_REFERENCE = {
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "language", nargs="?", choices=LANGUAGES, default="robot", help="default: robot"
+        "language", nargs="?", choices=languages(), default="robot", help="default: robot"
     )
     parser.add_argument(
         "--reference",

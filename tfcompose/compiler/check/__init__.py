@@ -8,10 +8,20 @@ from tfcompose.compiler.check.check import (
     RULES,
     apply,
     check,
+    rules_of_tools,
     silenced,
     unused_allows,
     with_replaced,
 )
 from tfcompose.compiler.check.rule import Rule
 
-__all__ = ["RULES", "Rule", "apply", "check", "silenced", "unused_allows", "with_replaced"]
+__all__ = [
+    "RULES",
+    "Rule",
+    "apply",
+    "check",
+    "rules_of_tools",
+    "silenced",
+    "unused_allows",
+    "with_replaced",
+]

@@ -28,6 +28,8 @@ from tfcompose.compiler.check import (
 from tfcompose.compiler.check.rule import Rule
 from tfcompose.foundation.catalogue import CATALOGUE, can_be_allowed, code_of, similar_words
 from tfcompose.foundation.findings import Allow, Finding, Note, Span, did_you_mean, finding
+from tfcompose.foundation.tool import load
+from tfcompose.spec.language.tool_keys import keys_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -100,6 +102,23 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
                 )
             )
     return found
+
+
+def rules_of_tools(robot: Robot) -> tuple[list[Rule], list[Finding]]:
+    """Return the rules of the tools whose sections the robot's file has, and a finding for each that fails to load."""
+    rules: list[Rule] = []
+    found = []
+    for key in keys_in(robot.sections):
+        try:
+            module = vars(load(key.rules)) if key.rules else {}
+        except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
+            message = f"the rules of {key.name} cannot be loaded: {type(error).__name__}: {error}"
+            advice = f"mend or uninstall it: {key.rules}"
+            at = robot.sections[key.name].at()
+            found.append(finding("TF921", message, at, help=advice))
+            continue
+        rules += [value for value in module.values() if isinstance(value, Rule)]
+    return rules, found
 
 
 def _is_left_out(found: Finding, rule: Rule, robot: Robot) -> bool:

@@ -18,7 +18,6 @@ from tfcompose.compiler.resolve.containers import (
     container_process,
 )
 from tfcompose.compiler.resolve.edges import Drafts, source_numbers
-from tfcompose.compiler.resolve.fleet import is_own_share, own_share, wrong_membership
 from tfcompose.compiler.resolve.hosts import hosts_of, with_host_place
 from tfcompose.compiler.resolve.isolation import isolate, settings_of
 from tfcompose.compiler.resolve.middleware import (
@@ -44,6 +43,13 @@ from tfcompose.compiler.resolve.processes import (
 from tfcompose.compiler.resolve.resolved import Collected, Resolved
 from tfcompose.compiler.resolve.rules import limits_of, zones_of
 from tfcompose.compiler.resolve.sensors import add_sensor
+from tfcompose.compiler.resolve.tool_sections import (
+    ToolSection,
+    as_sections,
+    check_sections,
+    processes_of,
+    sections_of,
+)
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.model.robot import Edge, Process, Robot, may_be_refused
@@ -93,6 +99,7 @@ class _Work:
     broken: set[tuple[str, str]] = field(default_factory=set)
     collected: Collected = field(default_factory=Collected)
     joined: list[Joined] = field(default_factory=list)
+    sections: list[ToolSection] = field(default_factory=list)
 
     @property
     def spec(self) -> RobotSpec:
@@ -105,7 +112,10 @@ class _Work:
     def resolved(self) -> Resolved:
         """Return the robot and what was found; each step knows what the ones before it refused."""
         self.broken.update(self.validated.broken)
-        own = _processes(self.validated, self.found, is_part=self.holder is not None)
+        if self.holder is None:
+            self.sections = sections_of(self.spec, self.source, self.read)
+        of_tools = processes_of(self.sections, self.found)
+        own = _processes(self.validated, self.found, of_tools, is_part=self.holder is not None)
         started = {process.name for process in own}
         self.broken |= {("processes", name) for name in self.spec.processes if name not in started}
         packages = self._packages()
@@ -159,7 +169,7 @@ class _Work:
         self.found += self._wrong_components(robot)
         if self.holder is None:
             self.found += wrong_middleware(robot, self.spec, self.source)
-            self.found += wrong_membership(robot, self.spec, self.source, self.read)
+            self.found += check_sections(self.sections, robot)
             robot = with_router(robot)
         return Resolved(robot, (*self.of_parts, *self.found), self.collected)
 
@@ -343,6 +353,7 @@ class _Work:
             conditions=self.validated.conditions,
             hosts=reduce(or_, (part.hosts for part in parts[::-1]), {})
             | hosts_of(self.spec, self.source),
+            sections=as_sections(self.sections),
         )
 
 
@@ -365,19 +376,19 @@ def _has_calibrations(spec: RobotSpec) -> bool:
     return bool(spec.calibrations) or any(entry.calibration for entry in entries)
 
 
-def _processes(validated: Validated, found: list[Finding], *, is_part: bool) -> list[Process]:
+def _processes(
+    validated: Validated, found: list[Finding], of_tools: list[Process], *, is_part: bool
+) -> list[Process]:
     processes = built_in(validated.spec, validated.source)
     spec = validated.spec
-    processes += (
-        []
-        if is_part
-        else [*own_router(spec, validated.source), *own_share(spec, validated.source)]
-    )
+    processes += [] if is_part else own_router(spec, validated.source)
+    processes += of_tools
     processes += [
         container_process(name, declared, validated) for name, declared in spec.containers.items()
     ]
+    names = {process.name for process in of_tools}
     for name, declared in spec.processes.items():
-        if is_own_router(name, declared, spec) or is_own_share(name, declared, spec):
+        if is_own_router(name, declared, spec) or name in names:
             found += built_in_keys(name, declared, validated.source)
             continue
         process, refused = user_process(name, declared, validated)

@@ -113,6 +113,19 @@ class SourceNumbers:
 
 
 @dataclass(frozen=True, slots=True)
+class Section:
+    """A tool's section of the robot file: what it says, as its model has it, and where that stands."""
+
+    name: str
+    value: Any
+    place: Callable[[tuple[str | int, ...]], Span] = field(compare=False, repr=False)
+
+    def at(self, *path: str | int) -> Span:
+        """Return the place of a value in the section, or of the nearest around it."""
+        return self.place((self.name, *path))
+
+
+@dataclass(frozen=True, slots=True)
 class Part:
     """A part that is a robot of its own beside others, with its own ``static``, ``joints`` and description.
 
@@ -174,7 +187,7 @@ class Robot:
     profiles or overlays merged over it. ``zones`` are those that sensors have to see, ``limits``
     what the file sets instead of the limits of codes, ``conditions`` those of the entries that
     they leave out, by (section, name). ``hosts`` are the computers that it may run on, its parts'
-    among them; empty: not declared.
+    among them; empty: not declared. ``sections`` are those of tools, by name.
     """
 
     name: str
@@ -206,6 +219,7 @@ class Robot:
     limits: dict[str, float] = field(default_factory=dict, compare=False)
     conditions: dict[tuple[str, str], str] = field(default_factory=dict, compare=False)
     hosts: dict[str, Host] = field(default_factory=dict)
+    sections: dict[str, Section] = field(default_factory=dict, compare=False, repr=False)
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""

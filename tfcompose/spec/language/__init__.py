@@ -5,7 +5,6 @@ sources, ``validate`` makes a ``RobotSpec`` of one.
 """
 
 from tfcompose.spec.language.args import ArgSpec, Given, GivenArg
-from tfcompose.spec.language.fleet import FleetSpec
 from tfcompose.spec.language.overlay import (
     as_part,
     composed,
@@ -19,7 +18,7 @@ from tfcompose.spec.language.validate import (
     Validated,
     levels_of,
     validate,
-    validate_fleet,
+    validate_file,
     validate_node_preset,
     validate_preset,
 )
@@ -28,7 +27,6 @@ from tfcompose.spec.language.variables import alternatives_of
 __all__ = [
     "DIRECTIONS",
     "ArgSpec",
-    "FleetSpec",
     "Given",
     "GivenArg",
     "Validated",
@@ -40,7 +38,7 @@ __all__ = [
     "profiles_in",
     "set_value",
     "validate",
-    "validate_fleet",
+    "validate_file",
     "validate_node_preset",
     "validate_preset",
     "with_includes",

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 from pydantic.json_schema import GenerateJsonSchema
 
 from tfcompose.foundation.catalogue import CATALOGUE
+from tfcompose.foundation.tool import installed, load
 from tfcompose.foundation.units import EXPRESSION
-from tfcompose.spec.language.fleet import FleetSpec
 from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.preset import PresetSpec
-from tfcompose.spec.language.robot import RobotSpec
 from tfcompose.spec.language.spec import described, examples_of, fields_of, walk
+from tfcompose.spec.language.tool_keys import full_robot_model
 from tfcompose.spec.language.values import COMPUTED
 from tfcompose.spec.load.scalars import plain
 
@@ -26,27 +26,32 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.preset import Option
     from tfcompose.spec.language.spec import Spec
 
-LANGUAGES: dict[str, type[Spec]] = {
-    "robot": RobotSpec,
-    "preset": PresetSpec,
-    "node": NodePresetSpec,
-    "fleet": FleetSpec,
-}
+#: The languages of the core besides that of robot files.
+_MODELS: dict[str, type[Spec]] = {"preset": PresetSpec, "node": NodePresetSpec}
+
+
+def model_of(language: str) -> type[Spec]:
+    """Return the model of ``robot``, ``preset`` or ``node``, or of a language that a tool brings."""
+    if language == "robot":
+        return full_robot_model()
+    model: type[Spec] = _MODELS.get(language) or load(installed().languages()[language].model)
+    return model
 
 
 def json_schema(
     language: str, presets: Mapping[str, PresetSpec], nodes: Iterable[str]
 ) -> dict[str, Any]:
-    """Return the schema of ``robot``, of an ``overlay`` of one, of ``preset``, or of ``node``, a node's preset.
+    """Return the schema of ``robot``, of an ``overlay`` of one, or of another language.
 
     The schemas of robots know the names and options of ``presets``, and the names of ``nodes``,
     their presets.
     """
-    root = RobotSpec if language == "overlay" else LANGUAGES[language]
+    is_robot = language in {"robot", "overlay"}
+    root = model_of("robot" if is_robot else language)
     own = _with_named_types(
         root.model_json_schema(schema_generator=_Generator), {one for _, one in walk(root)}
     )
-    if root is not RobotSpec:
+    if not is_robot:
         own = _without_expressions(own)
     definitions = own.pop("$defs", {})
     for _, kind in walk(root):
@@ -62,7 +67,7 @@ def json_schema(
         _exclude(schema, getattr(kind, "EXCLUSIVE", ()), definitions)
     if language == "preset":
         _overlaid(own, definitions)
-    if root is RobotSpec:
+    if is_robot:
         own["patternProperties"] = {
             "^x-": {"description": "your own anchors, which tfcompose does not read"}
         }

@@ -16,8 +16,8 @@ from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, di
 from tfcompose.spec.language.args import Given
 from tfcompose.spec.language.conditions import holds
 from tfcompose.spec.language.expressions import ExpressionError
-from tfcompose.spec.language.robot import RobotSpec
 from tfcompose.spec.language.spec import Spec, mappings_at
+from tfcompose.spec.language.tool_keys import robot_model
 from tfcompose.spec.language.variables import NothingNewError, Variables
 from tfcompose.spec.load import DEEPEST, Path, Place, Source, load
 
@@ -105,15 +105,16 @@ def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], l
 
 
 def lay_over(
-    base: Source, overlay: Source, *, is_overlay: bool = True, of: type[Spec] = RobotSpec
+    base: Source, overlay: Source, *, is_overlay: bool = True, of: type[Spec] | None = None
 ) -> Source:
     """Return ``base`` with ``overlay`` merged into it; each key remembers where it is from, and what it replaced.
 
     With ``is_overlay`` a value that changes nothing is a finding. ``of`` is the language that both
-    are written in.
+    are written in, by default that of robot files.
     """
-    if of is RobotSpec:
+    if of is None:
         base, overlay = _with_full_args(base), _with_full_args(overlay)
+        of = robot_model(base.data.keys() | overlay.data.keys())
     merger = _Merger(base.replaced, overlay.replaced, of, is_overlay=is_overlay)
     if is_overlay and not overlay.data:
         merger.found.append(_idle("nothing is merged over the robot here", overlay.places))

@@ -7,8 +7,9 @@ import json
 import types
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
+from tfcompose.foundation.tool import installed
 from tfcompose.foundation.units import Measure
-from tfcompose.spec.language.json_schema import LANGUAGES
+from tfcompose.spec.language.json_schema import model_of
 from tfcompose.spec.language.spec import (
     described,
     examples_of,
@@ -29,7 +30,6 @@ _HEAD = {
     "robot": "The language of robot files",
     "preset": "The language of sensor presets",
     "node": "The language of node presets",
-    "fleet": "The language of fleet files",
 }
 _VALUES = (
     "A bare number is in SI units and radians; a string may carry a unit: `30 cm`, `15 deg`,"
@@ -43,13 +43,14 @@ _REQUIRED = "Keys without a default are required."
 
 
 def reference(language: str) -> str:
-    """Return the reference of ``robot``, ``preset``, ``node`` or ``fleet``."""
-    root = LANGUAGES[language]
+    """Return the reference of ``robot``, ``preset``, ``node``, or a language that a tool brings."""
+    root = model_of(language)
     sections: dict[Any, list[str]] = {}
     for pattern, kind in walk(root):
         sections.setdefault(kind, []).append(_place(pattern))
     rules = [_VALUES, *([_EXPRESSIONS] if language == "robot" else []), _REQUIRED]
-    lines = [f"# {_HEAD[language]}, version 1", "", *rules, ""]
+    head = _HEAD.get(language) or installed().languages()[language].title
+    lines = [f"# {head}, version 1", "", *rules, ""]
     for kind, places in sections.items():
         lines += _section(kind, places)
     return "\n".join(lines).rstrip() + "\n"
@@ -63,7 +64,7 @@ def key_page(path: str) -> str | None:
     every place is explained.
     """
     words = tuple(path.split("."))
-    root = LANGUAGES["robot"]
+    root = model_of("robot")
     places = [(pattern, kind) for pattern, kind in walk(root) if pattern]
     holders: list[tuple[Pattern, Any]] = [((), root), *places]
     if words[0] in fields_of(root) and len(words) == 1:
@@ -93,7 +94,7 @@ def key_page(path: str) -> str | None:
 
 def paths() -> list[str]:
     """Return where each key of a robot file is, such as ``sensors.place``, without the names between."""
-    found = walk(LANGUAGES["robot"])
+    found = walk(model_of("robot"))
     return [
         ".".join(step for step in (*at, name) if step != "*")
         for at, kind in found
@@ -103,7 +104,7 @@ def paths() -> list[str]:
 
 def keys() -> list[str]:
     """Return the names of all keys of a robot file, and the kinds of its sections."""
-    kinds = dict.fromkeys(kind for _, kind in walk(LANGUAGES["robot"]))
+    kinds = dict.fromkeys(kind for _, kind in walk(model_of("robot")))
     return [
         *dict.fromkeys(name for kind in kinds for name in fields_of(kind)),
         *(_title(one).lower() for one in kinds),

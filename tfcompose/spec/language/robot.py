@@ -38,7 +38,6 @@ from tfcompose.model.plan.middleware import ENDPOINT
 from tfcompose.model.robot import Dynamics, Limit, ReferencePositions, SafetyController
 from tfcompose.spec.language.args import Args
 from tfcompose.spec.language.bodies import LinkSpec
-from tfcompose.spec.language.fleet import Member
 from tfcompose.spec.language.hosts import HostName, HostSpec
 from tfcompose.spec.language.optics import OpticsSpec
 from tfcompose.spec.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
@@ -554,12 +553,6 @@ class RobotSpec(Spec):
     )
     hosts: dict[HostName, HostSpec] = key(
         {}, "the computers that processes name as their host", {"brain": {"ssh": "robot@10.0.0.2"}}
-    )
-    fleet: Member | None = key(
-        None,
-        "the fleet that it shares edges with, by a process fleet_share",
-        "fleet.yaml",
-        {"file": "fleet.yaml", "robot": "r1"},
     )
     profiles: Parameters = key(
         {},

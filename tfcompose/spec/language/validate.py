@@ -10,14 +10,13 @@ from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Finding, RejectedError, without_duplicates
 from tfcompose.spec.language.args import Given
 from tfcompose.spec.language.conditions import unfolded
-from tfcompose.spec.language.fleet import FleetSpec
 from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.overlay import is_for_later
 from tfcompose.spec.language.preset import PresetSpec, wrong_names
 from tfcompose.spec.language.reading import Refusal, read
-from tfcompose.spec.language.robot import RobotSpec
 from tfcompose.spec.language.rules import RuleSpec, level_of
 from tfcompose.spec.language.spec import Spec
+from tfcompose.spec.language.tool_keys import problems_with, robot_model
 from tfcompose.spec.language.values import plain
 from tfcompose.spec.language.variables import Variables, unused
 
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
     from tfcompose.model.plan import ParameterValue
+    from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path, Source
 
 
@@ -94,9 +94,14 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     nulls = _nulls(source)
     data = variables.compute(source.data, done.scopes)
     already = [*(one.path for one in nulls), *variables.uncomputed]
-    spec, refusals = read(RobotSpec, data, already)
+    spec, refusals = read(robot_model(source.data), data, already)
     own = _findings([*nulls, *variables.refusals, *refusals], source)
-    found = (*source.found, *without_duplicates([*variables.found, *done.found]), *own)
+    found = (
+        *source.found,
+        *without_duplicates([*variables.found, *done.found]),
+        *own,
+        *problems_with(source.data),
+    )
     if spec is None:
         raise RejectedError(found)
     refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
@@ -137,19 +142,15 @@ def validate_node_preset(source: Source) -> NodePresetSpec:
     Raises:
         RejectedError: with every finding, if anything is wrong with it.
     """
-    return _validated(NodePresetSpec, source)
+    return validate_file(NodePresetSpec, source)
 
 
-def validate_fleet(source: Source) -> FleetSpec:
-    """Return the typed fleet.
+def validate_file(kind: type[M], source: Source) -> M:
+    """Return the typed file of a language that needs nothing but its model.
 
     Raises:
         RejectedError: with every finding, if anything is wrong with it.
     """
-    return _validated(FleetSpec, source)
-
-
-def _validated(kind: type[M], source: Source) -> M:
     nulls = _nulls(source)
     spec, refusals = read(kind, source.data, [one.path for one in nulls])
     found = (*source.found, *_findings([*nulls, *refusals], source))

@@ -15,7 +15,7 @@ import asyncssh
 
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.launcher.program import ANYWHERE
-from tfcompose.tools.exporters.supervisors import SOURCING
+from tfcompose.model.systemd import SOURCING
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tfcompose.launcher.program import anywhere
-from tfcompose.tools.exporters.supervisors import quoted, sourced
+from tfcompose.model.systemd import quoted, sourced
 
 #: How long everything on a host has to end: the launcher ends processes one after the other.
 STOP_S = 90

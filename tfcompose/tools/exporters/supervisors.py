@@ -17,9 +17,10 @@ from tfcompose.launcher.program import anywhere
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.process_keys import PROCESS_KEYS, Exported
+from tfcompose.model.systemd import quoted, sourced, without_specifiers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping
 
     from tfcompose.model.plan import Plan, PlanProcess
     from tfcompose.model.process_keys import Dialect, Setting
@@ -221,16 +222,6 @@ def yaml_text(value: Mapping[str, Any]) -> str:
     return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000)
 
 
-#: Sources its arguments up to ``--``, then becomes the command behind it; bash, because ROS's
-#: setup files are bash's.
-SOURCING = 'until [ "$1" = -- ]; do . "$1"; shift; done; shift; exec "$@"'
-
-
-def sourced(setup: Sequence[str], words: list[str]) -> list[str]:
-    """Return the words that source the setup files and become the command; the command's own where there are none."""
-    return ["/bin/bash", "-c", SOURCING, "bash", *setup, "--", *words] if setup else words
-
-
 def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     """Return the units, and what they do not keep of the plan.
 
@@ -296,7 +287,7 @@ def _unit_text(plan: Plan, exported: Exported, machine: Machine, names: Mapping[
     settling_s = _settling_s(plan, process)
     settings = settings_of(_SYSTEMD, exported)
     unit = [
-        f"Description={_plain(process.name)} of robot {plan.robot}",
+        f"Description={without_specifiers(process.name)} of robot {plan.robot}",
         f"PartOf={target}",
         *(f"{key}={' '.join(before)}" for key in ("After", "Wants") if before),
         *(f"{key}={value}" for key, value, section in settings if section == "Unit"),
@@ -310,7 +301,7 @@ def _unit_text(plan: Plan, exported: Exported, machine: Machine, names: Mapping[
             for name, value in sorted(machine.env.items())
         ),
         *_logs(plan, machine),
-        f"WorkingDirectory={_plain(machine.folder)}",
+        f"WorkingDirectory={without_specifiers(machine.folder)}",
         f"ExecStart={_exec(process, machine)}",
         *([f"ExecStartPost=/bin/sleep {settling_s:g}"] if settling_s else []),
         *(f"{key}={value}" for key, value, section in settings if section == "Service"),
@@ -332,19 +323,6 @@ def _exec(process: PlanProcess, machine: Machine) -> str:
         machine.setup, command_of(process, machine.python, f"{machine.folder}/plan.json")
     )
     return " ".join(quoted(word).replace("$", "$$") for word in words)
-
-
-def _plain(text: str) -> str:
-    return text.replace("%", "%%")
-
-
-def quoted(word: str) -> str:
-    """Return the word as systemd reads it back; a percent sign is doubled."""
-    text = _plain(word)
-    if text and all(c.isalnum() or c in "/.:=@+,-_%" for c in text):
-        return text
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
 
 
 #: Where the plan's folder is inside a container.

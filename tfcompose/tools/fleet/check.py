@@ -9,8 +9,8 @@ from tfcompose.foundation.findings import Finding, Note, finding
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.spec.language import FleetSpec
     from tfcompose.spec.load import Path, Source
+    from tfcompose.tools.fleet.spec import FleetSpec
 
 
 def check_fleet(fleet: FleetSpec, source: Source) -> Iterator[Finding]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.foundation.geometry import Pose
-    from tfcompose.spec.language import FleetSpec
+    from tfcompose.tools.fleet.spec import FleetSpec
 
 #: A robot sends twice a second: where the last that came was sent longer ago, its link is stale,
 #: in seconds.

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.foundation.signals import Stop
-    from tfcompose.spec.language import FleetSpec
+    from tfcompose.tools.fleet.spec import FleetSpec
 
 
 def share(

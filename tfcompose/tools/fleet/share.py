@@ -13,8 +13,8 @@ from tfcompose.tools.fleet.session import connected
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from tfcompose.spec.language import FleetSpec
     from tfcompose.tf.ros.tf_codec import Row
+    from tfcompose.tools.fleet.spec import FleetSpec
 
 #: All fixed edges are sent so often, in seconds, also where there is none: that says that the
 #: robot is reached.

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Sequence
 
-    from tfcompose.cli.bag_view import BagView
     from tfcompose.foundation.geometry import Offset
+    from tfcompose.tools.view.bag_view import BagView
     from tfcompose.tools.view.reload import Files
     from tfcompose.tools.view.session import Session
 
@@ -86,7 +86,7 @@ def run(arguments: Namespace) -> int:
     except ImportError as error:
         fail(f"{error.name} is not installed: pip install 'tfcompose[view]'", UNREADABLE)
     from tfcompose.cli.reading import read_text
-    from tfcompose.cli.view_session import session_of
+    from tfcompose.tools.view.view_session import session_of
 
     if arguments.live and arguments.bag:
         fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
@@ -126,7 +126,7 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     bag = _bag_view(session, arguments) if arguments.bag else None
     if arguments.live:
         from tfcompose.cli.live import set_up_ros
-        from tfcompose.cli.view_session import plan_of_session
+        from tfcompose.tools.view.view_session import plan_of_session
 
         set_up_ros(plan_of_session(session).ros)
     token = "" if arguments.host in _LOOPBACK else secrets.token_urlsafe(16)
@@ -142,7 +142,7 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
         _announce(_address(arguments.host, server.get_port(), token), arguments)
         with Watcher(files) as watcher:
             if arguments.live:
-                from tfcompose.cli.live_view import follow
+                from tfcompose.tools.view.live_view import follow
 
                 return follow(
                     server, shown, watcher.changed, _tolerance(arguments), joints=arguments.joints
@@ -163,7 +163,7 @@ def _tolerance(arguments: Namespace) -> Offset:
 
 
 def _bag_view(session: Session, arguments: Namespace) -> BagView:
-    from tfcompose.cli.bag_view import BagView
+    from tfcompose.tools.view.bag_view import BagView
 
     return BagView(arguments.bag, arguments.at or 0.0, session, _tolerance(arguments))
 

@@ -1,16 +1,20 @@
-"""The language of ``fleet.yaml``, version 1: the robots of a fleet, their Zenoh routers, and which edges leave them."""
+"""Language of ``fleet.yaml``, version 1: robots, their Zenoh routers, and which edges leave them."""
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
 from tfcompose.foundation.units import Rate
 from tfcompose.model.plan.middleware import ENDPOINT
 from tfcompose.spec.language.spec import Spec, key
+from tfcompose.spec.language.validate import validate_file
 from tfcompose.spec.language.values import Matches, Name, Namespace, Text, Texts
+
+if TYPE_CHECKING:
+    from tfcompose.spec.load import Source
 
 _ARROW = re.compile(r"\s*(?:→|->)\s*")
 
@@ -124,3 +128,12 @@ class FleetSpec(Spec):
     def key_of(self, robot: str) -> str:
         """Return where on Zenoh a robot's edges are: this key, with ``/tf`` or ``/tf_static`` behind it."""
         return f"tfcompose/fleet/{self.name}/{robot}"
+
+
+def validate_fleet(source: Source) -> FleetSpec:
+    """Return the typed fleet.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    return validate_file(FleetSpec, source)

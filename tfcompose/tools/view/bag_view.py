@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.live import from_bag
 from tfcompose.cli.terminal import UNREADABLE, fail
-from tfcompose.cli.view_session import plan_of_session
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tools.view.bag import BagTree, Recorded
 from tfcompose.tools.view.live_panel import BagPanel
+from tfcompose.tools.view.view_session import plan_of_session
 
 if TYPE_CHECKING:
     import viser

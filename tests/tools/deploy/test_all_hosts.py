@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tfcompose.cli.all_hosts import _Printer
+from tfcompose.tools.deploy.all_hosts import _Printer
 
 
 def test_events_have_their_host_and_a_line_that_is_none_is_printed(

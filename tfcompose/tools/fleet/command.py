@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.spec.language.fleet import FleetSpec
     from tfcompose.tools.fleet.observe import FleetObserver, RobotStatus
+    from tfcompose.tools.fleet.spec import FleetSpec
 
 #: What can be done, with the names that it takes.
 _ACTIONS = {"lint": (), "share": ("ROBOT",), "ps": (), "echo": ("A", "B"), "doctor": ()}
@@ -119,9 +119,9 @@ def _read(file: str) -> tuple[FleetSpec | None, list[Finding]]:
     """Return the fleet of a file, None where it has errors, and all findings."""
     from tfcompose.cli.reading import read_text
     from tfcompose.foundation.findings import RejectedError
-    from tfcompose.spec.language.validate import validate_fleet
     from tfcompose.spec.load import load
     from tfcompose.tools.fleet.check import check_fleet
+    from tfcompose.tools.fleet.spec import validate_fleet
 
     try:
         source = load(read_text(file), file)

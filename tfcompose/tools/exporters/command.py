@@ -144,7 +144,7 @@ def _exported(
         urdf = read_text(str(file.parent / "robot.urdf"))
         if is_plan(arguments.file):
             return launch(plan, Machine(relative), urdf)
-        from tfcompose.cli.launch_values import launch_values
+        from tfcompose.tools.exporters.launch_arguments import launch_values
 
         values, further, fixed = launch_values(arguments, plan)
         files, gaps = launch(plan, Machine(relative), urdf, values)

@@ -1,61 +1,51 @@
-"""The robot as one of a fleet: the process that shares its edges, and what of the fleet's file is not this robot's."""
+"""Robot as a member of a fleet: the process that shares its edges, and whether the fleet's file fits."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.resolve.processes import added, says_how
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.foundation.text import listed
 from tfcompose.model.plan.fleet import SHARE_COMMAND
 from tfcompose.model.robot import Process
-from tfcompose.spec.language.validate import validate_fleet
 from tfcompose.spec.load import load, path_named
 from tfcompose.tools.fleet.check import check_fleet
+from tfcompose.tools.fleet.spec import validate_fleet
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Iterator
 
+    from tfcompose.compiler.resolve.tool_sections import ToolSection
     from tfcompose.model.robot import Robot
-    from tfcompose.spec.language.fleet import FleetSpec
-    from tfcompose.spec.language.process import ProcessSpec
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Source
+    from tfcompose.tools.fleet.spec import FleetSpec
 
 #: The process that shares a robot's edges with its fleet.
 SHARE = "fleet_share"
 _NAMED_AT_MOST = 8
 
 
-def is_own_share(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> bool:
-    """Return whether a process is what shares edges, and tfcompose's own: what stands under its name adds to it."""
-    return spec.fleet is not None and name == SHARE and not says_how(declared)
-
-
-def own_share(spec: RobotSpec, source: Source) -> list[Process]:
-    """Return the process that shares the robot's edges, if it is one of a fleet and has none of its own.
+def share_process(section: ToolSection) -> Iterator[Process]:
+    """Yield the process that shares the robot's edges.
 
     It is ready once it is started, and its failure ends nothing: no robot needs the others to run.
     """
-    declared = spec.processes.get(SHARE)
-    if spec.fleet is None or not is_own_share(SHARE, declared, spec):
-        return []
-    file = path_named(spec.fleet.file, source.at(("fleet", "file")))
-    words = (*SHARE_COMMAND, _name(spec), f"${{file:{file}}}", *_below(spec))
-    process = Process(
+    file = path_named(section.value.file, section.at("file"))
+    spec = section.spec
+    yield Process(
         SHARE,
         "run",
-        at=source.at_key(("processes", SHARE) if declared else ("fleet",)),
-        argv=words,
+        at=section.at_key(),
+        argv=(*SHARE_COMMAND, _name(section), f"${{file:{file}}}", *_below(spec)),
         restart="on-failure",
         required=False,
     )
-    return [added(process, declared, spec)]
 
 
-def _name(spec: RobotSpec) -> str:
-    return (spec.fleet and spec.fleet.robot) or spec.robot
+def _name(section: ToolSection) -> str:
+    return str(section.value.robot or section.spec.robot)
 
 
 def _below(spec: RobotSpec) -> tuple[str, ...]:
@@ -66,27 +56,24 @@ def _below(spec: RobotSpec) -> tuple[str, ...]:
     )
 
 
-def wrong_membership(
-    robot: Robot, spec: RobotSpec, source: Source, read: Callable[[str], str] | None
-) -> list[Finding]:
+def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
     """Return what is wrong with the fleet's file for this robot: it cannot be read, or names what the robot is not."""
-    if spec.fleet is None:
-        return []
-    at = source.at(("fleet", "file"))
-    path = path_named(spec.fleet.file, at)
-    if read is None:
+    source, member = section.source, section.value
+    at = section.at("file")
+    path = path_named(member.file, at)
+    if section.read is None:
         return [finding("TF001", f"{path}: files cannot be read here", at)]
     try:
-        fleet_source = load(read(path), path)
+        fleet_source = load(section.read(path), path)
         fleet = validate_fleet(fleet_source)
         wrong = [one for one in check_fleet(fleet, fleet_source) if one.severity == "error"]
     except RejectedError as error:
         wrong = list(error.findings)
     if wrong:
         return [replace(one, notes=(*one.notes, Note("named here", at))) for one in wrong]
-    name = _name(spec)
+    name = _name(section)
     if name not in fleet.robots:
-        place = source.at(("fleet", "robot") if spec.fleet.robot else ("robot",))
+        place = section.at("robot") if member.robot else source.at(("robot",))
         known = (
             f"there is {listed(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
             " NAME}"

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.process_table import HEAD, row, uptime
 from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject, warn
-from tfcompose.cli.view_session import plan_of_session
 from tfcompose.foundation.findings import finding
 from tfcompose.foundation.signals import Stop
 from tfcompose.launcher.control import RefusedError, ask
@@ -23,6 +22,7 @@ from tfcompose.tf.ros.environment import RosError
 from tfcompose.tools.view.joints import JointSender, joint_topics
 from tfcompose.tools.view.live import LiveTree
 from tfcompose.tools.view.live_panel import LivePanel
+from tfcompose.tools.view.view_session import plan_of_session
 
 if TYPE_CHECKING:
     import threading

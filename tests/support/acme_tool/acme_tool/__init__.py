@@ -1,0 +1,1 @@
+"""Beepers on robots."""

@@ -1,0 +1,205 @@
+"""A tool from outside of this repository can do what a tool inside does; one that is broken stops nothing."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.support import processes
+from tests.support.core import ACME, install, run_with, write_tool
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable
+    from pathlib import Path
+
+    Run = Callable[..., subprocess.CompletedProcess[str]]
+
+ROBOT = """\
+tfcompose: 1
+robot: r
+frames:
+  base_link: {}
+  mast: {parent: base_link, xyz: [0, 0, 1]}
+"""
+TOOL = "from tfcompose.foundation.tool import Command, Key, Tool\nTOOL = Tool("
+
+
+@pytest.fixture(scope="module")
+def acme(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder in which the package is installed."""
+    return install(ACME, tmp_path_factory.mktemp("acme"))
+
+
+@pytest.fixture
+def run(acme: Path, tmp_path: Path) -> Run:
+    """Run tfcompose with the installed package, in a folder with a robot that has its section."""
+    write_robot(tmp_path, "acme: {frame: mast, reach: 2 m}")
+    return lambda *arguments: run_with(acme, tmp_path, *arguments)
+
+
+def write_robot(folder: Path, *lines: str) -> None:
+    (folder / "robot.yaml").write_text(ROBOT + "".join(f"{line}\n" for line in lines))
+
+
+def findings(done: subprocess.CompletedProcess[str]) -> list[str]:
+    """Return the findings that were printed: place and code."""
+    found = re.findall(r"^(?:(\S+:\d+:\d+): )?(?:error|warning)\[(\w+)\]",
+                       done.stdout + done.stderr, re.MULTILINE)  # fmt: skip
+    return [f"{place} {code}".strip() for place, code in found]
+
+
+def test_its_command_runs_and_stands_in_the_help(run: Run) -> None:
+    done = run("acme", "robot.yaml")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "mast\n", "")
+    text = run("--help").stdout
+    assert "\nTools:\n  acme        List the frames that hear a robot's beeper\n" in text
+    assert "acme" in text.partition("topics,")[2]
+    options = run("acme", "--help").stdout
+    page = run("help", "acme").stdout
+    assert "those that the section acme of FILE names" in options
+    assert page.startswith(options)
+    assert "# Beepers" in page
+    assert run("completion", "--at", 1, "--", "tfcompose", "acm").stdout == "acme\n"
+
+
+def test_its_section_is_validated_at_its_places(run: Run, tmp_path: Path) -> None:
+    assert run("lint").returncode == 0
+    write_robot(tmp_path, "acme: {frame: mast, reech: 2 m}")
+    done = run("lint")
+    assert findings(done) == ["robot.yaml:6:21 TF101"]
+    assert "did you mean reach?" in done.stdout
+    write_robot(tmp_path, "acme: {frame: mast, reach: 2 deg}")
+    assert findings(run("lint")) == ["robot.yaml:6:28 TF104"]
+    write_robot(tmp_path, "acne: {frame: mast}")
+    assert "did you mean acme?" in run("lint").stdout
+
+
+def test_its_section_is_merged_like_every_other_and_adds_its_process(
+    run: Run, tmp_path: Path
+) -> None:
+    write_robot(tmp_path, "acme: {frame: mast}", "profiles: {loud: {acme: {reach: 3 m}}}",
+                "processes: {beeper: {restart: always}}")  # fmt: skip
+    assert run("build", "-p", "loud", "-o", "built").returncode == 0
+    plan = json.loads((tmp_path / "built/plan.json").read_text())
+    (beeper,) = (process for process in plan["processes"] if process["name"] == "beeper")
+    assert (beeper["argv"], beeper["restart"]) == (["sleep", "3"], "always")
+
+
+def test_its_rule_finds_at_its_place_and_can_be_silenced_and_explained(
+    run: Run, tmp_path: Path
+) -> None:
+    write_robot(tmp_path, "acme: {frame: nowhere}")
+    assert findings(run("lint")) == ["robot.yaml:6:15 ACME101"]
+    assert findings(run("lint", "--select", "TF2")) == []
+    write_robot(tmp_path, "acme: {frame: nowhere} # tfcompose: allow ACME101 because of a test")
+    assert findings(run("lint")) == []
+    write_robot(tmp_path, "acme: {frame: nowhere}", "rules: {ACME101: off}")
+    assert findings(run("lint")) == []
+    explained = run("explain", "ACME101").stdout
+    assert explained.startswith("ACME101 beeper_on_nothing\n\nThe beeper is on a frame")
+    assert run("explain", "beeper_on_nothing").stdout == explained
+
+
+def test_its_names_are_in_the_schema_and_the_reference(run: Run) -> None:
+    schema = json.loads(run("schema").stdout)
+    assert schema["properties"]["acme"]["description"] == "the robot's beeper"
+    assert schema["$defs"]["AcmeSpec"]["properties"].keys() == {"frame", "reach"}
+    assert "ACME101" in schema["properties"]["rules"]["properties"]
+    assert "how far it is heard" in run("help", "acme.reach").stdout
+    assert "| ACME101 | beeper_on_nothing | error |" in run("help", "codes").stdout
+
+
+def test_its_preset_is_found(run: Run, tmp_path: Path) -> None:
+    write_robot(tmp_path, "sensors: {b: {preset: acme/beeper-1, parent: mast, driver: none}}")
+    assert "TF601" not in run("lint").stdout
+    assert "acme/beeper-1" in run("presets", "acme").stdout
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["import no_such_module", "TOOL = 1", "raise SystemError('no')"],
+    ids=["import", "type", "crash"],
+)
+def test_a_tool_that_does_not_load_is_one_finding_and_the_rest_goes_on(
+    module: str, acme: Path, tmp_path: Path
+) -> None:
+    write_tool(tmp_path / "broken", "broken", module)
+    path = f"{acme}:{tmp_path / 'broken'}"
+    write_robot(tmp_path, "acme: {frame: mast}")
+    done = run_with(path, tmp_path, "--help")
+    assert (done.returncode, findings(done)) == (0, ["TF921"])
+    assert "the tool broken" in done.stderr
+    assert "  acme " in done.stdout
+    assert run_with(path, tmp_path, "acme").stdout == "mast\n"
+    done = run_with(path, tmp_path, "lint")
+    assert (done.returncode, findings(done)) == (0, ["TF921"])
+    write_robot(tmp_path)
+    assert findings(run_with(path, tmp_path, "lint")) == []
+
+
+@pytest.mark.parametrize(
+    "brings",
+    [
+        "commands=(Command('lint', 's', 'x'),)",
+        "commands=(Command('view', 's', 'x'),)",
+        "commands=(Command('acme', 's', 'x'),)",
+        "keys=(Key('frames', 'x:X', 'about'),)",
+        "keys=(Key('fleet', 'x:X', 'about'),)",
+        "keys=(Key('acme', 'x:X', 'about'),)",
+    ],
+)
+def test_a_clash_of_commands_or_keys_is_a_finding_and_the_first_one_stays(
+    brings: str, acme: Path, tmp_path: Path
+) -> None:
+    write_tool(tmp_path / "second", "second", f"{TOOL}name='second', package='second', {brings})")
+    path = f"{acme}:{tmp_path / 'second'}"
+    write_robot(tmp_path, "acme: {frame: mast}")
+    done = run_with(path, tmp_path, "--help")
+    assert findings(done) == ["TF922"]
+    kind, name = ("key" if "Key" in brings else "command"), brings.split("'")[1]
+    assert f"has the {kind} {name}" in done.stderr
+    assert run_with(path, tmp_path, "acme").stdout == "mast\n"
+
+
+@pytest.mark.parametrize("code", ["ACME101", "TF801", "TF999", "acme1"])
+def test_a_code_that_is_not_its_own_is_a_finding(code: str, acme: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "second"
+    write_tool(folder, "second_tool", f"{TOOL}name='second', package='second', codes='second')")
+    (folder / "second/codes").mkdir(parents=True)
+    (folder / "second/__init__.py").write_text("")
+    text = (ACME / "acme_tool/codes/ACME101.md").read_text()
+    (folder / f"second/codes/{code}.md").write_text(text)
+    done = run_with(f"{acme}:{folder}", tmp_path, "--help")
+    assert findings(done) == ["TF922"]
+    assert code in done.stderr
+
+
+def test_a_command_whose_module_does_not_load_is_one_finding(tmp_path: Path) -> None:
+    brings = "name='far', package='far', commands=(Command('far', 'Go far', 'not_there'),)"
+    write_tool(tmp_path / "far", "far", f"{TOOL}{brings})")
+    done = run_with(tmp_path / "far", tmp_path, "far")
+    assert (done.returncode, findings(done)) == (2, ["TF921"])
+    assert "Traceback" not in done.stderr
+
+
+def test_tools_of_other_packages_are_looked_up_only_where_something_is_unknown(
+    acme: Path, tmp_path: Path
+) -> None:
+    code = "import sys; from tfcompose.cli import main; main(sys.argv[1:]); print('acme_tool' in sys.modules)"
+
+    def loads(*arguments: str) -> bool:
+        command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(acme)!r}); {code}"]
+        done = processes.run([*command, *arguments], cwd=tmp_path, check=True)
+        return done.stdout.splitlines()[-1] == "True"
+
+    write_robot(tmp_path, "# fleet: fleet.yaml")
+    assert not loads("lint")
+    assert not loads("tree")
+    assert loads("--help")
+    write_robot(tmp_path, "acme: {frame: mast}")
+    assert loads("lint")

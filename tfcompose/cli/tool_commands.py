@@ -1,0 +1,157 @@
+"""Commands and options of tools, as the parser, the help and the completion have them.
+
+Tools that ship are looked up first. Those of other packages are looked up only where a command or an
+option is still unknown, and for the help.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli.terminal import UNREADABLE, fail
+from tfcompose.foundation.tool import absent, installed, load, shipped
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Iterable, Sequence
+
+    from tfcompose.cli.command_parser import CommandModule, Parser
+    from tfcompose.foundation.tool import Command, Option, Tool, Toolset
+
+
+class ToolCommand:
+    """A tool's command; its module is loaded when its help or its options are needed."""
+
+    def __init__(self, tool: Tool, command: Command) -> None:
+        self.tool = tool
+        self.command = command
+
+    @property
+    def __doc__(self) -> str | None:  # type: ignore[override]
+        """The help, which is the module's docstring."""
+        text: str | None = self._module().__doc__
+        return text
+
+    def arguments(self, parser: ArgumentParser, /) -> None:
+        """Add the command's arguments."""
+        self._module().arguments(parser)
+
+    def run(self, arguments: Namespace, /) -> int:
+        """Run it and return the exit code."""
+        return int(self._module().run(arguments))
+
+    def _module(self) -> Any:
+        return _loaded(self.tool, self.command.module)
+
+
+class ToolOption:
+    """Options that a tool adds to a command of the core."""
+
+    def __init__(self, tool: Tool, option: Option) -> None:
+        self.tool = tool
+        self.option = option
+
+    def arguments(self, parser: ArgumentParser) -> None:
+        """Add them."""
+        _loaded(self.tool, self.option.module).arguments(parser)
+
+    def run(self, command: str, arguments: Namespace) -> int | None:
+        """Run the command their way, and return the exit code; None where it is to run as usual."""
+        code: int | None = _loaded(self.tool, self.option.module).run(command, arguments)
+        return code
+
+
+def _loaded(tool: Tool, module: str) -> Any:
+    """Return a module of a tool.
+
+    Raises:
+        SystemExit: after reporting that it cannot be loaded.
+    """
+    try:
+        return load(module)
+    except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
+        from tfcompose.cli.terminal import reject
+        from tfcompose.foundation.findings import finding
+
+        message = f"the tool {tool.name} cannot be loaded: {type(error).__name__}: {error}"
+        reject(
+            [finding("TF921", message, None, help=f"mend or uninstall it: {module}")], UNREADABLE
+        )
+
+
+def summary_of(command: CommandModule) -> str:
+    """Return what a command does, in one line without a full stop."""
+    if isinstance(command, ToolCommand):
+        return command.command.summary
+    return (command.__doc__ or "").partition("\n")[0].removesuffix(".")
+
+
+def all_commands() -> list[ToolCommand]:
+    """Return the commands of all installed tools."""
+    return [ToolCommand(tool, command) for tool, command in installed().commands()]
+
+
+def find(name: str) -> ToolCommand | None:
+    """Return the command of a tool; None if no tool has it."""
+    for toolset in (shipped, installed):
+        for tool, command in toolset().commands():
+            if command.name == name:
+                return ToolCommand(tool, command)
+    return None
+
+
+def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOption]:
+    """Add the options that tools bring for a command, if it lacks one that is given; return what was added."""
+    added: list[ToolOption] = []
+    for toolset in (shipped, installed):
+        if not parser.lacks_option(argv):
+            break
+        added += _add(name, parser, toolset(), added)
+    else:
+        _refuse_absent(parser, argv)
+    return added
+
+
+def add_all_options(name: str, parser: Parser) -> list[ToolOption]:
+    """Add the options that all installed tools bring for a command."""
+    return _add(name, parser, installed(), ())
+
+
+def _add(
+    name: str, parser: Parser, toolset: Toolset, before: Iterable[ToolOption]
+) -> list[ToolOption]:
+    known = {option.option for option in before}
+    added = [
+        ToolOption(tool, option)
+        for tool in toolset.tools
+        for option in tool.options
+        if name in option.commands and option not in known
+    ]
+    for option in added:
+        option.arguments(parser)
+    return added
+
+
+def _refuse_absent(parser: Parser, argv: Sequence[str]) -> None:
+    """Refuse an option of a tool that ships and is absent.
+
+    Raises:
+        SystemExit: after reporting what installs it.
+    """
+    if not parser.lacks_option(argv):
+        return
+    for argument in argv:
+        if missing := absent("option", argument.partition("=")[0]):
+            fail(missing, UNREADABLE)
+
+
+def report_problems() -> None:
+    """Print what is wrong with tools of other packages, if anything is."""
+    problems = installed().problems
+    if problems:
+        from tfcompose.cli.terminal import print_findings
+        from tfcompose.foundation.findings import finding
+
+        findings = [finding(code, message, None, help=help_) for code, message, help_ in problems]
+        print_findings(findings, sys.stderr)

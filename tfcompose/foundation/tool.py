@@ -1,0 +1,290 @@
+"""Description of a tool, and the one place where the core finds tools.
+
+A tool adds commands, codes, topics and keys of the robot file to the core. Those that ship stand in
+the table of ``tfcompose.tools``; other packages bring theirs by the entry-point group
+``tfcompose.tools``. No wing imports a tool: ``shipped`` loads the table by its name, and returns
+nothing where that folder is absent; ``installed`` adds the tools of other packages. What a tool
+does is named as ``module:attribute`` and loaded when it is used, so the table costs little.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+#: The package with the table of the tools that ship, ``TOOLS``; the only name by which the core
+#: knows it.
+SHIPPED = "tfcompose.tools"
+#: The entry-point group of tools from other packages; each entry leads to a ``Tool``.
+GROUP = "tfcompose.tools"
+#: Codes of other packages' tools have a prefix of their own: ACME101.
+_FOREIGN_CODE = re.compile(r"(?!TF\d)[A-Z]{2,8}\d{3}")
+
+
+class Command(NamedTuple):
+    """A command. Its module has ``arguments(parser)`` and ``run(arguments)``, its docstring is the help.
+
+    ``topic`` is the page that ``help`` prints below the options, by default that of the command's
+    name. ``completes`` pairs arguments with the sections of the robot file whose names they take.
+    """
+
+    name: str
+    summary: str
+    module: str
+    group: str = "Tools"
+    topic: str = ""
+    completes: tuple[tuple[str, str], ...] = ()
+
+
+class Topic(NamedTuple):
+    """A page for ``help``: ``topics/NAME.md`` in the tool's package."""
+
+    name: str
+    about: str
+
+
+class Key(NamedTuple):
+    """A section of the robot file, with its own model, validated like every other section.
+
+    ``model`` leads to a pydantic model based on ``tfcompose.spec.language.spec.Spec``. The hooks run
+    only for robots whose file has the key:
+
+    - ``processes``: a function of a ``ToolSection``, returns processes that the robot starts;
+    - ``check``: a function of a ``ToolSection`` and the ``Robot``, returns findings; it may read files;
+    - ``rules``: a module with rules, as ``tfcompose.compiler.check.rule.rule`` makes them.
+    """
+
+    name: str
+    model: str
+    about: str
+    examples: tuple[Any, ...] = ()
+    processes: str = ""
+    check: str = ""
+    rules: str = ""
+
+    def __hash__(self) -> int:
+        """Return the hash of what identifies it: examples may be lists and mappings."""
+        return hash((self.name, self.model))
+
+
+class Language(NamedTuple):
+    """A kind of file of its own, for ``schema``: its name, its model, and the heading of its reference."""
+
+    name: str
+    model: str
+    title: str
+
+
+class Option(NamedTuple):
+    """Options that a tool adds to commands of the core.
+
+    The module has ``arguments(parser)`` and ``run(name, arguments)``, which returns an exit code, or
+    None for the command itself to go on.
+    """
+
+    commands: tuple[str, ...]
+    flags: tuple[str, ...]
+    module: str
+
+
+class Tool(NamedTuple):
+    """Everything that a tool brings.
+
+    ``package`` is where its pages are: topics in ``topics/NAME.md``, codes in ``codes/CODE.md``.
+    ``extra`` is the extra of tfcompose that installs what it needs, empty if it needs nothing.
+    """
+
+    name: str
+    package: str
+    commands: tuple[Command, ...] = ()
+    codes: tuple[str, ...] = ()
+    topics: tuple[Topic, ...] = ()
+    keys: tuple[Key, ...] = ()
+    languages: tuple[Language, ...] = ()
+    options: tuple[Option, ...] = ()
+    extra: str = ""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of its package."""
+        return Path(str(import_module(self.package).__file__)).parent
+
+    def names(self) -> Iterator[tuple[str, str]]:
+        """Yield everything that it brings under a name that no other tool may have, as (kind, name)."""
+        yield from (("command", command.name) for command in self.commands)
+        yield from (("code", code) for code in self.codes)
+        yield from (("topic", topic.name) for topic in self.topics)
+        yield from (("key", key.name) for key in self.keys)
+        yield from (("language", language.name) for language in self.languages)
+        yield from (("option", flag) for option in self.options for flag in option.flags)
+
+
+class Problem(NamedTuple):
+    """What is wrong with a tool of another package: the code of the finding, its message and its help."""
+
+    code: str
+    message: str
+    help: str
+
+
+class Toolset(NamedTuple):
+    """Tools that go together, and what is wrong with those that were left out."""
+
+    tools: tuple[Tool, ...]
+    problems: tuple[Problem, ...] = ()
+
+    def commands(self) -> Iterator[tuple[Tool, Command]]:
+        """Yield each command with its tool."""
+        return ((tool, command) for tool in self.tools for command in tool.commands)
+
+    def topics(self) -> dict[str, tuple[Tool, Topic]]:
+        """Return the topics by name."""
+        return {topic.name: (tool, topic) for tool in self.tools for topic in tool.topics}
+
+    def keys(self) -> dict[str, Key]:
+        """Return the sections of robot files by name."""
+        return {key.name: key for tool in self.tools for key in tool.keys}
+
+    def languages(self) -> dict[str, Language]:
+        """Return the kinds of files by name."""
+        return {language.name: language for tool in self.tools for language in tool.languages}
+
+    def options(self, command: str) -> list[Option]:
+        """Return the options that a command of the core gets."""
+        return [
+            option for tool in self.tools for option in tool.options if command in option.commands
+        ]
+
+
+def load(reference: str) -> Any:
+    """Return what ``module:attribute``, or a module's name alone, leads to."""
+    module, _, attribute = reference.partition(":")
+    loaded = import_module(module)
+    return getattr(loaded, attribute) if attribute else loaded
+
+
+@cache
+def shipped() -> Toolset:
+    """Return the tools that ship; none where their folder is absent."""
+    try:
+        table = import_module(SHIPPED)
+    except ModuleNotFoundError as error:
+        if error.name != SHIPPED:
+            raise
+        return Toolset(())
+    return Toolset(getattr(table, "TOOLS", ()))
+
+
+@cache
+def installed() -> Toolset:
+    """Return the tools that ship, then those of other packages that load and clash with none before them."""
+    problems: list[Problem] = []
+    tools = list(shipped().tools)
+    owners = {name: tool.name for tool in tools for name in tool.names()}
+    for entry_name, reference in _entry_points():
+        try:
+            tool = load(reference)
+            if not isinstance(tool, Tool):
+                raise TypeError(f"{reference} is no Tool")  # noqa: TRY301 (as one that does not load)
+            names = list(tool.names())
+        except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
+            message = f"the tool {entry_name} cannot be loaded: {type(error).__name__}: {error}"
+            problems.append(Problem("TF921", message, f"mend or uninstall it: {reference}"))
+            continue
+        clashes = [*_clashes(tool, owners), *_wrong_codes(tool)]
+        problems += clashes
+        if not clashes:
+            owners |= dict.fromkeys(names, tool.name)
+            tools.append(tool)
+    return Toolset(tuple(tools), tuple(problems))
+
+
+def _clashes(tool: Tool, owners: Mapping[tuple[str, str], str]) -> Iterator[Problem]:
+    reserved = {name: owner for name, (owner, _) in _reserved().items()}
+    for name in tool.names():
+        owner = owners.get(name) or reserved.get(name)
+        if owner:
+            kind = " ".join(name)
+            message = f"the tool {tool.name} is left out: {owner} has the {kind}"
+            yield Problem("TF922", message, f"uninstall one of them, or rename the {name[0]}")
+
+
+def _wrong_codes(tool: Tool) -> Iterator[Problem]:
+    for code in tool.codes:
+        if not _FOREIGN_CODE.fullmatch(code):
+            message = f"the tool {tool.name} is left out: {code} is no code of its own"
+            advice = "give its codes a prefix of their own and three digits: ACME101"
+            yield Problem("TF922", message, advice)
+
+
+def absent(kind: str, name: str) -> str:
+    """Return what installs the tool that ships and has this command, key or option; empty if none has."""
+    tool, extra = _reserved().get((kind, name), ("", ""))
+    if not extra or any(other.name == tool for other in shipped().tools):
+        return ""
+    return f"{name} belongs to the tool {tool}, which is not installed: pip install '{extra}'"
+
+
+@cache
+def _reserved() -> dict[tuple[str, str], tuple[str, str]]:
+    """Return who owns each name of the core and of the tools that ship, with what installs that.
+
+    The file is written by ``python -m tests.support.names --write``: it also answers where a tool is
+    absent.
+    """
+    from json import loads
+
+    rows = loads(_NAMES.read_text(encoding="utf-8"))
+    return {
+        (kind, name): (owner, entry["install"])
+        for owner, entry in rows.items()
+        for kind, names in entry["names"].items()
+        for name in names
+    }
+
+
+_NAMES = Path(__file__).parents[1] / "data" / "names.json"
+
+
+def _entry_points() -> list[tuple[str, str]]:
+    """Return the entry points of the group, as (name, reference), by name."""
+    if not any(map(_may_hold_tools, sys.path)):
+        return []
+    from importlib.metadata import entry_points
+
+    return sorted({(entry.name, entry.value) for entry in entry_points(group=GROUP)})
+
+
+def _may_hold_tools(folder: str) -> bool:
+    """Return whether a package in a folder of ``sys.path`` has entry points of the group.
+
+    Most installations have none, and ``importlib.metadata`` takes longer to load than all of
+    ``--help``.
+    """
+    section = f"[{GROUP}]"
+    try:
+        with os.scandir(folder or ".") as entries:
+            places = [entry.path for entry in entries if entry.name.endswith(_METADATA)]
+    except NotADirectoryError:
+        return folder.endswith((".zip", ".egg"))
+    except OSError:
+        return False
+    for place in places:
+        try:
+            text = Path(place, "entry_points.txt").read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError):
+            continue
+        if section in text:
+            return True
+    return False
+
+
+_METADATA = (".dist-info", ".egg-info")

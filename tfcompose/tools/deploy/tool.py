@@ -1,0 +1,26 @@
+"""Deploy tool: a robot on several computers, by ssh."""
+
+from tfcompose.foundation.tool import Command, Option, Tool, Topic
+
+TOOL = Tool(
+    name="deploy",
+    package=__package__,
+    commands=(
+        Command(
+            "deploy",
+            "Bring a robot to its computers, and start it there",
+            "tfcompose.tools.deploy.command",
+            group="Ship",
+            completes=(("hosts", "hosts"),),
+        ),
+    ),
+    topics=(Topic("hosts", "a robot on several computers, and `deploy`"),),
+    options=(
+        Option(
+            ("ps", "logs", "events", "down"),
+            ("--all-hosts", "--file"),
+            "tfcompose.tools.deploy.option",
+        ),
+    ),
+    extra="deploy",
+)

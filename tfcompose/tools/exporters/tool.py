@@ -1,0 +1,19 @@
+"""Export tool: a plan for systemd, docker compose, Kubernetes or ros2 launch."""
+
+from tfcompose.foundation.tool import Command, Tool, Topic
+
+TOOL = Tool(
+    name="export",
+    package=__package__,
+    commands=(
+        Command(
+            "export",
+            "Export the plan for systemd, docker compose, Kubernetes or ros2 launch",
+            "tfcompose.tools.exporters.command",
+            group="Ship",
+            topic="exports",
+            completes=(("host", "hosts"),),
+        ),
+    ),
+    topics=(Topic("exports", "systemd, docker compose, Kubernetes and launch files"),),
+)

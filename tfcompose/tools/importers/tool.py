@@ -1,0 +1,16 @@
+"""Import tool: a robot file from URDF, launch files, scripts or a running robot."""
+
+from tfcompose.foundation.tool import Command, Tool
+
+TOOL = Tool(
+    name="import",
+    package=__package__,
+    commands=(
+        Command(
+            "import",
+            "Write a robot file from URDF, launch files, scripts or a running robot",
+            "tfcompose.tools.importers.command",
+            group="Write",
+        ),
+    ),
+)

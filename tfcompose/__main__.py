@@ -15,7 +15,7 @@ PROCESSES = {
     "simulate": "tfcompose.launcher.publishers.simulate",
     "guard": "tfcompose.guard.start",
     "exec": "tfcompose.launcher.exec",
-    "rehearse": "tfcompose.tools.deploy.rehearse",
+    "rehearse": "tfcompose.launcher.rehearse",
 }
 
 

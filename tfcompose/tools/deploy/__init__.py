@@ -18,6 +18,6 @@ publishers meanwhile; where nothing of that kind changes, launchers go on, follo
 start only what is different again.
 
 ``release`` makes the folder, ``unit`` what systemd starts, ``connection`` reaches the hosts,
-``agent`` is what acts there, ``rehearse`` tells it whether the plan could start, ``following``
+``agent`` is what acts there, ``following``
 whether the robot can go on meanwhile, ``rollout`` decides.
 """

@@ -1,6 +1,6 @@
 """Check of whether a plan's share could be started on this machine: ``tfcompose rehearse PLAN HOST``.
 
-The agent runs it on a host, with the environment that the unit has, before anything changes. It
+Whoever deploys runs it on a host, with the environment that the unit has, before anything changes. It
 prints the findings as one line of JSON.
 """
 

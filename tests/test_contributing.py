@@ -9,10 +9,12 @@ import yaml
 
 from tests.support.house import GUIDE, ROOT, mermaid, with_drawing
 from tests.support.skips import ACCEPTED
+from tfcompose.foundation.catalogue import read_code
 
 TEXT = GUIDE.read_text("utf-8")
 #: What the examples would add.
 NEW = {
+    "tfcompose/data/codes/TF506.md",
     "tfcompose/data/presets/hokuyo/uam-05lp.yaml",
     "tfcompose/cli/commands/frames.py",
     "tfcompose/tools/exporters/procfile.py",
@@ -39,6 +41,12 @@ def test_each_file_that_it_names_is_there() -> None:
     names = set(re.findall(r"\b(?:tests|tfcompose)/[\w/.-]*\w", TEXT))
     assert len(names) > 15
     assert {name for name in names if not (ROOT / name).exists()} == NEW
+
+
+def test_the_page_of_a_new_rule_is_understood() -> None:
+    (text,) = re.findall(r"^```markdown\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+    code = read_code("TF506", text)
+    assert f'@rule("{code.code}", of_urdf=True)\ndef {code.name}(' in TEXT
 
 
 def test_the_fast_tests_are_folders_that_are_there() -> None:

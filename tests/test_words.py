@@ -42,7 +42,7 @@ GLOSSARY = {
     ),
     "finding": "a code, a message, a span, notes, help and edits",
     "severity": "error, warning or note",
-    "rule": "a check of the robot model, with its code; its docstring is its page",
+    "rule": "a check of the robot model, which yields the findings of one code",
     # who publishes
     "owner": "the process that publishes an edge; each edge has exactly one",
     "publisher, subscriber": "an endpoint of a topic in the ROS graph, with its GID",

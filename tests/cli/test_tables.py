@@ -10,13 +10,14 @@ import pytest
 
 from tfcompose.cli import preset_page
 from tfcompose.cli.compiling import library
-from tfcompose.cli.documentation import topic
+from tfcompose.cli.documentation import code_table, topic
 from tfcompose.cli.process_table import row
 from tfcompose.cli.tables import Table, shortened
 from tfcompose.cli.terminal import plain
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.render.text import RED
 from tfcompose.compiler.render.tree import pose_text, tree
+from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tree import drawn
 from tfcompose.model.messages import ProcessState, ProcessStatus, StateName, notice_line
 from tfcompose.model.plan.codec import encode
@@ -162,3 +163,12 @@ def test_a_tree_too_wide_for_a_terminal_drops_the_gaps_not_the_poses() -> None:
     assert [line.split()[-1] for line in narrow] == [
         line.split()[-1] for line in tree(robot).splitlines()
     ]
+
+
+def test_the_table_of_codes_has_all_of_them_or_those_of_a_family() -> None:
+    assert re.findall(r"^\| (TF\d{3}) ", code_table("names"), re.MULTILINE) == [
+        code for code in CATALOGUE if code.startswith("TF5")
+    ]
+    lines = code_table().splitlines()
+    assert len(lines) == len(CATALOGUE) + 2
+    assert all(line.endswith(". |") for line in lines[2:])

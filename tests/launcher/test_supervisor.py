@@ -1,6 +1,7 @@
 """Real processes, without ROS: plain Python children stand in for what a plan starts."""
 
 import os
+import shutil
 import signal
 import tracemalloc
 from collections.abc import Callable
@@ -14,6 +15,9 @@ import pytest
 from tests.support.findings import expect
 from tests.support.launcher import SLEEPER, Launcher, guard, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
+from tfcompose.foundation import findings
+from tfcompose.foundation.catalogue import Catalogue
+from tfcompose.launcher import supervisor
 from tfcompose.launcher.child import READ_SIZE
 from tfcompose.launcher.state import Times
 from tfcompose.launcher.supervisor import supervise
@@ -43,6 +47,7 @@ child.stdout.readline()
 print("pids", os.getpid(), child.pid, flush=True)
 time.sleep(180)
 """
+HEAD_OF_TF808 = "name: process_failed\nseverity: error\nfamily: processes\n"
 DEAF = """
 import os, signal, time
 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -161,6 +166,36 @@ def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(
     expect(found, "TF808", "lidar", "exit code 1", "lidar: no lidar at /dev/ttyUSB0")
     assert len(found.notes) == 8
     assert notices[-1] == Ended(1, (found.message, *(note.message for note in found.notes)))
+
+
+def test_a_finding_needs_no_file_once_the_plan_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The package may be upgraded, or its disk be lost, under a robot that runs."""
+    folder, flag = tmp_path / "codes", tmp_path / "flag"
+    folder.mkdir()
+    (folder / "TF808.md").write_text(f"---\n{HEAD_OF_TF808}---\n\nA page.\n", encoding="utf-8")
+    copy = Catalogue(folder)
+    monkeypatch.setattr(supervisor, "CATALOGUE", copy)
+    monkeypatch.setattr(findings, "CATALOGUE", copy)
+    notices: list[Notice] = []
+
+    def report(notice: Notice) -> None:
+        notices.append(notice)
+        if isinstance(notice, LogLine) and folder.exists():
+            shutil.rmtree(folder)
+            flag.touch()
+
+    waits = (
+        "import os, sys, time; print('up', flush=True)\n"
+        "while not os.path.exists(sys.argv[1]): time.sleep(0.01)\n"
+        "sys.exit(1)"
+    )
+    plan = plan_of(program("lidar", waits, str(flag)))
+    assert supervise(plan, tmp_path / "plan.json", report=report, duration_s=60) == 1
+    assert [notice.found.code for notice in notices if isinstance(notice, FindingShown)] == [
+        "TF808"
+    ]
 
 
 def test_a_process_that_fails_is_started_again(tmp_path: Path) -> None:

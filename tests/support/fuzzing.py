@@ -98,7 +98,7 @@ def _shown(found: list[Finding]) -> None:
         render_text(found, lambda *_: None, colour=False),
         render_json(found),
         render_github(found),
-        render_sarif(found, "0", {}),
+        render_sarif(found, "0"),
     ):
         text.encode()
         assert not {"\x1b", "\x00", "\x9b"} & set(text), ascii(text)

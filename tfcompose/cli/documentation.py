@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from tfcompose.cli.command_parser import CommandModule
+    from tfcompose.foundation.catalogue import Family
 
 FOLDER = Path(__file__).parents[1] / "data" / "topics"
 #: The topics of the core, in the order of reading, with what their pages are about.
@@ -106,10 +107,19 @@ def _keys() -> str:
     return reference("robot").replace("\n# ", "\n## ").replace("# ", "## ", 1)
 
 
-def _codes() -> str:
-    from tfcompose.compiler.pages import table
+def code_table(family: Family | None = None) -> str:
+    """Return all codes, or those of a family, as a table in Markdown.
 
-    return table(None)
+    Its columns are code, name, severity, and the first sentence of the page.
+    """
+    from tfcompose.foundation.catalogue import CATALOGUE
+
+    rows = [
+        f"| {code.code} | {code.name} | {code.severity} | {CATALOGUE.summary(code.code)} |\n"
+        for code in CATALOGUE.values()
+        if family in {None, code.family}
+    ]
+    return "".join(["| code | name | severity | what is wrong |\n", "|---|---|---|---|\n", *rows])
 
 
 def _vendors() -> str:
@@ -125,13 +135,13 @@ def _vendors() -> str:
 
 _GENERATED: dict[str, Callable[[], str]] = {
     "language": _keys,
-    "codes": _codes,
+    "codes": code_table,
     "presets": _vendors,
 }
 
 #: The heading of a model in the reference, to which the types of keys lead.
 _MODEL = re.compile(r"<h2>(\w+)</h2>")
-_CODE_CELL = re.compile(r"<td>([A-Z]+\d{3})</td>")
+_CODE_CELL = re.compile(r"<td>([A-Z]+[0-9]{3})</td>")
 _STYLE = """
 :root { color-scheme: light dark; }
 body { margin: 0 auto; max-width: 60rem; padding: 1rem; font: 16px/1.5 system-ui, sans-serif; }
@@ -155,7 +165,6 @@ def html(commands: Mapping[str, CommandModule]) -> str:
 
     from markdown_it import MarkdownIt
 
-    from tfcompose.compiler.pages import page as code_page
     from tfcompose.foundation.catalogue import CATALOGUE
 
     renderer = MarkdownIt("commonmark", {"html": False}).enable("table")
@@ -164,7 +173,7 @@ def html(commands: Mapping[str, CommandModule]) -> str:
     about["topic-language"] = _MODEL.sub(_with_id, about["topic-language"])
     about["topic-codes"] = _CODE_CELL.sub(r'<td><a href="#\1">\1</a></td>', about["topic-codes"])
     about["topic-codes"] += "\n".join(
-        f'<h2 id="{code}">{code} {entry.name}</h2>\n{renderer.render(code_page(code))}'
+        f'<h2 id="{code}">{code} {entry.name}</h2>\n{renderer.render(CATALOGUE.page(code))}'
         for code, entry in CATALOGUE.items()
     )
     described = {}

@@ -14,6 +14,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.text import counted
 from tfcompose.guard.channel import (
     EventWriter,
@@ -319,6 +320,7 @@ def guard(own: Own, stop: Stop) -> None:
         say(f"watching {counted(len(own.plan.edges), 'edge')}{judging}{' again' if left else ''}")
         events.flush()
         ready()
+        CATALOGUE.load()
         diagnostics = DiagnosticsPage(node, own.plan.robot)
         orders = OrderReader(judged, Gates(node, emit), Components(node, emit))
         steps = [orders.take, *(watch.step for watch in watches)]

@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
+from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.findings import Note
 from tfcompose.foundation.signals import take_interrupt
 from tfcompose.launcher.answers import answer as answer_to
@@ -191,6 +192,7 @@ class _Supervisor:
     def run(self, duration_s: float | None) -> int:
         self._handle(Begin())
         self._prepare()
+        CATALOGUE.load()
         while self._exit_code is None:
             end = self._end(duration_s)
             self._notifier.catch_up()

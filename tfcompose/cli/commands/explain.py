@@ -46,9 +46,9 @@ def run(arguments: Namespace) -> int:
     """Print the page or the chain; exit code 1 if a frame is not there, 2 for wrong use."""
     match arguments.what:
         case [] if arguments.table:
-            from tfcompose.compiler.pages import table
+            from tfcompose.cli.documentation import code_table
 
-            sys.stdout.write(table(None if arguments.table == "all" else arguments.table))
+            sys.stdout.write(code_table(None if arguments.table == "all" else arguments.table))
         case [word]:
             _explain_code(word)
         case [a, b] if not a.endswith((".yaml", ".yml")):
@@ -68,7 +68,6 @@ def _explain_frames(file: str, a: str, b: str, arguments: Namespace) -> None:
 
 
 def _explain_code(word: str) -> None:
-    from tfcompose.compiler.pages import page
     from tfcompose.foundation.catalogue import CATALOGUE, code_of, similar_words
     from tfcompose.foundation.findings import did_you_mean
 
@@ -76,7 +75,7 @@ def _explain_code(word: str) -> None:
     if code is None:
         advice = did_you_mean(word, similar_words(word), "lint prints codes: TF301")
         fail(f"no code {word}; {advice}", UNREADABLE)
-    sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{page(code)}\n")
+    sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{CATALOGUE.page(code)}\n")
 
 
 def _explain_chain(robot: Robot, sources: Sequence[Source], a: str, b: str) -> None:

@@ -123,7 +123,7 @@ def codes(text: str) -> list[str]:
 
     beginnings = [one.strip() for one in text.split(",")]
     for one in beginnings:
-        named = [code for code in CATALOGUE.values() if one and code.code.startswith(one)]
+        named = [CATALOGUE[code] for code in CATALOGUE if one and code.startswith(one)]
         if not named:
             raise ArgumentTypeError(
                 f"there is no code {one}; tfcompose explain --table lists them"
@@ -322,12 +322,9 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
         rows = [("lint", file, tuple(case)) for file, case in cases.items()]
         sys.stdout.write(render_junit("tfcompose", rows, failing=_failing(arguments), seconds=0.0))
     else:
-        from tfcompose.compiler.pages import page
         from tfcompose.compiler.render.formats import render_sarif
 
-        sys.stdout.write(
-            render_sarif(found, __version__, {one.code: page(one.code) for one in found})
-        )
+        sys.stdout.write(render_sarif(found, __version__))
 
 
 def lint_file(

@@ -16,13 +16,6 @@ if TYPE_CHECKING:
 
 @rule("TF709", of_urdf=True)
 def inertia_missing(robot: Robot) -> Iterator[Finding]:
-    """A moving body has no mass, but others have.
-
-    Simulators drop a link without inertia and everything attached to it, or refuse the robot;
-    dynamics libraries treat it as massless. Give the link ``inertial: {mass: 0.5 kg}``: the tensor
-    is computed from its shape. Links that are fixed to each other count as one body. A robot in
-    which nothing that moves has a mass, apart from sensors, is for TF only and exempt.
-    """
     fixed: dict[str, list[str]] = {}
     for edge in robot.edges:
         if edge.kind == "static":
@@ -66,12 +59,6 @@ _ROUNDING = 0.01
 
 @rule("TF710", of_urdf=True)
 def impossible_inertia(robot: Robot) -> Iterator[Finding]:
-    """An inertia is physically impossible: not positive definite, or one moment exceeds the sum of the others.
-
-    Simulators refuse it (MuJoCo, Gazebo), or the simulation becomes unstable. Usually a sign was
-    lost, moments and products were swapped, or all are 0. Remove ``inertia`` to have it computed
-    from mass and shape, or take the values from CAD, about the centre of mass.
-    """
     for link in robot.links.values():
         inertial = link.inertial
         if inertial is None or inertial.at is None:
@@ -127,13 +114,6 @@ _TIMES = 10
 
 @rule("TF711", of_urdf=True)
 def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
-    """A link's inertia is at least ten times, or at most a tenth of, what its mass and shape give.
-
-    Usually it is in g mm² or kg cm², about another point than the centre of mass, or copied from
-    another link: in simulation arms swing wildly or hardly move. Remove ``inertia`` to have it
-    computed. The sums of the principal moments are compared, for the visual and the collision
-    shapes at uniform density; the closer one counts.
-    """
     for link in robot.links.values():
         inertial = link.inertial
         if inertial is None or not inertial.of_shapes:
@@ -157,14 +137,6 @@ _KDL_READERS = frozenset({"robot_state_publisher", "moveit_ros_move_group"})
 
 @rule("TF712", of_urdf=True)
 def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
-    """The root link has an inertia, which programs that read the URDF with KDL ignore.
-
-    KDL does not support an inertia on the root: it warns at each start, and ignores the mass in
-    dynamics. Add a root without a body: ``base: base_footprint`` with ``base_link: {parent:
-    base_footprint}``. Where nothing uses KDL (tfcompose does not), an inertia on the root is right
-    and not reported; ``robot.urdf``, for the stock robot_state_publisher, is written without it. A
-    URDF is taken to be read by that node, which uses KDL.
-    """
     root = robot.links.get(robot.base or "")
     if root is None or root.inertial is None:
         return
@@ -189,11 +161,6 @@ def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF713", of_urdf=True)
 def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
-    """Two materials have the same name and different colours.
-
-    URDF readers keep one of them, usually the first, and draw both bodies with it. Rename one of
-    them, or remove its name: then it is named after its colour.
-    """
     first: dict[str, Material] = {}
     for link in robot.links.values():
         for shape in link.visuals:
@@ -216,11 +183,6 @@ def _appearance(material: Material) -> tuple[object, ...]:
 
 @rule("TF714")
 def material_without_colour(robot: Robot) -> Iterator[Finding]:
-    """A material has a name only, and no material of that name has a colour or a texture.
-
-    URDF readers warn about it in their log, and draw the body in a default colour. Give it an
-    ``rgba``, or the name of a material that has one.
-    """
     shapes = [shape for link in robot.links.values() for shape in link.visuals]
     used = [shape.material for shape in shapes if shape.material]
     known = [material.name for material in used if material.rgba or material.texture]
@@ -237,13 +199,6 @@ _MOST_LISTED = 5
 
 @rule("TF730")
 def body_in_no_urdf(robot: Robot) -> Iterator[Finding]:
-    """A link with a body is not below the base.
-
-    The URDF describes what is below ``base``, so this body is neither drawn nor checked for
-    collisions; its frame is published all the same. Set ``base`` to a frame above it, ``base:
-    map``, or make it a robot of its own: a part with a ``namespace`` has its own description. All
-    such links are one finding.
-    """
     if robot.base is None:
         return
     described = robot.below(robot.base) | {

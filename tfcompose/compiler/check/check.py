@@ -47,9 +47,9 @@ def by_code(rules: Iterable[Rule]) -> dict[str, Rule]:
         ValueError: if two have one code.
     """
     table: dict[str, Rule] = {}
-    for rule in sorted(rules, key=lambda rule: rule.code.code):
-        if table.setdefault(rule.code.code, rule) is not rule:
-            raise ValueError(f"two rules have the code {rule.code.code}")
+    for rule in sorted(rules, key=lambda rule: rule.code):
+        if table.setdefault(rule.code, rule) is not rule:
+            raise ValueError(f"two rules have the code {rule.code}")
     return table
 
 
@@ -90,9 +90,8 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
                 if not _is_left_out(one, rule, robot)
             ]
         except Exception as error:  # noqa: BLE001 (a rule's fault must not hide the others' findings)
-            message = (
-                f"rule {rule.code.code} {rule.code.name} crashed: {type(error).__name__}: {error}"
-            )
+            name = CATALOGUE[rule.code].name
+            message = f"rule {rule.code} {name} crashed: {type(error).__name__}: {error}"
             found.append(
                 finding(
                     "TF903",

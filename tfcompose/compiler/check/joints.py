@@ -18,11 +18,6 @@ if TYPE_CHECKING:
 
 @rule("TF701", of_urdf=True)
 def mimic_without_master(robot: Robot) -> Iterator[Finding]:
-    """A joint mimics a joint that does not exist or does not move.
-
-    Its frame would never appear: nobody publishes a position for a joint that is fixed or
-    misspelt. Name a joint that moves, or remove ``mimic``.
-    """
     joints = [edge.joint for edge in robot.edges if edge.joint]
     names = {joint.name for joint in joints}
     fixed = {edge.joint_name for edge in robot.edges if edge.joint_name} - names
@@ -39,10 +34,6 @@ def mimic_without_master(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF702", of_urdf=True)
 def mimic_loop(robot: Robot) -> Iterator[Finding]:
-    """Joints mimic each other in a circle.
-
-    None of them has a position of its own. Remove ``mimic`` from the joint that is actuated.
-    """
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     done: set[str] = set()
     for start in joints:
@@ -67,13 +58,6 @@ def mimic_loop(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF704", of_urdf=True)
 def joint_without_limits(robot: Robot) -> Iterator[Finding]:
-    """A revolute or prismatic joint has no position limits.
-
-    URDF requires limits for these types, and readers refuse the whole robot without them. A joint
-    that turns without limits is ``continuous``. In an existing URDF, limits with effort and
-    velocity only are a warning: readers take lower and upper as 0, so planners and simulators hold
-    the joint there.
-    """
     for edge in robot.edges:
         joint = edge.joint
         if joint is None or joint.type == "continuous":
@@ -102,11 +86,6 @@ def joint_without_limits(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF705", of_urdf=True)
 def inverted_limits(robot: Robot) -> Iterator[Finding]:
-    """A joint's lower limit is above its upper limit.
-
-    No position is valid: planners find no path, and simulators refuse the robot or hold the joint
-    at one limit. Swap the two, or check the sign: ``limit: {lower: -90 deg, upper: 90 deg}``.
-    """
     for edge in robot.edges:
         joint = edge.joint
         if (
@@ -129,13 +108,6 @@ def inverted_limits(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF706", of_urdf=True)
 def zero_limit(robot: Robot) -> Iterator[Finding]:
-    """A joint's velocity or effort limit is 0 or negative.
-
-    With velocity 0 the joint never moves: MoveIt cannot time a path, and simulators hold the
-    joint. With effort 0 its motor has no force. Give the motor's values, or remove the key: then
-    there is no limit. Mimic joints and continuous joints, such as free wheels, may have an effort
-    of 0.
-    """
     for edge in robot.edges:
         joint = edge.joint
         if joint is None or joint.limit is None:
@@ -158,12 +130,6 @@ _AXIS_TOLERANCE = 0.02
 
 @rule("TF707", of_urdf=True)
 def axis_not_unit(robot: Robot) -> Iterator[Finding]:
-    """A joint's axis does not have length 1.
-
-    An axis is a direction, and URDF asks for a unit vector. tfcompose normalises it, but other
-    readers, such as yourdfpy, scale a prismatic joint's motion by its length. Often a digit or a
-    sign was lost. Write [0, 0, 1], or [0.7071, 0, 0.7071].
-    """
     for edge in robot.edges:
         joint = edge.joint
         if joint and abs(joint.axis_length - 1) > _AXIS_TOLERANCE:
@@ -178,13 +144,6 @@ _MOST_MIMICS = 100
 
 @rule("TF708", of_urdf=True)
 def mimic_chain(robot: Robot) -> Iterator[Finding]:
-    """A joint mimics a joint that mimics another one.
-
-    tfcompose resolves such chains. The stock robot_state_publisher goes through the joints once,
-    in alphabetical order, so a joint that comes before the one it mimics lags behind or never
-    appears; Gazebo and ros2_control do not support chains at all. Let the joint mimic the last one
-    of the chain directly, with the product of the multipliers.
-    """
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     for joint in joints.values():
         middle = joints.get(joint.mimic or "")
@@ -219,12 +178,6 @@ def _loops(joints: dict[str, Joint], name: str) -> bool:
 
 @rule("TF715")
 def joint_without_owner(robot: Robot) -> Iterator[Finding]:
-    """A planar or floating joint has no owner.
-
-    Joint states hold one position for each joint, and these joints need three and six: neither
-    tfcompose nor robot_state_publisher can place the child. Name the process that publishes the
-    edge as its owner: odometry, a simulator, or a simulated process (``simulate: {fixed: {}}``).
-    """
     for edge in robot.edges:
         joint = edge.free
         if joint and edge.owner in BUILT_IN:
@@ -242,11 +195,6 @@ def joint_without_owner(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF716", of_urdf=True)
 def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
-    """A safety controller's soft limits are not within the joint's limits, or leave no range.
-
-    The controller starts to hold the joint back at the soft limits; if those are beyond the
-    joint's limits it does so too late, or never. The default of both is 0, as in URDF.
-    """
     for edge in robot.edges:
         joint = edge.joint
         safety, limit = (joint.safety, joint.limit) if joint else (None, None)
@@ -263,11 +211,6 @@ def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF717", of_urdf=True)
 def interface_claimed_twice(robot: Robot) -> Iterator[Finding]:
-    """Two hardware components of ros2_control have the same interface of the same joint.
-
-    The controller manager refuses the second one, and no controller starts. One component drives a
-    joint; a second one may have other interfaces of it.
-    """
     first: dict[tuple[str, str, str], tuple[str, Span]] = {}
     for hardware in robot.hardware:
         for component in hardware.components:
@@ -292,11 +235,6 @@ def interface_claimed_twice(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF718", of_urdf=True)
 def mimic_joint_commanded(robot: Robot) -> Iterator[Finding]:
-    """A mimic joint has a command interface.
-
-    It cannot both mimic a joint and be commanded: ros2_control refuses the whole hardware. Keep
-    its state interfaces only, and command the joint that it mimics.
-    """
     mimics = {
         edge.joint.name: edge.joint
         for edge in robot.edges
@@ -325,12 +263,6 @@ _MOST_LISTED = 5
 
 @rule("TF728", of_urdf=True)
 def joint_named_like_a_frame(robot: Robot) -> Iterator[Finding]:
-    """A joint has the same name as a link or frame.
-
-    URDF allows that. Gazebo converts it to SDF, where links, joints and frames share one
-    namespace, and refuses the robot: the joint "has a name collision". Name the joint after its
-    link, with ``_joint`` at the end. All joints of a robot are one finding.
-    """
     named = {
         edge.joint_name: edge.joint_at or edge.at
         for edge in robot.edges
@@ -351,11 +283,6 @@ def joint_named_like_a_frame(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF731", of_urdf=True)
 def negative_damping(robot: Robot) -> Iterator[Finding]:
-    """A joint's damping or friction is negative.
-
-    It would drive the joint instead of slowing it down. Drake refuses a robot with negative
-    damping, and pinocchio one with negative friction. The default of both is 0.
-    """
     for edge in robot.edges:
         joint = edge.joint
         if joint is None or joint.dynamics is None:

@@ -27,15 +27,6 @@ _NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 @rule("TF501", of_urdf=True)
 def bad_frame_name(robot: Robot) -> Iterator[Finding]:
-    """The name of a frame, joint, process or node is not valid for tf2, URDF, ROS or the file system.
-
-    tf2 strips a leading slash, the parameter file of a process is named after it, and spaces,
-    quotes and ``&`` break something sooner or later. Use letters, digits and ``_``, and a slash
-    only between a prefix and a name. No part of a node's name begins with a digit. Hyphens, dots,
-    colons and non-ASCII letters, as in ``base_link-base_fixed_joint``, are warnings: URDF and TF
-    accept them, but parameters and topics that are named after the frame or joint cannot have
-    them. In an existing URDF, every name that can be looked up is only a warning.
-    """
     names: dict[str, Span] = dict(robot.frames)
     for edge in robot.edges:
         names.setdefault(edge.child, edge.child_at or edge.at)
@@ -88,13 +79,6 @@ _ALLOWED = "use letters, digits and _; a node's name does not begin with a digit
 
 @rule("TF503", of_urdf=True)
 def upper_case_name(robot: Robot) -> Iterator[Finding]:
-    """A frame's name has upper case letters.
-
-    ``Base_link`` and ``base_link`` are two frames for tf2 but look alike to people: a lookup
-    fails, and nobody sees why. ROS names are lower case with underscores, ``left_wheel_link``.
-    Frames of presets are exempt, and all frames of a robot are one finding; if the vendor's names
-    are upper case, write ``rules: {TF503: off}``.
-    """
     presets = [sensor for sensor in robot.sensors if sensor.name == sensor.name.lower()]
     inside = {frame for sensor in presets for frame in (sensor.mount, *sensor.frames)}
     bad = {
@@ -126,12 +110,6 @@ def _lower_case(name: str) -> str:
 
 @rule("TF504", idle=True)
 def unused_variable(robot: Robot) -> Iterator[Finding]:
-    """A variable or an argument is not used.
-
-    Probably its value is still written where the variable was meant to be, and changing the
-    variable has no effect. Use it, ``"${mast}"``, or remove it. Variables that only a profile
-    uses, or that come from an included file, are exempt.
-    """
     for (section, name), at in robot.unused.items():
         if at.file == robot.file and (section, name) not in robot.broken:
             what, expression = (

@@ -51,17 +51,6 @@ _STEEP_RAD = math.radians(45)
 
 @rule("TF401", of_urdf=True, follows="pose")
 def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
-    """A frame is named like an optical frame but not rotated like one.
-
-    By REP-103 an optical frame has z forward, x right and y down, and its body frame x forward, y
-    left and z up. The rotation from body to optical frame is rpy [-90 deg, 0, -90 deg]; without it
-    point clouds are turned on their side. It may be divided between several edges of one camera.
-    Rounded constants (−1.57) pass: they are off by 0.0011 rad each. So do frames of presets whose
-    vendor uses other axes (RealSense T265), and measured poses. An optical frame directly on
-    base_link may look anywhere with its image upright; it is reported if it looks at the sky, or
-    by right angles stands on its head or its side. An end of an arm has its own axes, and is no
-    camera body.
-    """
     above = {edge.child: edge for edge in robot.edges}
     for edge in robot.edges:
         is_fixed = edge.kind == "static" and edge.pose_known
@@ -165,14 +154,6 @@ def _stem(frame: str) -> str:
 
 @rule("TF620")
 def camera_without_optical_frame(robot: Robot) -> Iterator[Finding]:
-    """A camera has no optical frame.
-
-    By REP-103 images are stamped with a frame whose z points forward and y down, named
-    ``…_optical_frame``. Without one the driver stamps them with the body frame, and everything
-    that projects pixels is rotated by 90 degrees twice. Give the sensor one: ``frames:
-    {NAME_optical_frame: {parent: NAME_link, rpy: [-90 deg, 0, -90 deg]}}``, or keep the preset's
-    name for it.
-    """
     children = robot.children()
     for sensor in robot.sensors:
         if sensor.kind not in CAMERAS:

@@ -18,11 +18,6 @@ if TYPE_CHECKING:
 
 @rule("TF301")
 def edge_with_two_owners(robot: Robot) -> Iterator[Finding]:
-    """Two processes would publish one edge.
-
-    tf2 silently takes the last message, so the frame jumps between two values. Each edge has one
-    owner: leave the edge to the driver, or switch the driver's TF off with ``tf: tfcompose``.
-    """
     first: dict[tuple[str, str], Edge] = {}
     for edge in robot.edges:
         other = first.setdefault((edge.parent, edge.child), edge)
@@ -45,12 +40,6 @@ STOCK = frozenset({"robot_state_publisher", "static_transform_publisher", "joint
 
 @rule("TF302")
 def unknown_owner(robot: Robot) -> Iterator[Finding]:
-    """An edge names an owner that is not a process.
-
-    An owner is one of the robot's processes: one under ``processes``, a sensor with a driver, or
-    the built-in ``static`` and ``joints``. A process that tfcompose does not start is declared
-    with ``external: true``.
-    """
     names = {process.name: None for process in robot.processes}
     lost: dict[
         tuple[str, Span], list[Edge]
@@ -80,12 +69,6 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF303")
 def owner_cannot_publish(robot: Robot) -> Iterator[Finding]:
-    """The owner does not publish edges of this kind.
-
-    ``static`` publishes fixed edges and ``joints`` those of moving joints; ``guard`` and processes
-    that send joint states publish no edges. Leave the owner out, or name the process that
-    publishes the edge.
-    """
     processes = {process.name: process for process in robot.processes}
     for edge in robot.edges:
         process = processes.get(edge.owner)
@@ -108,12 +91,6 @@ def owner_cannot_publish(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF305")
 def static_edge_with_rate(robot: Robot) -> Iterator[Finding]:
-    """A fixed edge has a rate.
-
-    Fixed edges are sent once on /tf_static, and every listener keeps them; a rate has no meaning
-    there. Probably the edge's owner is missing. Remove the rate, or name the process that
-    publishes the edge periodically: ``odom: {parent: map, owner: slam, rate: 10 Hz}``.
-    """
     for edge in robot.edges:
         refused = robot.excuses(edge.owner) or robot.excuses(edge.child)  # its owner may have been
         if edge.kind == "static" and edge.rate is not None and not refused:
@@ -130,14 +107,6 @@ def static_edge_with_rate(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF306")
 def one_node_two_levels(robot: Robot) -> Iterator[Finding]:
-    """One node publishes both map → odom and odom → base_link.
-
-    REP-105 keeps the two apart: odometry is continuous and drifts, localisation corrects it in
-    jumps. If a node computes one pose and splits it, the odometry jumps too, and controllers react
-    to that; with robot_localization it means that one filter does both jobs. Run two, with
-    ``world_frame: odom`` and ``world_frame: map``. Sensor drivers that do both (visual odometry
-    inside a camera) and simulated processes are exempt.
-    """
     sensors = {sensor.driver for sensor in robot.sensors}
     owners = {
         p.name: p
@@ -169,13 +138,6 @@ _LEAST_HZ = {
 
 @rule("TF307")
 def rate_too_low(robot: Robot) -> Iterator[Finding]:
-    """Odometry is published below 20 Hz, or map → odom below 5 Hz.
-
-    tf2 interpolates between two messages and fails after the last one: scans are dropped with
-    "extrapolation into the future", and controllers act on an old pose. Raise the rate of the node
-    that publishes the edge (``publish_rate``, ``frequency``, ``transform_publish_period``), then
-    the one declared here. Simulated processes are exempt.
-    """
     simulated = {process.name for process in robot.processes if process.kind == "simulate"}
     for edge in robot.edges:
         ends = (edge.parent.rpartition("/")[2], edge.child.rpartition("/")[2])
@@ -190,15 +152,6 @@ def rate_too_low(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF308")
 def driver_publishes_too(robot: Robot) -> Iterator[Finding]:
-    """A sensor's driver publishes frames that tfcompose owns, and tfcompose cannot switch them off.
-
-    With ``tf: tfcompose`` tfcompose publishes the frames inside a sensor and switches off those of
-    a driver that it starts itself. It cannot do so for an external driver, or one that has a
-    command of its own: both would publish, and tf2 takes the last message. Set the driver's
-    parameter where it is started and allow this finding, or leave the frames to the driver with
-    ``tf: driver``. The same holds for edges outside the sensor that a driver publishes by default,
-    such as map → laser of sick_scan_xd.
-    """
     processes = {process.name: process for process in robot.processes}
     for sensor in robot.sensors:
         process = processes.get(sensor.driver)
@@ -266,13 +219,6 @@ _MOST_STATIC_PUBLISHERS = 50
 
 @rule("TF309")
 def many_static_publishers(robot: Robot) -> Iterator[Finding]:
-    """More than 50 processes publish fixed edges.
-
-    A listener keeps the last 100 messages on /tf_static and receives one from each publisher when
-    it starts: with 100 publishers and more, edges are lost, different ones each time
-    (geometry2#398). Each publisher also costs a process and its discovery. Let tfcompose publish
-    fixed edges, all in one message: remove ``owner``, and set ``tf: tfcompose`` on sensors.
-    """
     first = {edge.owner: edge for edge in reversed(robot.edges) if edge.kind == "static"}
     if len(first) > _MOST_STATIC_PUBLISHERS:
         listed = sorted(first)
@@ -284,12 +230,6 @@ def many_static_publishers(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF310")
 def switched_edge_without_owner(robot: Robot) -> Iterator[Finding]:
-    """An edge has several parents and no owner that switches between them.
-
-    With ``parent: [tool0, rack_1]`` a tool is sometimes on the arm and sometimes in its rack. One
-    of your processes knows which, and publishes the edge: ``owner: tool_changer``. tfcompose
-    itself publishes one parent only.
-    """
     for edge in robot.edges:
         if edge.switched and edge.owner in BUILT_IN:
             parents = " or ".join((edge.parent, *edge.switched))
@@ -303,13 +243,6 @@ def switched_edge_without_owner(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF311")
 def switched_edge_static(robot: Robot) -> Iterator[Finding]:
-    """An edge whose parent changes is published on /tf_static.
-
-    A transform on /tf_static is valid at all times, also before the change: a lookup in the past
-    finds the tool where it is now. And it never expires: when the tool changer dies, or another
-    publisher takes over, running listeners keep the last parent they received. Publish the edge
-    periodically on /tf, and remove ``static: true``.
-    """
     for edge in robot.edges:
         if edge.switched and edge.kind == "static" and edge.owner not in BUILT_IN:
             parents = ", ".join((edge.parent, *edge.switched))
@@ -331,14 +264,6 @@ _STOCK_HZ = 20.0
 
 @rule("TF314")
 def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
-    """``publish_frequency`` is lower than the rate of the joints.
-
-    It limits how often tfcompose's ``joints`` and the stock robot_state_publisher publish joint
-    states with the same names; they drop the rest, the stock one silently. Without it ``joints``
-    publishes all joint states, and the stock one 20 Hz; the stock one also rounds to whole
-    milliseconds, so give it twice the rate needed. The rate needed is that of the edges, or of a
-    simulated process that sends joint states.
-    """
     for process in robot.processes:
         most = _most_hz(process)
         if most is None:
@@ -387,14 +312,6 @@ _PARAMETERS = "ros__parameters"
 
 @rule("TF334")
 def parameters_of_another_node(robot: Robot) -> Iterator[Finding]:
-    """Parameters are given to a node that the process does not have.
-
-    ROS gives a node the parameters under its full name and silently drops all others. In a
-    parameter file, a name without a leading slash is relative to the process's namespace; * stands
-    for one part of a name and ** for any number of them. If none of a process's files has anything
-    for its node, that is a warning: such a file is legal, and sets nothing. Inline parameters do
-    not repeat the node's name and ``ros__parameters``: tfcompose adds these.
-    """
     for process in robot.processes:
         for node in process.ros_nodes:
             for key, value in node.params.items():
@@ -412,12 +329,6 @@ _TRUE = frozenset({"true", "yes", "on", "y"})
 
 @rule("TF335")
 def clocks_mixed(robot: Robot) -> Iterator[Finding]:
-    """A node uses another clock than the robot.
-
-    Transforms are looked up by their stamps. If one node stamps with the system clock and another
-    with /clock, every lookup fails or finds data that is decades old. Set the clock once, ``ros:
-    {clock: sim}``; tfcompose passes use_sim_time to each node.
-    """
     sim = robot.ros.clock == "sim"
     for process in robot.processes:
         for node in process.ros_nodes:

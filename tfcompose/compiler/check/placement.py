@@ -82,14 +82,6 @@ def _some(links: Sequence[str]) -> str:
 
 @rule("TF640")
 def sensor_inside_body(robot: Robot) -> Iterator[Finding]:
-    """A camera, lidar, radar or ultrasonic sensor is inside a body of the robot.
-
-    The origin of what it sees is in a shape of another link, deeper than the limit: it would see
-    nothing. Usually a pose is wrong, or the shape is a box around a part with an opening. Move the
-    sensor, or give the link a shape that leaves the opening out. Shapes for collision count, else
-    those that are seen; a mesh counts where trimesh is installed (``pip install
-    'tfcompose[mesh]'``) and the mesh is closed. ``rules: {TF640: {limit: 5 cm}}``.
-    """
     limit = _limit(robot, "TF640")
     for sensor in robot.sensors:
         deepest: dict[str, tuple[float, str]] = {}
@@ -113,16 +105,6 @@ def _at(robot: Robot, link: str) -> list[Note]:
 
 @rule("TF641")
 def view_blocked(robot: Robot) -> Iterator[Finding]:
-    """The robot's own bodies block a part of what a sensor sees.
-
-    Rays are cast into the field of view of each stream, as far as it reaches, against the bodies
-    that do not move relative to it; wheels count as they stand. The sensor's own body blocks
-    nothing. Move the sensor, turn it, or raise the limit where the rest is enough: ``rules:
-    {TF641: {limit: 30 %}}``. A scanner in one plane has a rule of its own, TF642. Shapes for
-    collision count, else those that are seen. Meshes count where trimesh is installed (``pip
-    install 'tfcompose[mesh]'``); without it nothing is said about them. ``tfcompose presets NAME``
-    prints the field of view; one that is not known is given under ``sensors.NAME.optics``.
-    """
     limit = _limit(robot, "TF641")
     for sensor in robot.sensors:
         views = [
@@ -145,15 +127,6 @@ def view_blocked(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF642")
 def blind_sector(robot: Robot) -> Iterator[Finding]:
-    """A laser scanner in one plane is blind in a sector: the robot's own bodies block it.
-
-    In that sector the scan shows the robot itself, which navigation takes for an obstacle unless
-    the driver or a filter drops those points. Move the scanner, or raise it. If the driver leaves
-    the sector out, say what the scan still covers, under ``sensors.NAME.optics.STREAM``:
-    ``horizontal: [-120 deg, 120 deg]``; if the rest is enough, raise the limit: ``rules: {TF642:
-    {limit: 120 deg}}``. Angles are those of the LaserScan: counter-clockwise from x of its frame.
-    Bodies count as for TF641.
-    """
     limit = _limit(robot, "TF642")
     for sensor in robot.sensors:
         for view in _views(robot, sensor):
@@ -200,12 +173,6 @@ def _sees_only_robot(robot: Robot, view: View) -> bool:
 
 @rule("TF643")
 def camera_sees_only_robot(robot: Robot) -> Iterator[Finding]:
-    """The image of a camera shows nothing but the robot itself.
-
-    Usually it is turned the wrong way: an optical frame without its rotation, a pitch with the
-    wrong sign, a yaw of 180 deg. Correct its pose. The limit is the part of the image: ``rules:
-    {TF643: {limit: 99 %}}``. Bodies count as for TF641.
-    """
     for sensor in robot.sensors:
         for view in _views(robot, sensor):
             if _sees_only_robot(robot, view):
@@ -232,13 +199,6 @@ _AT_THE_FLOOR = re.compile(
 
 @rule("TF644")
 def camera_sees_only_floor(robot: Robot) -> Iterator[Finding]:
-    """The image of a camera on wheels shows only the floor close to it.
-
-    No ray reaches farther than the limit before it hits the floor, which is below the wheels.
-    Usually the pitch has the wrong sign or a wrong size: a positive one looks down. A camera whose
-    name says that it looks down (floor, ground, down, bottom, line, dock) is meant so. Set how
-    near is too near: ``rules: {TF644: {limit: 50 cm}}``.
-    """
     limit = _limit(robot, "TF644")
     for sensor in robot.sensors:
         if _AT_THE_FLOOR.search(sensor.name.rpartition("/")[2]):
@@ -296,12 +256,6 @@ def _lowest(robot: Robot, name: str, pose: Pose, up: Vector) -> float:
 
 @rule("TF645")
 def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
-    """Two lidars, or two cameras with infrared projectors, look into each other.
-
-    Each is in the other's field of view, nearer than the limit, and no body is between them: their
-    light makes false points, or blinds the imagers. Turn one away, mount them at different
-    heights, or put a shield between them. ``rules: {TF645: {limit: 2 m}}``.
-    """
     limit = _limit(robot, "TF645")
     active = [
         (one, stream)
@@ -370,14 +324,6 @@ def _distance_in_sight(
 
 @rule("TF646")
 def zone_not_covered(robot: Robot) -> Iterator[Finding]:
-    """A zone under ``coverage`` is not seen by the sensors that have to see it.
-
-    tfcompose samples points all over the box for each stream of the sensors that ``by`` names: a
-    point is seen if it is in the field of view and in range, and no body of the robot is in
-    between. A scanner in one plane sees a point if its plane goes through the box below or above
-    it. What is not known of a stream does not cover anything: give ``sensors.NAME.optics``. Bodies
-    count as for TF641.
-    """
     for zone in robot.zones:
         if zone.frame not in robot.frames:
             if not robot.excuses(zone.frame):

@@ -59,13 +59,6 @@ _FULL_CIRCLE_RAD = 6.29
 
 @rule("TF410", of_urdf=True)
 def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
-    """An angle without a unit is probably meant in degrees.
-
-    A bare number is in radians: 90 is more than fourteen turns. The frame ends up in some
-    orientation, and nothing else complains. Write the unit, ``90 deg``; an angle in radians may
-    have the unit ``rad``. Limits of revolute joints may exceed a turn: of these only values that
-    people write in degrees are reported.
-    """
     revolute = {
         edge.joint.name for edge in robot.edges if edge.joint and edge.joint.type == "revolute"
     }
@@ -102,12 +95,6 @@ _MOST_DECIMALS = 6
 
 @rule("TF411", of_urdf=True)
 def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
-    """An angle is π/2 or π with too few digits.
-
-    −1.57 is 0.05 degrees off a right angle: 0.8 mm at one metre. Two such frames do not cancel
-    out, and every point cloud is slightly tilted. Write ``-90 deg``, or ``"${-pi/2}"``. Only
-    roundings of right angles are reported: a measured 1.5689 is not.
-    """
     for value in robot.source_numbers:
         if value.key not in {"rpy", "look", "axis_angle"}:
             continue
@@ -150,14 +137,6 @@ _SMALL_ROTATION_W = 0.85
 
 @rule("TF412")
 def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
-    """A quaternion probably has w first; the order is x, y, z, w.
-
-    Eigen's constructor, MATLAB and many papers put w first. [1, 0, 0, 0] is the identity there and
-    a half turn about x here: the sensor is upside down. Move the first number to the end. If the
-    half turn is meant, write ``rpy: [180 deg, 0, 0]``. Reported are [1, 0, 0, 0] itself, and
-    quaternions that are a small pitch or yaw with w first and a large rotation about an odd axis
-    otherwise.
-    """
     for value in robot.source_numbers:
         if value.key != "quat_xyzw" or len(value.numbers) != 4:  # noqa: PLR2004 (x, y, z, w)
             continue
@@ -205,12 +184,6 @@ _OVERHEAD_M = 1.5
 
 @rule("TF413", follows="pose")
 def camera_looks_away(robot: Robot) -> Iterator[Finding]:
-    """A camera looks up although its name says floor, or down although its name says ceiling.
-
-    By REP-103 looking down is *positive* pitch, a common mistake. Write what is meant: ``look:
-    {down: 30 deg}``. What counts is the optical axis in the robot's base, for cameras that are
-    fixed to it.
-    """
     base = (robot.base or "").rpartition("/")[2]
     poses = placed(robot) if base.startswith("base") and robot.sensors else {}
     for sensor in robot.sensors:
@@ -244,12 +217,6 @@ _TIMES = 3
 
 @rule("TF414", of_urdf=True, follows="pose")
 def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
-    """A position or a body is far larger than the robot, and probably in millimetres.
-
-    A bare number is in metres. Drawings are in millimetres, and 250 puts a sensor a quarter of a
-    kilometre away. Write the unit: ``250 mm``. The limit is three times the size of the robot's
-    bodies or typical mounts, and at least 5 m. Values with a unit are not reported.
-    """
     sizes = {link.name: _sizes(link) for link in robot.links.values()}
     for link in robot.links.values():
         largest = max(sizes[link.name], default=0.0)

@@ -35,13 +35,6 @@ _DEFAULTS: dict[str, dict[str, str]] = {
 
 @rule("TF318")
 def frame_without_prefix(robot: Robot) -> Iterator[Finding]:
-    """A node is given the name of a frame without the robot's frame prefix.
-
-    With ``isolate: frames`` or a ``frame_prefix`` the frame has another name on the live tree: the
-    node waits for a transform that never comes. Write ``${frame(odom)}`` for the name; tfcompose
-    writes the names itself for nodes with a preset. Known nodes of Nav2, slam_toolbox and
-    robot_localization are reported for their default names too.
-    """
     for process in robot.processes if robot.ros.frame_prefix else ():
         if process.kind != "run" or not process.takes_ros_arguments:
             continue

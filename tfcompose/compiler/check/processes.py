@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 
 @rule("TF812")
 def start_order_loop(robot: Robot) -> Iterator[Finding]:
-    """Processes wait for each other.
-
-    None of them would ever start. Remove one of the entries under ``after``.
-    """
     waiting = {process.name: process for process in robot.processes}
     order = TopologicalSorter(
         {name: waiting.keys() & process.after.keys() for name, process in waiting.items()}
@@ -61,13 +57,6 @@ def _needed(robot: Robot) -> set[str]:
 
 @rule("TF815", idle=True)
 def process_without_role(robot: Robot) -> Iterator[Finding]:
-    """An external or simulated process is not used.
-
-    It owns no edge, is no sensor's driver, and nothing waits for it: probably an ``owner`` was
-    meant to name it. Make it the owner of its edge, or remove it. Processes that tfcompose starts
-    are exempt, as is an external process that may send the joint states because no simulated one
-    does.
-    """
     owners = {edge.owner for edge in robot.edges} | {sensor.driver for sensor in robot.sensors}
     needed = _needed(robot)
     if owners - {process.name for process in robot.processes} - {""}:
@@ -99,11 +88,6 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF818")
 def required_without_role(robot: Robot) -> Iterator[Finding]:
-    """A required process owns no edge, and nothing waits for it.
-
-    When it ends, the whole robot stops, although nothing needs it. Remove ``required``, or declare
-    who needs it: ``after: {NAME: ready}`` on that process.
-    """
     needed = _needed(robot)
     for process in robot.processes:
         if process.required and process.name not in needed and not robot.excuses(process.name):
@@ -117,11 +101,6 @@ def required_without_role(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF847")
 def needed_but_optional(robot: Robot) -> Iterator[Finding]:
-    """A process that the robot needs waits for one with ``required: false``.
-
-    If the optional process fails, the other one never starts, and the whole robot stops: the
-    process is not optional after all. Write ``required: false`` on both, or on neither.
-    """
     optional = {process.name: process for process in robot.processes if process.required is False}
     for process in robot.processes:
         if process.required is False or process.kind == "external":
@@ -136,12 +115,6 @@ def needed_but_optional(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF848")
 def gate_never_opens(robot: Robot) -> Iterator[Finding]:
-    """A process waits for something that cannot happen before it is ready.
-
-    It owns no edges and waits for them to be live, or it waits for its own exit and always
-    restarts. It never becomes ready, and what waits for it never starts. Choose another ``ready``,
-    remove it, or remove ``restart: always``.
-    """
     owners = {edge.owner for edge in robot.edges}
     for process in robot.processes:
         kind = process.ready.kind if process.ready else ""
@@ -164,10 +137,6 @@ def gate_never_opens(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF855")
 def component_elsewhere(robot: Robot) -> Iterator[Finding]:
-    """A component is to run on another computer than its container.
-
-    A component has no process of its own: it runs where its container does. Remove its ``host``.
-    """
     processes = {process.name: process for process in robot.processes}
     for process in robot.processes:
         container = processes.get(process.component.container) if process.component else None
@@ -189,11 +158,6 @@ def component_elsewhere(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF856")
 def container_without_components(robot: Robot) -> Iterator[Finding]:
-    """A container has no components.
-
-    Nothing is ever loaded into it. Name it as the ``container`` of a component, or remove it.
-    Other files that this one is merged with, or profiles, may have its components.
-    """
     used = {process.component.container for process in robot.processes if process.component}
     for process in robot.processes:
         if process.loads and process.name not in used:
@@ -208,11 +172,6 @@ def container_without_components(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF857")
 def host_not_declared(robot: Robot) -> Iterator[Finding]:
-    """A process names a host that is not among ``hosts``.
-
-    Nothing would start it: ``deploy`` goes to the computers under ``hosts``, and each starts what
-    names it. Correct the name, or declare the host. A robot without ``hosts`` may name any.
-    """
     for process in robot.processes if robot.hosts else ():
         name = process.host
         if (
@@ -232,11 +191,6 @@ def host_not_declared(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF858", idle=True)
 def host_without_processes(robot: Robot) -> Iterator[Finding]:
-    """A host has no process.
-
-    Nothing names it as its ``host``, so nothing is deployed to it. What names no host runs where
-    ``static`` does. Name it, ``processes: {NAME: {host: HOST}}``, or remove it.
-    """
     used = {process.host for process in robot.processes}
     for name, host in robot.hosts.items():
         if name not in used and ("hosts", name) not in robot.broken:
@@ -253,12 +207,6 @@ _WITH_UNIT = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?) +(\S+)")
 
 @rule("TF859")
 def parameter_with_unit(robot: Robot) -> Iterator[Finding]:
-    """A parameter of a node is a number with a unit.
-
-    ROS parameters have no units, so the node gets a string, and most nodes end with
-    InvalidParameterTypeException. Write the number in the unit that the node expects:
-    ``wheel_separation: 0.4``. If the node does read such a string, allow the finding.
-    """
     for process in robot.processes:
         for node in process.ros_nodes:
             for name, value in node.params.items():

@@ -1,12 +1,12 @@
-"""What a rule is: a function that yields the findings of one code, and whose docstring is the code's page."""
+"""Rules: functions that yield the findings of one code.
+
+What the code means is in the catalogue: ``tfcompose/data/codes/CODE.md``.
+"""
 
 from __future__ import annotations
 
-import inspect
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
-
-from tfcompose.foundation.catalogue import CATALOGUE, Code
 
 Follows = Literal["pose"]
 
@@ -29,33 +29,22 @@ class Rule:
     use it.
     """
 
-    code: Code
+    code: str
     find: Find
     of_urdf: bool = False
     follows: Follows | None = None
     idle: bool = False
 
-    @property
-    def page(self) -> str:
-        """What ``tfcompose explain`` prints: the function's docstring."""
-        return inspect.getdoc(self.find) or ""
-
 
 def rule(
     code: str, *, of_urdf: bool = False, follows: Follows | None = None, idle: bool = False
 ) -> Callable[[Find], Rule]:
-    """Return a decorator that makes a function the rule of a code; the function has the name of the code.
+    """Return a decorator that makes a function the rule of a code.
 
-    Raises:
-        KeyError: if the catalogue does not have the code.
-        ValueError: if it has it under another name.
+    The function has the name that the catalogue has for the code.
     """
 
     def made(find: Find) -> Rule:
-        if find.__name__ != CATALOGUE[code].name:
-            raise ValueError(
-                f"the catalogue calls {code} {CATALOGUE[code].name}, not {find.__name__}"
-            )
-        return Rule(CATALOGUE[code], find, of_urdf, follows, idle)
+        return Rule(code, find, of_urdf, follows, idle)
 
     return made

@@ -32,15 +32,6 @@ _NEARER, _NEAR = 0.9, 3.0
 
 @rule("TF615")
 def calibration_probably_inverse(robot: Robot) -> Iterator[Finding]:
-    """A calibration is probably inverted.
-
-    It is beyond its limit from the nominal pose, the one in the robot file, and its inverse is
-    closer, within three times the limit; or there is no nominal pose, and the calibration puts the
-    sensor outside the robot while its inverse does not. Calibration tools differ in whether they
-    write the pose of the camera in the base or of the base in the camera. Check which one the file
-    holds, then invert its values, or swap the frames under ``calibration``: ``parent`` and
-    ``child``.
-    """
     for edge in robot.edges:
         measured, why = edge.calibration, _why_inverse(robot, edge)
         if measured and why:
@@ -99,12 +90,6 @@ def _outside(robot: Robot, measured: Calibration, back: Pose, sensor: str | None
 
 @rule("TF616")
 def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
-    """A calibration is farther from the nominal pose than its limit.
-
-    The sensor was moved, the file belongs to another robot, the frames are not those meant, or the
-    nominal pose, the one in the robot file, is only approximate. Find out which, and correct the
-    wrong one, or raise the limit: ``limit: {xyz: 5 cm, rot: 5 deg}``.
-    """
     for edge in robot.edges:
         measured = edge.calibration
         if measured is None or _is_all_zero(measured):
@@ -139,11 +124,6 @@ def _distance(metres: float, radians: float) -> str:
 
 @rule("TF617")
 def calibration_all_zero(robot: Robot) -> Iterator[Finding]:
-    """A calibration is all zero, but the nominal pose is not.
-
-    The file was probably prepared and never filled in. Calibrate the sensor, or remove
-    ``calibration``: then the nominal pose, the one in the robot file, is used.
-    """
     for edge in robot.edges:
         measured = edge.calibration
         if measured and _is_all_zero(measured):
@@ -167,11 +147,6 @@ def _is_all_zero(measured: Calibration) -> bool:
 
 @rule("TF618")
 def calibration_copied(robot: Robot) -> Iterator[Finding]:
-    """Two mounts have identical calibration values.
-
-    Two measurements never agree to the last digit: one was copied and not changed, or both name
-    the same entry. Name each mount's own entry, or calibrate the second one.
-    """
     first: dict[Pose, Calibration] = {}
     for edge in robot.edges:
         measured = edge.calibration
@@ -197,12 +172,6 @@ _TURNED_RAD = 0.02
 
 @rule("TF621", follows="pose")
 def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
-    """Two sensors are mounted at exactly the same pose.
-
-    Two bodies cannot be in one place: a mount was copied, and its numbers were not changed.
-    Measure the second one. IMUs and GNSS receivers, which may be inside another sensor, and
-    sensors without a pose are exempt; TF618 is about copied calibrations.
-    """
     kinds = {sensor.name: sensor.kind for sensor in robot.sensors}
     mounts = [
         edge for edge in robot.edges if edge.given and edge.sensor in kinds and edge.pose != Pose()
@@ -224,12 +193,6 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF622", follows="pose")
 def mount_copied(robot: Robot) -> Iterator[Finding]:
-    """A left frame is where the right one is, or a front one where the rear one is.
-
-    Both have the same position in the same parent, away from its middle: the entry was copied, and
-    the sign was not changed. By REP-103 y is positive to the left and x to the front. Example:
-    with ``wheel_left_link`` at y = 0.2, ``wheel_right_link`` is at −0.2.
-    """
     given: dict[str, Edge] = {}
     for edge in robot.edges:
         if not edge.given:
@@ -248,15 +211,6 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF625", follows="pose")
 def sides_swapped(robot: Robot) -> Iterator[Finding]:
-    """A left frame is on the right of its parent and the right one on the left, or front and rear are swapped.
-
-    The two are each other's mirror image, and each stands where the other's name says. By REP-103
-    y is positive to the left and x to the front. Example: ``left_camera`` is at y = -0.1 and
-    ``right_camera`` at y = 0.1: what the left camera sees appears on the robot's right. Swap the
-    signs, or the names. Fixed frames and wheels are judged, in a parent turned as the base is: on
-    a rack that looks back, left is the robot's right. A gripper's fingers are named as their maker
-    likes.
-    """
     poses = placed(robot, moving=True)
     given: dict[str, Edge] = {}
     for edge in robot.edges:
@@ -289,13 +243,6 @@ _DEVICE_WORDS = ("serial", "usb_port", "device_type", "device_id", "mxid", "guid
 
 @rule("TF623")
 def serial_missing(robot: Robot) -> Iterator[Finding]:
-    """Two sensors have the same driver, and one has no serial number.
-
-    Each driver takes the first device that it finds: at the next start left and right may be
-    swapped, or both drivers compete for one device. Give each its serial number: ``options:
-    {serial: "123456789012"}``. Another parameter that identifies the device (``usb_port_id``,
-    ``device_type``) will do. External drivers are exempt.
-    """
     processes = {
         process.name: process
         for process in robot.processes
@@ -338,11 +285,6 @@ _SHORT_WORD = 3
 
 @rule("TF624")
 def serial_used_twice(robot: Robot) -> Iterator[Finding]:
-    """Two sensors have the same serial number.
-
-    There is one such device, and only one of the drivers gets it. Read the number from the device,
-    or with the vendor's tool (``rs-enumerate-devices -s``).
-    """
     first: dict[tuple[str, str], MountedSensor] = {}
     for sensor in robot.sensors:
         if sensor.serial:

@@ -29,13 +29,6 @@ _WITH_ANGLES, _WITH_QUATERNION = 8, 9
 
 @rule("TF317")
 def stock_publisher_publishes_too(robot: Robot) -> Iterator[Finding]:
-    """A stock static_transform_publisher or robot_state_publisher publishes edges that are not its own.
-
-    tfcompose publishes what it owns itself, so both would, and tf2 takes the last message. Remove
-    the process: fixed edges belong under ``frames`` or ``links``, and ``joints`` reads the joint
-    states. Or name the process as the ``owner`` of the edges. A robot_state_publisher whose
-    description is not in the robot file is taken to publish the robot, unless it owns an edge.
-    """
     for process in robot.processes:
         program = _program(process)
         if program == _STATIC_PUBLISHER:

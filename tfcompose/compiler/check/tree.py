@@ -18,13 +18,6 @@ if TYPE_CHECKING:
 
 @rule("TF201", of_urdf=True)
 def two_parents(robot: Robot) -> Iterator[Finding]:
-    """A frame has two parents.
-
-    tf2 keeps one parent for each frame, the one in the newest message, and says nothing: the frame
-    jumps between the two. Decide which one is meant, and check that parent and child of the other
-    edge are not swapped. A camera whose driver publishes frames of its own is mounted by the first
-    of them.
-    """
     first: dict[str, Edge] = {}
     for edge in robot.edges:
         other = first.setdefault(edge.child, edge)
@@ -37,11 +30,6 @@ def two_parents(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF202", of_urdf=True)
 def cycle(robot: Robot) -> Iterator[Finding]:
-    """Frames are each other's ancestors.
-
-    A transform tree has no cycles: tf2 finds no way through one, and URDF readers refuse it. One
-    of the edges points the wrong way: swap its parent and child, or give the child another parent.
-    """
     above = {edge.child: edge for edge in reversed(robot.edges)}
     done: set[str] = set()
     for start in above:
@@ -93,11 +81,6 @@ _MOST_SEARCHES = 50
 
 @rule("TF203", of_urdf=True)
 def unknown_frame(robot: Robot) -> Iterator[Finding]:
-    """An edge names a frame that is not declared.
-
-    Frames are declared under ``frames`` or ``links``, or come with a sensor or a part. A misspelt
-    parent would start a second tree, which no lookup reaches.
-    """
     searches = count(1)
     moved = {edge.child for edge in robot.edges if edge.joint_name}
 
@@ -128,12 +111,6 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF204", of_urdf=True)
 def several_roots(robot: Robot) -> Iterator[Finding]:
-    """The robot consists of several trees.
-
-    There is no transform between frames of two trees. Give every root but one a parent, and remove
-    trees that nobody needs. A part that brings its own ``map`` can share it: ``ros:
-    {shared_frames: [map]}``.
-    """
     grown = _trees(robot)
     main = _main_root(robot, grown)
     for root, frames in grown.items():
@@ -158,11 +135,6 @@ def several_roots(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF205", of_urdf=True)
 def edge_given_twice(robot: Robot) -> Iterator[Finding]:
-    """An edge is defined twice.
-
-    Both definitions would be published, and which one a listener keeps depends on when it starts.
-    Keep the one that was measured.
-    """
     first: dict[tuple[str, str], Edge] = {}
     for edge in robot.edges:
         other = first.setdefault((edge.parent, edge.child), edge)
@@ -179,11 +151,6 @@ def edge_given_twice(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF206", of_urdf=True)
 def no_frames(robot: Robot) -> Iterator[Finding]:
-    """The robot has no frames.
-
-    There is nothing to publish and nothing to describe. A robot has at least a ``base_link``,
-    under ``links``.
-    """
     if not robot.frames and not robot.broken:
         at = Span(robot.file)
         advice = '<link name="base_link"/>' if robot.is_foreign(at) else "links: {base_link: {}}"
@@ -202,13 +169,6 @@ _MOST_ANCESTORS = 100
 
 @rule("TF207")
 def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
-    """The frames earth, map, odom and base_link are not in the order that REP-105 gives.
-
-    Localisation publishes map → odom and odometry odom → base_link; navigation, SLAM and recorded
-    data rely on it. A node that publishes its edge in a chain of another order gives a frame a
-    second parent. Levels may be left out. Swap parent and child, and invert the pose. Example:
-    ``odom: {parent: map}``, ``base_link: {parent: odom}``.
-    """
     above = {edge.child: edge for edge in reversed(robot.edges)}
     for edge in robot.edges:
         prefix, level = _level(edge.child)
@@ -236,14 +196,6 @@ def _level(frame: str) -> tuple[str, int | None]:
 
 @rule("TF208")
 def base_footprint_below_base_link(robot: Robot) -> Iterator[Finding]:
-    """base_footprint is a child of base_link; it should be the parent.
-
-    base_footprint is the robot's position on the ground and stays level while the robot pitches
-    and rolls. As a child of base_link it tilts along, and odometry that publishes base_footprint
-    would give it a second parent. Write ``base_link: {parent: base_footprint, xyz: [0, 0, 0.1]}``,
-    and let odometry move base_footprint. On a robot that never tilts only the name is wrong: allow
-    the finding there.
-    """
     for edge in robot.edges:
         prefix, _, name = edge.child.rpartition("/")
         above, _, parent = edge.parent.rpartition("/")
@@ -257,11 +209,6 @@ def base_footprint_below_base_link(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF209", of_urdf=True)
 def unused_frame(robot: Robot) -> Iterator[Finding]:
-    """A link or frame has neither a parent nor a child.
-
-    No joint and no mount uses it, no lookup reaches it, and readers refuse a URDF with such a
-    link. Give it a parent, or remove it.
-    """
     grown = _trees(robot)
     main = _main_root(robot, grown)
     for root, frames in grown.items():

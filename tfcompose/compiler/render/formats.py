@@ -11,7 +11,7 @@ from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.text import visible
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from tfcompose.foundation.findings import Finding, Span
 
@@ -77,15 +77,15 @@ def _escaped_property(text: str) -> str:
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def render_sarif(found: Sequence[Finding], version: str, pages: Mapping[str, str]) -> str:
-    """Return the findings as one run of tfcompose; ``pages`` holds the page of each code."""
+def render_sarif(found: Sequence[Finding], version: str) -> str:
+    """Return the findings as one run of tfcompose, with the page of each code."""
     codes = sorted({one.code for one in found})
     run = {
         "tool": {
             "driver": {
                 "name": "tfcompose",
                 "version": version,
-                "rules": [_rule(code, pages) for code in codes],
+                "rules": [_rule(code) for code in codes],
             }
         },
         "columnKind": "unicodeCodePoints",
@@ -99,17 +99,16 @@ def render_sarif(found: Sequence[Finding], version: str, pages: Mapping[str, str
     )
 
 
-def _rule(code: str, pages: Mapping[str, str]) -> dict[str, Any]:
-    rule: dict[str, Any] = {"id": code, "name": CATALOGUE[code].name}
-    page = pages.get(code, "")
-    if page:
-        rule["shortDescription"] = {"text": page.partition("\n")[0]}
-        rule["fullDescription"] = {"text": page}
-        rule["help"] = {
-            "text": page,
-            "markdown": page,
-        }  # no helpUri: the pages are at no address of the web
-    return rule
+def _rule(code: str) -> dict[str, Any]:
+    page = CATALOGUE.page(code)
+    return {
+        "id": code,
+        "name": CATALOGUE[code].name,
+        "shortDescription": {"text": CATALOGUE.summary(code)},
+        "fullDescription": {"text": page},
+        # no helpUri: the pages are at no address of the web
+        "help": {"text": page, "markdown": page},
+    }
 
 
 def _result(found: Finding, index: int) -> dict[str, Any]:

@@ -1,0 +1,221 @@
+"""The catalogue: a file for each code, read on demand; and the codes of other packages."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support import processes
+from tests.support.tables import for_each
+from tfcompose.foundation.catalogue import (
+    CATALOGUE,
+    FAMILIES,
+    Catalogue,
+    Code,
+    can_be_allowed,
+    code_of,
+    read_code,
+    similar_words,
+)
+from tfcompose.foundation.findings import finding
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "tfcompose"
+FOLDER = PACKAGE / "data" / "codes"
+#: Codes of the past, which no other finding may have: TF904 was no_xacro, from when xacro was no
+#: dependency.
+RETIRED = {"TF904"}
+
+HEAD = "---\nname: pump_off\nseverity: warning\nfamily: live\n---\n\n"
+PAGE = "The pump is off.\n\nSwitch it on.\n"
+
+
+@for_each(sorted(FOLDER.iterdir()))
+def test_each_file_is_a_code_and_a_page_whose_first_paragraph_is_a_sentence(file: Path) -> None:
+    assert CATALOGUE[file.stem] == read_code(file.stem, file.read_text("utf-8"))
+    summary = CATALOGUE.summary(file.stem)
+    assert re.fullmatch(r"[^\n]{9,109}\.", summary)
+    first, gap, rest = CATALOGUE.page(file.stem).partition("\n\n")
+    assert " ".join(first.split()) == summary
+    assert not gap or len(rest.split()) >= 3, "why it is wrong, and what to do"
+    assert all(len(line) <= 99 for line in file.read_text("utf-8").splitlines())
+
+
+def test_codes_are_in_order_in_families_and_have_one_name_each() -> None:
+    assert list(CATALOGUE) == sorted(file.stem for file in FOLDER.iterdir())
+    assert {code.family for code in CATALOGUE.values()} == set(FAMILIES)
+    assert len({code.name for code in CATALOGUE.values()}) == len(CATALOGUE)
+    assert not RETIRED & CATALOGUE.keys()
+
+
+def test_every_code_is_used_and_every_code_that_is_used_has_a_page() -> None:
+    sources = [file.read_text("utf-8") for file in PACKAGE.rglob("*.py")]
+    used = {code for text in sources for code in re.findall(r"\"(TF\d{3})\"", text)}
+    assert used == set(CATALOGUE)
+
+
+def test_a_head_says_what_a_code_is() -> None:
+    text = HEAD.replace("live", "guard").replace("---\n\n", "unbuildable: true\n---\n\n") + PAGE
+    assert read_code("ACME101", text) == Code(
+        "ACME101", "pump_off", family="guard", severity="warning", unbuildable=True
+    )
+    numbered = (HEAD + PAGE).replace("family: live\n", "")
+    assert read_code("TF299", numbered).family == "tree"
+
+
+@pytest.mark.parametrize(
+    ("limit", "si"),
+    [
+        ("0.02 m", (0.02, "m")),
+        ("2 cm", (0.02, "m")),
+        ("90 deg", (1.5707963267948966, "rad")),
+        ("95 %", (0.95, "%")),
+    ],
+)
+def test_a_limit_is_in_si(limit: str, si: tuple[float, str]) -> None:
+    assert read_code("TF640", HEAD[:-5] + f"limit: {limit}\n---\n\n" + PAGE).limit == si
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (PAGE, "head"),
+        (HEAD, "page"),
+        (HEAD.rstrip(), "page"),
+        (HEAD.replace("pump_off", "Pump off") + PAGE, "name"),
+        (HEAD.replace("name: pump_off\n", "") + PAGE, "name"),
+        (HEAD.replace("warning", "note") + PAGE, "severity"),
+        (HEAD.replace("severity: warning\n", "") + PAGE, "severity"),
+        (HEAD.replace("live", "pumps") + PAGE, "family"),
+        (HEAD.replace("family: live\n", "") + PAGE, "family"),
+        (HEAD.replace("family: live", "familly: live") + PAGE, "familly"),
+        (HEAD.replace("family: live", "family: live\nfamily: live") + PAGE, "twice"),
+        (HEAD.replace("family: live", "family: live\nlimit: 3 ft") + PAGE, "limit"),
+        (HEAD.replace("family: live", "family: live\nunbuildable: yes") + PAGE, "unbuildable"),
+    ],
+)
+def test_a_file_that_is_not_understood_says_which_and_why(text: str, why: str) -> None:
+    with pytest.raises(ValueError, match=rf"ACME101: .*{why}"):
+        read_code("ACME101", text)
+
+
+def test_a_finding_has_the_name_and_the_severity_of_its_code_unless_it_says_otherwise() -> None:
+    one = finding("TF207", "message", None)
+    assert (one.name, one.severity) == ("wrong_chain_order", "warning")
+    assert finding("TF207", "message", None, severity="error").severity == "error"
+    assert finding("TF201", "message", None).severity == "error"
+
+
+@pytest.mark.parametrize("code", ["TF999", "tf201", "", "TF20", "../codes/TF201", "TF201\n"])
+def test_what_is_no_code_is_in_no_catalogue_and_no_finding(code: str) -> None:
+    assert code not in CATALOGUE
+    assert not can_be_allowed(code)
+    for ask in (CATALOGUE.page, CATALOGUE.summary, lambda code: finding(code, "message", None)):
+        with pytest.raises(KeyError):
+            ask(code)
+
+
+def test_a_code_is_found_by_its_name_too() -> None:
+    assert code_of("two_parents") == code_of("tf201") == "TF201"
+    assert code_of("three_parents") is None
+    assert {"two_parents", "TF201"} <= set(similar_words("two_parent"))
+    assert not similar_words("TF999")
+
+
+def test_a_robot_that_cannot_be_built_or_is_not_understood_cannot_be_allowed() -> None:
+    assert not Code("TF202", "cycle", "tree", "error", unbuildable=True).can_be_allowed
+    assert not CATALOGUE["TF101"].can_be_allowed
+    assert CATALOGUE["TF301"].can_be_allowed
+
+
+def package(folder: Path, name: str, *codes: str) -> str:
+    """Make a package with these codes; it is imported by its name."""
+    (folder / name / "codes").mkdir(parents=True)
+    (folder / name / "__init__.py").touch()
+    for code in codes:
+        (folder / name / "codes" / f"{code}.md").write_text(HEAD + PAGE, encoding="utf-8")
+    return name
+
+
+def test_a_package_brings_codes_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    acme = Catalogue.of(package(tmp_path, "acme_pumps_1", "ACME101", "ACME102"))
+    assert list(acme) == ["ACME101", "ACME102"]
+    both = Catalogue(FOLDER)
+    assert len(both) == len(CATALOGUE)
+    assert both.add(acme) == []
+    assert list(both) == ["ACME101", "ACME102", *CATALOGUE]
+    assert (both["ACME101"].name, both.page("ACME101")) == ("pump_off", PAGE.rstrip())
+    assert both["TF201"] == CATALOGUE["TF201"]
+
+
+def test_codes_that_are_there_already_are_named_and_nothing_is_taken_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    acme = Catalogue.of(package(tmp_path, "acme_pumps_2", "ACME101", "TF201"))
+    both = Catalogue(FOLDER)
+    assert both.add(acme) == ["TF201"]
+    assert list(both) == list(CATALOGUE)
+    assert "ACME101" not in both
+
+
+def test_a_package_without_codes_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / package(tmp_path, "acme_pumps_3") / "codes").rmdir()
+    with pytest.raises(FileNotFoundError, match="acme_pumps_3"):
+        Catalogue.of("acme_pumps_3")
+
+
+def test_what_was_loaded_needs_no_file(tmp_path: Path) -> None:
+    file = tmp_path / "ACME101.md"
+    file.write_text(HEAD + PAGE, encoding="utf-8")
+    loaded, lazy = Catalogue(tmp_path), Catalogue(tmp_path)
+    loaded.load()
+    file.unlink()
+    assert loaded["ACME101"].name == "pump_off"
+    with pytest.raises(KeyError):
+        lazy["ACME101"]
+
+
+def test_the_catalogue_loads_nothing_else_of_the_package() -> None:
+    loaded = "[name for name in sys.modules if name.startswith('tfcompose')]"
+    program = f"import sys, tfcompose.foundation.findings; print(*{loaded})"
+    done = processes.run([sys.executable, "-c", program], check=True, cwd=ROOT)
+    modules = {
+        "tfcompose",
+        *(f"tfcompose.foundation{name}" for name in ("", ".catalogue", ".findings")),
+    }
+    assert set(done.stdout.split()) == modules
+
+
+READS = """
+import sys
+from pathlib import Path
+read = []
+sys.addaudithook(lambda event, args: event == "open" and read.append(str(args[0])))
+{program}
+print(*sorted(Path(name).stem for name in read if "data/codes/" in name), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "codes"),
+    [
+        ("import tfcompose.foundation.findings, tfcompose.compiler.check", set()),
+        (
+            "from tfcompose.cli.parser import main\nmain(['lint', 'robots/my_robot.yaml'])",
+            # those that have limits
+            {"TF640", "TF641", "TF642", "TF643", "TF644", "TF645"},
+        ),
+    ],
+)
+def test_a_file_is_read_only_for_a_finding_or_a_limit(program: str, codes: set[str]) -> None:
+    command = [sys.executable, "-c", READS.format(program=program)]
+    done = processes.run(command, check=True, cwd=ROOT)
+    assert set(done.stderr.split()) <= codes

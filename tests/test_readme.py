@@ -21,7 +21,7 @@ from tfcompose.foundation.tool import shipped
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS, TOPICS = all_commands(), topics()
-FOLDERS = (FOLDER, *(tool.folder / "topics" for tool in shipped().tools))
+FOLDERS = (FOLDER, *(tool.topic_folder for tool in shipped().tools))
 PAGES = {file.stem: file.read_text("utf-8") for folder in FOLDERS for file in folder.glob("*.md")}
 EVERYTHING = "\n".join((README, *PAGES.values()))
 

@@ -21,7 +21,15 @@ def copy_core(folder: Path) -> Path:
     """Copy the package without the folder ``tools``; return the folder that it is in."""
     ignored = shutil.ignore_patterns("__pycache__", "tools")
     shutil.copytree(PACKAGE, folder / "tfcompose", ignore=ignored)
+    (folder / "sitecustomize.py").write_text(_WITHOUT_EDITABLE, encoding="utf-8")
     return folder
+
+
+#: An editable install finds each missing part of the package in the repository; this hides it.
+_WITHOUT_EDITABLE = """\
+import sys
+sys.meta_path[:] = [each for each in sys.meta_path if "Editable" not in getattr(each, "__name__", "")]
+"""
 
 
 def install(source: Path, folder: Path) -> Path:

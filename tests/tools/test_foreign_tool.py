@@ -83,11 +83,11 @@ def test_its_section_is_merged_like_every_other_and_adds_its_process(
     run: Run, tmp_path: Path
 ) -> None:
     write_robot(tmp_path, "acme: {frame: mast}", "profiles: {loud: {acme: {reach: 3 m}}}",
-                "processes: {beeper: {restart: always}}")  # fmt: skip
+                "processes: {beeper: {env: {LOUD: very}}}")  # fmt: skip
     assert run("build", "-p", "loud", "-o", "built").returncode == 0
     plan = json.loads((tmp_path / "built/plan.json").read_text())
     (beeper,) = (process for process in plan["processes"] if process["name"] == "beeper")
-    assert (beeper["argv"], beeper["restart"]) == (["sleep", "3"], "always")
+    assert (beeper["argv"], beeper["env"]) == (["sleep", "3"], {"LOUD": "very"})
 
 
 def test_its_rule_finds_at_its_place_and_can_be_silenced_and_explained(

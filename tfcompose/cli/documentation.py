@@ -77,7 +77,7 @@ def for_terminal(markdown: str, columns: int) -> str:
 def topic(word: str) -> str:
     """Return the page of a topic as Markdown, with what the code knows."""
     tool, _ = installed().topics().get(word, (None, None))
-    text = _read(word, FOLDER if tool is None else tool.folder / "topics")
+    text = _read(word, FOLDER if tool is None else tool.topic_folder)
     more = _GENERATED.get(word)
     return f"{text}\n{more()}" if more else text
 
@@ -92,7 +92,7 @@ def _options(name: str, command: CommandModule) -> str:
 def _about(name: str, command: CommandModule) -> str:
     """Return the page of a command; a tool's is in the tool's folder."""
     if isinstance(command, ToolCommand):
-        return _read(command.command.topic or name, command.tool.folder / "topics")
+        return _read(command.command.topic or name, command.tool.topic_folder)
     return _read(name, FOLDER)
 
 

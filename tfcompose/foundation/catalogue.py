@@ -4,21 +4,22 @@ A file is ``CODE.md``: a head of ``key: value`` lines between two lines ``---``,
 page that ``tfcompose explain CODE`` prints: what is wrong, in a sentence; then why it matters and
 what to do. A code is never used again for something else.
 
-Every process that can find something loads this module, which imports nothing of the package; a
-file is read when its code is first asked for.
+Every process that can find something loads this module; a file is read when its code is first
+asked for. The codes of tools are in their folders, which are looked up after those of the core.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
+from tfcompose.foundation.tool import code_folders
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
 Severity = Literal["error", "warning"]
 
@@ -96,39 +97,15 @@ class Code:
 class Catalogue(Mapping[str, Code]):
     """The codes whose files are in some folders, in alphabetical order."""
 
-    def __init__(self, *folders: Path) -> None:
-        self._folders = list(folders)
+    def __init__(self, *folders: Path, more: Callable[[], Iterable[Path]] = tuple) -> None:
+        """Take codes from folders, then from those that ``more`` returns when it is needed."""
+        self._folders = folders
+        self._more = more
         self._codes: dict[str, Code] = {}
-        self._names: list[str] | None = None
-
-    @classmethod
-    def of(cls, package: str) -> Catalogue:
-        """Return the codes in the folder ``codes`` of a package, such as ``__package__``.
-
-        Raises:
-            FileNotFoundError: if the package has no such folder.
-            ModuleNotFoundError: if there is no such package.
-        """
-        module = sys.modules.get(package) or import_module(package)
-        folder = Path(next(iter(module.__path__))) / "codes"
-        if not folder.is_dir():
-            raise FileNotFoundError(f"the package {package} has no folder codes")
-        return cls(folder)
-
-    def add(self, other: Catalogue) -> list[str]:
-        """Take in the codes of another catalogue, and return those that this one has already.
-
-        If there are any, nothing is taken in: a code has one meaning.
-        """
-        clashes = sorted(self.keys() & other.keys())
-        if not clashes:
-            self._folders += other._folders
-            self._names = None
-        return clashes
 
     def load(self) -> None:
-        """Read every code now: a process that runs for long depends on no file later."""
-        for code in self:
+        """Read every code of the core now: a process that runs for long depends on no file later."""
+        for code in _codes_in(self._folders):
             self[code]
 
     def page(self, code: str) -> str:
@@ -155,22 +132,24 @@ class Catalogue(Mapping[str, Code]):
         return self._codes[code]
 
     def __iter__(self) -> Iterator[str]:
-        if self._names is None:
-            files = [file for folder in self._folders for file in folder.iterdir()]
-            pages = [file.stem for file in files if file.suffix == ".md"]
-            self._names = sorted(filter(_is_code, pages))
-        return iter(self._names)
+        return iter(sorted(_codes_in(chain(self._folders, self._more()))))
 
     def __len__(self) -> int:
         return len(list(iter(self)))
 
     def _text(self, code: str) -> str:
-        for folder in self._folders if _is_code(code) else ():
+        for folder in chain(self._folders, self._more()) if _is_code(code) else ():
             try:
                 return (folder / f"{code}.md").read_text("utf-8")
             except FileNotFoundError:
                 continue
         raise KeyError(code)
+
+
+def _codes_in(folders: Iterable[Path]) -> set[str]:
+    """Return the codes whose pages are in the folders."""
+    pages = {file.stem for folder in folders for file in folder.glob("*.md")}
+    return {page for page in pages if _is_code(page)}
 
 
 def read_code(code: str, text: str) -> Code:
@@ -232,7 +211,7 @@ def _is_code(text: str) -> bool:
     return text.isascii() and prefix.isalpha() and prefix.isupper() and number.isdecimal()
 
 
-CATALOGUE = Catalogue(Path(__file__).parents[1] / "data" / "codes")
+CATALOGUE = Catalogue(Path(__file__).parents[1] / "data" / "codes", more=code_folders)
 
 
 def code_of(word: str) -> str | None:

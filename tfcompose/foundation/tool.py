@@ -98,14 +98,15 @@ class Option(NamedTuple):
 class Tool(NamedTuple):
     """Everything that a tool brings.
 
-    ``package`` is where its pages are: topics in ``topics/NAME.md``, codes in ``codes/CODE.md``.
+    ``package`` is the one in whose folder ``topics`` its topics and the pages of its commands are,
+    ``codes`` the one in whose folder ``codes`` are the pages of its codes; empty: it has none.
     ``extra`` is the extra of tfcompose that installs what it needs, empty if it needs nothing.
     """
 
     name: str
     package: str
     commands: tuple[Command, ...] = ()
-    codes: tuple[str, ...] = ()
+    codes: str = ""
     topics: tuple[Topic, ...] = ()
     keys: tuple[Key, ...] = ()
     languages: tuple[Language, ...] = ()
@@ -113,18 +114,28 @@ class Tool(NamedTuple):
     extra: str = ""
 
     @property
-    def folder(self) -> Path:
-        """The folder of its package."""
-        return Path(str(import_module(self.package).__file__)).parent
+    def topic_folder(self) -> Path:
+        """The folder of its topics and of the pages of its commands."""
+        return _folder(self.package) / "topics"
+
+    @property
+    def code_folder(self) -> Path | None:
+        """The folder of its codes; None if it has none."""
+        return _folder(self.codes) / "codes" if self.codes else None
 
     def names(self) -> Iterator[tuple[str, str]]:
         """Yield everything that it brings under a name that no other tool may have, as (kind, name)."""
         yield from (("command", command.name) for command in self.commands)
-        yield from (("code", code) for code in self.codes)
+        yield from (("code", code) for code in self.code_names())
         yield from (("topic", topic.name) for topic in self.topics)
         yield from (("key", key.name) for key in self.keys)
         yield from (("language", language.name) for language in self.languages)
         yield from (("option", flag) for option in self.options for flag in option.flags)
+
+    def code_names(self) -> list[str]:
+        """Return its codes: the names of their files."""
+        folder = self.code_folder
+        return [] if folder is None else sorted(file.stem for file in folder.glob("*.md"))
 
 
 class Problem(NamedTuple):
@@ -164,6 +175,10 @@ class Toolset(NamedTuple):
         ]
 
 
+def _folder(package: str) -> Path:
+    return Path(next(iter(import_module(package).__path__)))
+
+
 def load(reference: str) -> Any:
     """Return what ``module:attribute``, or a module's name alone, leads to."""
     module, _, attribute = reference.partition(":")
@@ -186,10 +201,13 @@ def shipped() -> Toolset:
 @cache
 def installed() -> Toolset:
     """Return the tools that ship, then those of other packages that load and clash with none before them."""
+    entries = _entry_points()
+    if not entries:
+        return shipped()
     problems: list[Problem] = []
     tools = list(shipped().tools)
     owners = {name: tool.name for tool in tools for name in tool.names()}
-    for entry_name, reference in _entry_points():
+    for entry_name, reference in entries:
         try:
             tool = load(reference)
             if not isinstance(tool, Tool):
@@ -218,11 +236,19 @@ def _clashes(tool: Tool, owners: Mapping[tuple[str, str], str]) -> Iterator[Prob
 
 
 def _wrong_codes(tool: Tool) -> Iterator[Problem]:
-    for code in tool.codes:
+    for code in tool.code_names():
         if not _FOREIGN_CODE.fullmatch(code):
             message = f"the tool {tool.name} is left out: {code} is no code of its own"
             advice = "give its codes a prefix of their own and three digits: ACME101"
             yield Problem("TF922", message, advice)
+
+
+def code_folders() -> Iterator[Path]:
+    """Yield the folders with the codes of the tools that ship, then of the others; those are looked up when reached."""
+    ships = shipped().tools
+    yield from filter(None, (tool.code_folder for tool in ships))
+    others = installed().tools[len(ships) :]
+    yield from filter(None, (tool.code_folder for tool in others))
 
 
 def absent(kind: str, name: str) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 from pydantic import ValidationError
 
 from tfcompose.foundation.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
+from tfcompose.foundation.tool import absent
 from tfcompose.foundation.units import shown
 from tfcompose.spec.language.habits import habit, usual_value
 from tfcompose.spec.language.spec import FIRST, at, fields_of, kinds_of, mapping_at
@@ -221,7 +222,8 @@ def _unknown_key(
         return Refusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
     is_safe = slip not in around and meant[path[:-1], slip] == 1 and not usual
     advice = (
-        usual
+        (absent("key", name) if len(path) == 1 else "")
+        or usual
         or (f"did you mean {slip}?" if slip else "")
         or _indented_too_little(path, around, known)
     )

@@ -14,6 +14,7 @@ TOOL = Tool(
             completes=(("hosts", "hosts"),),
         ),
     ),
+    codes=__package__,
     topics=(Topic("hosts", "a robot on several computers, and `deploy`"),),
     options=(
         Option(

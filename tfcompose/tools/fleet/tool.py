@@ -13,6 +13,7 @@ TOOL = Tool(
             group="Ship",
         ),
     ),
+    codes=__package__,
     topics=(Topic("fleet", "poses between several robots, over Zenoh"),),
     keys=(
         Key(

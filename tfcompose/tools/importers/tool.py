@@ -13,4 +13,5 @@ TOOL = Tool(
             group="Write",
         ),
     ),
+    codes=__package__,
 )

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, settings
 from tests.support import processes
 from tests.support.domains import Domain, reserved_domain
 from tests.support.processes import Started
-from tests.support.skips import unexpected
+from tests.support.skips import ACCEPTED, unexpected
 from tests.support.waiting import TIMEOUT_S
 from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.program import HERE
@@ -52,13 +52,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="fail where a test is skipped that need not be",
     )
+    parser.addoption("--no-skips", action="store_true", help="fail where any test is skipped")
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
     reporter: Any = session.config.pluginmanager.get_plugin("terminalreporter")
-    if reporter and session.config.getoption("fail_on_skips"):
-        for skip in unexpected(reporter.stats.get("skipped", [])):
+    allows_none = session.config.getoption("no_skips")
+    if reporter and (allows_none or session.config.getoption("fail_on_skips")):
+        accepted = () if allows_none else tuple(ACCEPTED)
+        for skip in unexpected(reporter.stats.get("skipped", []), accepted):
             reporter.write_line(f"skipped, and may not be: {skip}", red=True)
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 

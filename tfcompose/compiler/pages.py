@@ -658,7 +658,8 @@ exempt if an overlay makes the process simulated or external: they apply when th
 With guard: strict, a profile file of Fast DDS moves what the plan's processes send on TF into a partition that only the
 guard receives. The process was started with another file, or without one: a shell that starts it exports
 FASTRTPS_DEFAULT_PROFILES_FILE, or clears the environment. What it sends reaches every listener, so tfcompose stops it,
-whatever on_violation says. Take that line out of the script, and name the file under env: of the process: tfcompose
+whatever on_violation says; a program with a cleared environment that a process forked is named alone, with its number,
+because nothing proves which process it belongs to. Take that line out of the script, and name the file under env: of the process: tfcompose
 adds the fence to a copy of it. Or let the guard fence off by remapping: guard: {fence: remap}; then a script must pass
 its arguments on, with "$@". There a plain command that owns no edge is not remapped, since it may be no ROS node: if it
 sends TF, start it as {package, executable}, or add --ros-args to its words."""

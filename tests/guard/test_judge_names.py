@@ -340,6 +340,21 @@ def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_s
     assert (found.found.code, found.process) == ("TF852", "slam")
 
 
+@pytest.mark.parametrize("fenced", [True, None, False])
+def test_a_process_whose_environment_was_cleared_is_reported_by_its_number(
+    *, fenced: bool | None
+) -> None:
+    running = History(GuardPolicy(mode="strict")).clear()
+    publisher = Publisher(b"1" * 16, "/slam", static=False, ours=False, fenced=fenced, unmarked=77)
+    for _ in range(3):
+        running.now += 1.0
+        running.events += running.judge.graph([publisher], running.now)
+    found = [event for event in running.events if isinstance(event, Unfenced)]
+    assert [(one.found.code, one.process, one.pid) for one in found] == (
+        [("TF852", "", 77)] if fenced is False else []
+    )
+
+
 def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped() -> None:
     running = History(GuardPolicy(mode="strict")).clear()
     slam, renamed = running.joins("/slam"), running.joins("/slam")

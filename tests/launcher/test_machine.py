@@ -346,6 +346,20 @@ def test_a_process_past_the_fence_is_stopped_where_violations_are_only_reported(
     assert everything.all(Stopping) == [Stopping("TF801 foreign_publisher")]
 
 
+def test_a_process_past_the_fence_is_known_by_its_number_where_its_environment_was_cleared() -> (
+    None
+):
+    history = begin(GUARD, STATIC, run_process("slam", restart="always")).feed(Clear())
+    pid = history.state.tracked["slam"].pid
+    assert pid
+    history.feed(Unfenced(ERROR, "", pid + 1000))
+    assert history.killed == []
+    expect(history.found()[-1], "TF801", "nothing is stopped", f"kill {pid + 1000}")
+    history.feed(Unfenced(ERROR, "", pid))
+    assert history.killed == [("slam", SIGINT)]
+    expect(history.found()[-1], "TF801", "slam is stopped", "strict")
+
+
 def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:
     history = begin(GUARD, DRIVE, STATIC, guard=GuardPolicy(on_violation="stop-offender")).feed(
         Clear()

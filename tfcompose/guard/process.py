@@ -233,7 +233,13 @@ def _run_marks(plan: Plan, profile: str) -> RunMarks:
         for node in process.nodes
     }
     return RunMarks(
-        RUN_ID, os.environ[RUN_ID], PROCESS, profile=profile, launcher=LAUNCHER, components=inside
+        RUN_ID,
+        os.environ[RUN_ID],
+        PROCESS,
+        profile=profile,
+        launcher=LAUNCHER,
+        components=inside,
+        launcher_pid=int(os.environ.get(LAUNCHER, "0").partition(":")[0]),
     )
 
 

@@ -25,6 +25,7 @@ from tfcompose.guard.verdict.publishers import (
     leak,
     replaced_latched,
     unfenced,
+    unmarked,
     volatile_publisher,
 )
 from tfcompose.model.messages import Found, GuardEvent, Recovered, Taken, Unfenced
@@ -448,8 +449,7 @@ class PublisherReports:
             one
             for one in publishers
             if one.node
-            and one.ours
-            and one.process
+            and ((one.ours and one.process) or one.unmarked)
             and one.fenced is False
             and not self._is_known(_UNFENCED, one)
         ]
@@ -464,8 +464,12 @@ class PublisherReports:
     def unfenced(self, one: Publisher, *, remapped: bool) -> list[Unfenced]:
         """Return the finding for one of these; the fence may be of remappings."""
         topic = one.topic or GLOBAL[one.static]
-        found = unfenced(one.node or "", one.process, topic, one.profile, remapped=remapped)
-        return [Unfenced(new.found, one.process) for new in self._once(one, found)]
+        if one.unmarked:
+            found = unmarked(one.node or "", topic, one.where, remapped=remapped)
+        else:
+            found = unfenced(one.node or "", one.process, topic, one.profile, remapped=remapped)
+        process = "" if one.unmarked else one.process
+        return [Unfenced(new.found, process, one.unmarked) for new in self._once(one, found)]
 
     def floods(
         self, senders: Senders, flooders: dict[bytes | None, Flood], now: float

@@ -216,8 +216,8 @@ def _guard_reported(step: Transition, event: Event) -> None:
             _complete(step, edges)
         case Found(found, process):
             _violation(step, found, process)
-        case Unfenced(found, process):
-            _left_the_fence(step, found, process)
+        case Unfenced(found, process, pid):
+            _left_the_fence(step, found, process or _process_of(step.state, pid), pid)
         case Recovered(message):
             step.notify(RecoveredShown(message, step.since_begin))
         case Remember(changed):
@@ -269,10 +269,25 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
         step.report(found)
 
 
-def _left_the_fence(step: Transition, found: Finding, process: str) -> None:
-    """Report a process that sends past a strict plan's fence, and stop it, or everything, if that is the policy."""
+def _process_of(state: State, pid: int) -> str:
+    """Return the plan's process that was started with that number; empty: none was."""
+    started = (name for name, tracked in state.tracked.items() if pid and tracked.pid == pid)
+    return next(started, "")
+
+
+def _left_the_fence(step: Transition, found: Finding, process: str, pid: int) -> None:
+    """Report a process that sends past a strict plan's fence, and stop it, or everything, if that is the policy.
+
+    ``process`` is empty where one of the plan's started ``pid``, and nothing says which.
+    """
     if step.state.plan.guard.on_violation == "stop":
         _violation(step, found, process)
+    elif not process:
+        step.report(
+            _noted(
+                found, f"nothing is stopped: a process of the plan started it; kill {pid} ends it"
+            )
+        )
     else:
         _stop_offender(step, found, process, "guard is strict")
 

@@ -70,10 +70,14 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Unfenced:
-    """A process of a strict plan sends past the fence: it must be stopped, whatever else is only reported."""
+    """A process of a strict plan sends past the fence: it must be stopped, whatever else is only reported.
+
+    Where its environment was cleared, ``pid`` says which process it is instead of ``process``.
+    """
 
     found: Finding
     process: str
+    pid: int = 0
 
 
 @dataclass(frozen=True, slots=True)

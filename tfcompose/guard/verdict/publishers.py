@@ -133,6 +133,24 @@ def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: boo
     return finding("TF852", message, None, notes=notes, help=advice)
 
 
+def unmarked(node: str, topic: str, where: str, *, remapped: bool) -> Finding:
+    """Return the finding for a process of a strict plan's run whose environment was cleared.
+
+    It runs ``where``, and is not behind the fence, which may be of remappings.
+    """
+    message = (
+        f"{node} publishes {topic} past the fence of guard: strict: every listener receives it"
+    )
+    notes = [Note(f"it runs {where}, and what started it cleared its environment")]
+    advice = "start it without env -i, and with sudo -E where it needs sudo: "
+    advice += (
+        'a script passes its ROS arguments on with "$@"'
+        if remapped
+        else f"{PROFILE_VARIABLES[0]} names the fence"
+    )
+    return finding("TF852", message, None, notes=notes, help=advice)
+
+
 def best_effort_publisher(node: str, topic: str) -> Finding:
     """Return the finding for a publisher that sends best effort, which no TF listener accepts."""
     message = (

@@ -129,6 +129,8 @@ class Publisher:
         run: the run of another robot that it is of, where that was seen.
         profile: the profile file that its process was started with instead of the fence's; empty:
             none, or not known.
+        unmarked: the number of its process, where that descends from the run's launcher, and its
+            environment was cleared, so that nothing says which of the plan's processes it is of.
     """
 
     gid: bytes
@@ -145,6 +147,7 @@ class Publisher:
     process: str = ""
     run: OtherRun | None = None
     profile: str = ""
+    unmarked: int = 0
 
     @property
     def nodes(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from tfcompose.tf.ros.graph import (
     writers_unmapped,
 )
 from tfcompose.tf.ros.node import PublicTFReader, TFSubscription, middleware
-from tfcompose.tf.ros.processes import began_at, environments, origin
+from tfcompose.tf.ros.processes import began_at, descent, environments, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -152,6 +152,8 @@ class Identity:
             another run.
         run: the run of another robot that it is of.
         profile: the profile file that it was started with, where that is not the fence's.
+        unmarked: the number of the process, where it descends from the run's launcher, and its
+            environment says nothing of a run.
     """
 
     ours: bool | None = None
@@ -159,6 +161,7 @@ class Identity:
     fenced: bool | None = None
     run: OtherRun | None = None
     profile: str = ""
+    unmarked: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +171,7 @@ class RunMarks:
     ``launcher`` holds a run's launcher: its process number, and when it began, in clock ticks
     since the start of the machine. ``profile`` names the profile file that fences the process off;
     empty: there is no such fence. ``components`` are the plan's processes that run inside of
-    another one, by its name and their nodes'.
+    another one, by its name and their nodes'. ``launcher_pid`` is one's own launcher.
     """
 
     variable: str
@@ -177,6 +180,7 @@ class RunMarks:
     profile: str = ""
     launcher: str = ""
     components: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    launcher_pid: int = 0
 
     def process_of(self, known: Identity, node: str) -> str:
         """Return the plan's process that a node is of, in an operating system's process that is known."""
@@ -331,9 +335,7 @@ class TFGraph:
         if writer.gid not in self._where:
             own = self._own_gid()
             self._where[writer.gid] = origin(writer.gid, own)
-            self._ours[writer.gid] = (
-                self._marks.identify(environments(writer.gid, own)) if self._marks else Identity()
-            )
+            self._ours[writer.gid] = self._identify(writer.gid, own)
         known = self._ours[writer.gid]
         if fenced is None:
             fenced = known.fenced if writer.gid not in self._public else False
@@ -351,7 +353,18 @@ class TFGraph:
             process=self._marks.process_of(known, writer.node) if self._marks else "",
             run=known.run,
             profile=known.profile,
+            unmarked=known.unmarked,
         )
+
+    def _identify(self, gid: bytes, own: bytes) -> Identity:
+        if self._marks is None:
+            return Identity()
+        found = environments(gid, own)
+        known = self._marks.identify(found)
+        if found and not any(self._marks.variable in one for one in found):
+            pids = descent(gid, own, self._marks.launcher_pid)
+            return replace(known, unmarked=pids[0] if pids else 0)
+        return known
 
     def _own_gid(self) -> bytes:
         """Return an id of this process's: that of its reader."""

@@ -81,6 +81,23 @@ def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
         return None
 
 
+def descent(gid: bytes, own_gid: bytes, ancestor: int) -> tuple[int, ...]:
+    """Return a publisher's process and those above it, up to the child of ``ancestor``.
+
+    Empty where it does not descend from that process, or is not known.
+    """
+    if not _is_known(gid, own_gid) or gid[2:4] != own_gid[2:4]:
+        return ()
+    fitting = [pid for pid in _candidates(gid) if _command(pid)]
+    if len(fitting) != 1:
+        return ()
+    pids, pid = [], fitting[0]
+    while pid not in {0, 1, ancestor}:
+        pids.append(pid)
+        pid = _parent(pid)
+    return tuple(pids) if pid == ancestor else ()
+
+
 def has_ended(gid: bytes, own_gid: bytes) -> bool:
     """Return whether the process that an id is of ran on this machine, and has surely ended."""
     is_here = _is_known(gid, own_gid) and gid[2:4] == own_gid[2:4]
@@ -119,6 +136,15 @@ def _environment(pid: int) -> dict[str, str]:
         return {}
     words = (word.decode(errors="replace").partition("=") for word in data.split(b"\0"))
     return {name: value for name, _, value in words if name}
+
+
+def _parent(pid: int) -> int:
+    """Return the number of the process's parent, 0 where it has just ended."""
+    try:
+        fields = (_PROC / str(pid) / "stat").read_text(encoding="utf-8", errors="replace")
+        return int(fields.rpartition(")")[2].split()[1])
+    except (OSError, IndexError, ValueError):
+        return 0
 
 
 def _command(pid: int) -> str:

@@ -71,8 +71,7 @@ def cluster_name(name: str) -> str:
 
 def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
     """Return what the process reads of the plan's folder, by paths relative to it; the plan is first."""
-    named = (*process.argv, *process.env.values(), process.cwd or "")
-    files = {found for word in named for found in _IN_FOLDER.findall(word)}
+    files = {found for word in process.texts for found in _IN_FOLDER.findall(word)}
     if process.params_file:
         files.add(process.params_file)
     if process.kind in OWN_KINDS:

@@ -689,11 +689,10 @@ def _needs_launcher(process: PlanProcess) -> bool:
 
 def _is_command(process: PlanProcess) -> bool:
     """Return whether the process's command is one that launch can start as it is."""
-    words = (*process.argv, *process.env.values())
     return (
         process.kind == "run"
         and not _needs_launcher(process)
-        and not any(map(_PLACEHOLDER.search, words))
+        and not any(map(_PLACEHOLDER.search, process.texts))
     )
 
 

@@ -180,8 +180,7 @@ def outside_of(plan: Plan, folder: str) -> list[str]:
     """Return what processes need that is not in a container, which has the plan's folder alone, a sentence each."""
     gaps = []
     for process in plan.started:
-        named = (*process.argv, *process.env.values(), process.cwd or "")
-        outside = [word for word in named if "${build_dir}/.." in word]
+        outside = [word for word in process.texts if "${build_dir}/.." in word]
         gaps += [
             f"{process.name} needs {word}, which is outside of {folder}: add a volume"
             for word in outside

@@ -1,4 +1,4 @@
-"""The table of a process's keys: each has its row, and neither key nor foreign word is known in many files."""
+"""The table of a process's keys: neither a key nor another system's word is in many files."""
 
 import ast
 import re
@@ -28,8 +28,8 @@ UNIT_OF_THE_LAUNCHER = PACKAGE / "tools" / "deploy" / "unit.py"
 MOST_FILES = 5
 #: Names that are everyday words as well: of these only what is read of a process counts.
 EVERYDAY = {"env", "cwd", "output", "prefix", "restart", "required", "stop"}
-#: What features of their own set or ask of any process: the fence and Zenoh's router variables, the
-#: launcher's parts what the end of a process means.
+#: What features of their own set or ask of any process: the fence and Zenoh's router variables,
+#: the launcher's parts what the end of a process means.
 ASKED_WIDELY = {"env", "required", "restart"}
 
 
@@ -38,7 +38,7 @@ def files_with(word: str) -> set[Path]:
 
 
 def files_that_read(name: str) -> set[Path]:
-    """Return the files that have an attribute of this name of something that is called a process."""
+    """Return the files that read an attribute of this name of what is called a process."""
     return {
         file
         for file, text in FILES.items()
@@ -59,7 +59,7 @@ def test_a_key_is_known_in_few_files(row: ProcessKey) -> None:
 
 
 def foreign_words() -> set[str]:
-    """Return the words of other systems that are no everyday words: CamelCase, or with a separator."""
+    """Return other systems' words but for everyday ones: CamelCase, or with a separator."""
     process = PlanProcess("p", "run", restart="on-failure", component=Component("c", "p", "x::Y"))
     words = set()
     for row in ROWS:

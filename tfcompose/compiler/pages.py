@@ -807,9 +807,10 @@ materials. Nothing is written then. This is a bug in tfcompose; please report it
     "TF911": (
         """The kernel refuses what a process is to have.
 
-schedule: {cpus: [2, 3], priority: 80} needs these processors here, and the right to that real-time priority. What is
-below this process's own limits and scores needs no right, what is beyond them needs the capability CAP_SYS_RESOURCE.
-The kernel is asked before anything is started. rtprio in /etc/security/limits.conf gives the right to a user after the next login,
+schedule: {cpus: [2, 3], priority: 80} needs these processors here, and the right to that real-time
+priority. A limit above the launcher's own, and a score below it, need the capability
+CAP_SYS_RESOURCE. The kernel is asked before anything is started. rtprio in
+/etc/security/limits.conf gives the right to a priority to a user after the next login,
 LimitRTPRIO= to a systemd unit, and --cap-add SYS_NICE or --ulimit rtprio to a container."""
     ),
     "TF912": (

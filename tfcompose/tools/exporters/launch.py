@@ -408,7 +408,7 @@ class _Export:
     def _python(
         self, process: PlanProcess, value: Any, texts: Mapping[str, Text] | None = None
     ) -> Code | str:
-        """Return a value as Python; ``texts`` are what the launch file makes itself of a mapping."""
+        """Return a value as Python; a mapping also has the ``texts`` that the file makes."""
         if isinstance(value, PythonCode):
             return str(value)
         if isinstance(value, str):

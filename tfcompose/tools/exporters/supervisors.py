@@ -111,7 +111,7 @@ def waiting_s(process: PlanProcess, what: str) -> float:
 
 
 def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
-    """Return what a supervisor that knows nothing of ROS does not do of the plan, one sentence each.
+    """Return what a supervisor without ROS does not do of the plan, one sentence each.
 
     ``dialects`` are what the keys of a process are to it.
     """

@@ -33,6 +33,7 @@ from tfcompose.model.messages import (
     ProcessState,
     TreeComplete,
 )
+from tfcompose.model.plan import Component
 from tfcompose.model.plan.components import LoadRequest
 from tfcompose.model.plan.file import write_plan
 from tfcompose.tf.ros.node import open_node
@@ -389,7 +390,11 @@ def test_a_component_whose_node_a_container_has_already_is_refused(
         container = Container(node, "/robot1/box")
         assert until(lambda: container.load.is_there)
         container.ask_to_load(
-            LoadRequest("/robot1/box", "/robot1/front/rectify", "image_proc", "demo::Empty")
+            LoadRequest(
+                "/robot1/box",
+                "/robot1/front/rectify",
+                Component("box", "image_proc", "demo::Empty"),
+            )
         )
         assert until(container.load.answer)
         container.close()

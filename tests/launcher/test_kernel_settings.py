@@ -1,11 +1,13 @@
-"""Processors, real-time priority and prefixes: asked of the kernel before the start, and there in the process."""
+"""What the kernel follows of a process: asked before the start, and there in the process."""
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 from unittest import mock
 
@@ -17,33 +19,74 @@ from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.launcher.child import spawn
-from tfcompose.launcher.kernel_settings import refused_settings
+from tfcompose.launcher.kernel_settings import SETTINGS, refused_settings
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.plan import Plan, PlanProcess, RosSettings, Schedule
 from tfcompose.tf.ros.environment import child_environment
+from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.child import Command
     from tfcompose.model.plan import SchedulingPolicy
 
-ASKS = (
-    "import json, os; print(json.dumps([sorted(os.sched_getaffinity(0)), os.sched_getscheduler(0),"
-    " os.nice(0)]))"
-)
+#: What the cases ask the kernel by.
+KERNEL = {"os": os, "resource": resource, "Path": Path}
+LAST_CPU = max(os.sched_getaffinity(0))
+ROBOT = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nprocesses:\n  p: {%s, %s}\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A key in a robot file, and what comes of it.
+
+    ``planned`` is its value in the plan; ``asks`` Python that gives what the kernel says of the
+    process that runs it, which is ``answer``. ``unit`` and ``service`` are lines of the exports
+    for systemd and compose. ``refused`` is a value that a user without rights cannot have.
+    """
+
+    text: str
+    planned: object
+    asks: str
+    answer: object
+    refused: object
+    unit: str = ""
+    service: str = ""
+
+
+CASES = {
+    "schedule": Case(
+        f"{{cpus: [{LAST_CPU}], policy: batch}}",
+        Schedule((LAST_CPU,), "batch"),
+        "[sorted(os.sched_getaffinity(0)), os.sched_getscheduler(0)]",
+        [[LAST_CPU], os.SCHED_BATCH],
+        Schedule(policy="fifo", priority=80),
+    ),
+}
 ASKS_AS_NOBODY = """
-import json, os
+import os
 from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.model.plan import PlanProcess, Schedule
 if not os.getuid():
     os.setuid(65534)
-before = os.sched_getscheduler(0)
-found = refused_settings(PlanProcess("p", "run", schedule=Schedule((), "{policy}")))
-print(json.dumps([[one.message for one in found], os.sched_getscheduler(0) - before]))
+before = {asks}
+found = refused_settings(PlanProcess("p", "run", {key}={value!r}))
+print([one.code for one in found], {asks} == before)
 """
-PROCESS = PlanProcess("p", "run", argv=(sys.executable, "-c", ASKS))
+PROCESS = PlanProcess("p", "run", argv=(sys.executable, "-c", "import os; print(os.nice(0))"))
+
+
+def process_with(key: str, case: Case) -> PlanProcess:
+    """Return the process of a robot file that has the key and prints what the kernel says."""
+    program = [
+        sys.executable,
+        "-c",
+        f"import json, os, resource; from pathlib import Path; print(json.dumps({case.asks}))",
+    ]
+    text = ROBOT % (f"run: {json.dumps(program)}", f"{key}: {case.text}")
+    robot = compile_robot(text, "r.yaml", library()).robot
+    assert robot is not None
+    return plan_of(robot).process("p")
 
 
 def commands(folder: Path, process: PlanProcess) -> tuple[dict[str, Command], list[Finding]]:
@@ -51,25 +94,48 @@ def commands(folder: Path, process: PlanProcess) -> tuple[dict[str, Command], li
     return commands_of(plan, [process], folder / "plan.json", os.environ, child_environment)
 
 
-def answer(folder: Path, process: PlanProcess) -> list[object]:
+def answer(folder: Path, process: PlanProcess) -> object:
     made, found = commands(folder, process)
     assert found == []
     child = spawn(made["p"], ())
     output = child.communicate(timeout=30)[0]
     assert child.returncode == 0
-    return list(json.loads(output))
+    return json.loads(output)
 
 
-def test_a_process_runs_on_its_processors_with_its_policy_and_below_its_prefix(
-    tmp_path: Path,
+def test_each_setting_has_a_case() -> None:
+    assert CASES.keys() == {setting.key for setting in SETTINGS}
+
+
+@pytest.mark.parametrize("key", CASES)
+def test_a_key_reaches_the_plan_the_process_and_other_supervisors(
+    key: str, tmp_path: Path
 ) -> None:
-    before = os.sched_getaffinity(0), os.sched_getscheduler(0)
-    last = max(before[0])
-    process = replace(PROCESS, schedule=Schedule((last,), "batch"), prefix=("nice", "-n", "5"))
-    cpus, policy, nice = answer(tmp_path, process)
-    assert (cpus, policy) == ([last], os.SCHED_BATCH)
-    assert nice == min(os.nice(0) + 5, 19), "a suite that is nice itself"
-    assert (os.sched_getaffinity(0), os.sched_getscheduler(0)) == before
+    case = CASES[key]
+    process = process_with(key, case)
+    assert getattr(process, key) == case.planned
+    before = eval(case.asks, KERNEL)  # noqa: S307 (of this table)
+    assert answer(tmp_path, process) == case.answer
+    assert eval(case.asks, KERNEL) == before  # noqa: S307
+    plan = Plan("r", "", None, RosSettings(), (), (process,))
+    for export, line in ((systemd, case.unit), (compose, case.service)):
+        text = "".join(file.text for file in export(plan, Machine("/plan"))[0])
+        assert line in [lines.strip() for lines in text.splitlines()] or not line
+
+
+@pytest.mark.parametrize("key", CASES)
+def test_what_a_user_has_no_right_to_is_a_finding(key: str) -> None:
+    case = CASES[key]
+    code = ASKS_AS_NOBODY.format(key=key, value=case.refused, asks=case.asks)
+    done = processes.run(
+        [sys.executable, "-c", f"import resource; from pathlib import Path{code}"], check=True
+    )
+    assert done.stdout.split("\n")[0] == "['TF911'] True"
+
+
+def test_a_process_runs_below_its_prefix(tmp_path: Path) -> None:
+    process = replace(PROCESS, prefix=("nice", "-n", "5"))
+    assert answer(tmp_path, process) == min(os.nice(0) + 5, 19), "a suite that is nice itself"
 
 
 def test_what_the_kernel_refuses_is_a_finding_and_nothing_is_started(tmp_path: Path) -> None:
@@ -89,8 +155,11 @@ def test_what_asks_the_kernel_keeps_its_own_schedule_without_a_right_to_it(
     policy: SchedulingPolicy,
 ) -> None:
     """A process without privileges cannot leave the policy idle, once it has it."""
-    done = processes.run([sys.executable, "-c", ASKS_AS_NOBODY.format(policy=policy)], check=True)
-    assert json.loads(done.stdout) == [[], 0]
+    code = ASKS_AS_NOBODY.format(
+        key="schedule", value=Schedule((), policy), asks="os.sched_getscheduler(0)"
+    )
+    done = processes.run([sys.executable, "-c", code], check=True)
+    assert done.stdout.split("\n")[0] == "[] True"
 
 
 def test_a_prefix_that_is_not_there_is_named(tmp_path: Path) -> None:
@@ -98,14 +167,9 @@ def test_a_prefix_that_is_not_there_is_named(tmp_path: Path) -> None:
     expect(found[0], "TF810", "no_such_runner")
 
 
-ROBOT = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nprocesses:\n  p: {run: [x], %s}\n"
-
-
 def test_the_keys_reach_the_plan() -> None:
-    text = (
-        ROBOT % "restart: always, restart_delay: 2 s, prefix: gdb -ex 'run fast' --args, schedule:"
-        " {priority: 80}"
-    )
+    keys = "restart_delay: 2 s, prefix: gdb -ex 'run fast' --args, schedule: {priority: 80}"
+    text = ROBOT % ("run: [x], restart: always", keys)
     robot = compile_robot(text, "r.yaml", library()).robot
     assert robot is not None
     process = plan_of(robot).process("p")
@@ -124,4 +188,6 @@ def test_the_keys_reach_the_plan() -> None:
     ],
 )
 def test_wrong_keys_are_findings(keys: str, code: str) -> None:
-    assert [one.code for one in compile_robot(ROBOT % keys, "r.yaml", library()).errors] == [code]
+    assert [
+        one.code for one in compile_robot(ROBOT % ("run: [x]", keys), "r.yaml", library()).errors
+    ] == [code]

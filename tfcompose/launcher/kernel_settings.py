@@ -1,4 +1,4 @@
-"""What the kernel is told of a process before its program begins, and whether it would refuse that.
+"""What the kernel is told of a process before its program begins, and what it would refuse.
 
 A setting is a row of ``SETTINGS``: the process's key, what sets it for the calling process, and
 what asks beforehand without leaving a trace in this one.
@@ -77,7 +77,7 @@ def _apply_schedule(schedule: Schedule) -> None:
 
 
 def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
-    """Return what the kernel refuses of a schedule; a thread asks it, so that this one stays as it was."""
+    """Return what the kernel refuses of a schedule, which a thread asks that ends."""
     try:
         with ThreadPoolExecutor(1) as thread:
             lacking = set(schedule.cpus) - thread.submit(_cpus_with, schedule).result()
@@ -100,7 +100,7 @@ def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
 
 
 def _cpus_with(schedule: Schedule) -> set[int]:
-    """Have the kernel schedule this thread so, for good, and return the processors that it has then."""
+    """Have the kernel schedule this thread so, for good, and return its processors then."""
     _apply_schedule(schedule)
     return os.sched_getaffinity(0)
 

@@ -15,9 +15,10 @@ from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit import emit
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.foundation.findings import Finding, RejectedError
+from tfcompose.launcher.kernel_settings import SETTINGS
 from tfcompose.launcher.preflight import filled_in, folder_of, own_env
 from tfcompose.model.files import Target
-from tfcompose.model.plan import PlanProcess, Ready, Schedule, StopRule
+from tfcompose.model.plan import PlanProcess, Ready, StopRule
 from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.model.robot import Process
 from tfcompose.spec.language.process import keys_of
@@ -63,9 +64,6 @@ REACH: dict[str, dict[str, Any]] = {
     "restart: always, max_restarts: 3": {"restart": "always", "max_restarts": 3},
     "restart: always, restart_delay: 5 s": {"restart_delay": 5.0},
     "prefix: [nice, -n, '10']": {"prefix": ("nice", "-n", "10")},
-    "schedule: {cpus: [2, 3], policy: fifo, priority: 80}": {
-        "schedule": Schedule((2, 3), "fifo", 80)
-    },
     "stop: {signal: SIGTERM, timeout: 200 ms}": {"stop": StopRule("SIGTERM", 0.2)},
     "stop: {kill_timeout: 9 s}": {"stop": StopRule(kill_timeout_s=9.0)},
     "output: log": {"output": "log"},
@@ -106,6 +104,7 @@ def test_a_key_of_a_process_reaches_the_plan(keys: str) -> None:
 
 def test_no_key_that_a_process_of_the_plan_has_as_well_is_left_out() -> None:
     shared = {one.name for one in fields(Process) if one.init} & keys_of("run")
+    shared -= {setting.key for setting in SETTINGS}  # which are followed into the process itself
     assert shared <= {name for words in REACH.values() for name in words}
 
 

@@ -79,9 +79,7 @@ def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[
         ros_args += ["--log-level", process.log_level]
     if robot.ros.clock == "sim":
         ros_args += ["-p", "use_sim_time:=true"]
-    if has_params and not any(
-        _PARAMS_FILE in word for word in (*process.argv, *process.env.values())
-    ):
+    if has_params and not any(_PARAMS_FILE in text for text in process.texts):
         ros_args += ["--params-file", _PARAMS_FILE]
     for name, value in _launch_time_params(process.params):
         ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]

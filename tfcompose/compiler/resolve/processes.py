@@ -473,9 +473,7 @@ _WORDS = {
 def unreached(process: Process, source: Source) -> list[Finding]:
     """Return findings about a parameter file without parameters, and about keys that reach no node."""
     at: Path = ("processes", process.name)
-    names_params_file = any(
-        "${params_file}" in word for word in (*process.argv, *process.env.values())
-    )
+    names_params_file = any("${params_file}" in text for text in process.texts)
     if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
         keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
         given = [key for key in keys if getattr(process, key) and source.has((*at, key))]

@@ -7,9 +7,10 @@ remappings and parameters go with the request.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.model.plan.plan import Component  # noqa: TC001 (the codec reads annotations)
 from tfcompose.model.plan.topics import GLOBAL, private_topics
 
 if TYPE_CHECKING:
@@ -31,16 +32,13 @@ class LoadRequest:
 
     container: str
     node: str
-    package: str
-    plugin: str
+    component: Component
     remap: dict[str, str] = field(default_factory=dict)
-    params: dict[str, Any] = field(default_factory=dict)
-    extra_arguments: dict[str, Any] = field(default_factory=dict)
 
     @property
     def what(self) -> str:
         """The component as people write it."""
-        return f"{self.package}/{self.plugin}"
+        return f"{self.component.package}/{self.component.plugin}"
 
 
 def load_file(folder: Path, process: str) -> Path:
@@ -68,15 +66,9 @@ def load_request(
     if private and (own := private_topics(plan).get(process.name)):
         remap = dict([*zip(GLOBAL, own, strict=True), *zip(process.topics, own, strict=True)])
         remap |= {old: new for old, new in process.remap.items() if old not in remap}
-    return LoadRequest(
-        container.nodes[0],
-        process.nodes[0],
-        component.package,
-        plugin=component.plugin,
-        remap=remap,
-        params={name: _filled(value, fill) for name, value in component.params.items()},
-        extra_arguments=component.extra_arguments,
-    )
+    params = {name: _filled(value, fill) for name, value in component.params.items()}
+    loaded = replace(component, params=params)
+    return LoadRequest(container.nodes[0], process.nodes[0], loaded, remap)
 
 
 def _filled(value: Any, fill: Callable[[str], str]) -> Any:

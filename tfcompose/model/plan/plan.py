@@ -330,6 +330,11 @@ class PlanProcess:
     emulate_tty: bool = field(default=False, metadata=OMITTED)
 
     @property
+    def texts(self) -> tuple[str, ...]:
+        """The texts in which places of files can stand: its command, variables and folder."""
+        return (*self.argv, *self.env.values(), self.cwd or "")
+
+    @property
     def topics(self) -> tuple[str, str]:
         """The topics (moving, fixed) on which it publishes TF."""
         return self.remap.get("/tf", "/tf"), self.remap.get("/tf_static", "/tf_static")

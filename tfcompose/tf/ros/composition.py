@@ -110,12 +110,13 @@ class Container:
             ValueError: if a parameter is of no kind that ROS has.
         """
         namespace, _, name = request.node.rpartition("/")
+        component = request.component
         self.load.ask(
-            package_name=request.package,
-            plugin_name=request.plugin,
+            package_name=component.package,
+            plugin_name=component.plugin,
             node_name=name,
             node_namespace=namespace or "/",
             remap_rules=[f"{old}:={new}" for old, new in request.remap.items()],
-            parameters=[parameter(*one) for one in request.params.items()],
-            extra_arguments=[parameter(*one) for one in request.extra_arguments.items()],
+            parameters=[parameter(*one) for one in component.params.items()],
+            extra_arguments=[parameter(*one) for one in component.extra_arguments.items()],
         )

@@ -10,11 +10,13 @@ even with ``Recreate``.
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.model.files import File
+from tfcompose.model.plan.codec import encode
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import OWN_KINDS
 from tfcompose.model.process_keys import PROCESS_KEYS
@@ -71,8 +73,7 @@ def cluster_name(name: str) -> str:
 
 def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
     """Return what the process reads of the plan's folder, by paths relative to it; the plan is first."""
-    named = (*process.argv, *process.env.values(), process.cwd or "")
-    files = {found for word in named for found in _IN_FOLDER.findall(word)}
+    files = {found for word in process.texts for found in _IN_FOLDER.findall(word)}
     if process.params_file:
         files.add(process.params_file)
     if process.kind in OWN_KINDS:
@@ -252,7 +253,8 @@ def _node_selector(plan: Plan, host: str) -> dict[str, str]:
 def _digest(plan: Plan, process: PlanProcess, texts: Mapping[str, str]) -> str:
     """Return the digest of what the process is started with: its part of the plan, and the files that it reads."""
     files = [texts[path] for path in files_of(plan, process) if path != _PLAN]
-    return hashlib.sha256(repr((plan.started_with(process), files)).encode()).hexdigest()[:16]
+    text = json.dumps([plan.started_with(process), files], default=encode)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _environment(plan: Plan) -> dict[str, str]:

@@ -413,7 +413,7 @@ class _Export:
     def _python(
         self, process: PlanProcess, value: Any, texts: Mapping[str, Text] | None = None
     ) -> Code | str:
-        """Return a value as Python; ``texts`` are what the launch file makes itself of a mapping."""
+        """Return a value as Python; a mapping also has the ``texts`` that the file makes."""
         if isinstance(value, PythonCode):
             return str(value)
         if isinstance(value, str):
@@ -694,11 +694,10 @@ def _needs_launcher(process: PlanProcess) -> bool:
 
 def _is_command(process: PlanProcess) -> bool:
     """Return whether the process's command is one that launch can start as it is."""
-    words = (*process.argv, *process.env.values())
     return (
         process.kind == "run"
         and not _needs_launcher(process)
-        and not any(map(_PLACEHOLDER.search, words))
+        and not any(map(_PLACEHOLDER.search, process.texts))
     )
 
 

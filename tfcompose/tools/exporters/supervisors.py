@@ -113,7 +113,7 @@ def waiting_s(process: PlanProcess, what: str) -> float:
 
 
 def gaps_of(plan: Plan, dialects: Collection[Dialect]) -> list[str]:
-    """Return what a supervisor that knows nothing of ROS does not do of the plan, one sentence each.
+    """Return what a supervisor without ROS does not do of the plan, one sentence each.
 
     ``dialects`` are what the keys of a process are to it.
     """
@@ -180,8 +180,7 @@ def outside_of(plan: Plan, folder: str) -> list[str]:
     """Return what processes need that is not in a container, which has the plan's folder alone, a sentence each."""
     gaps = []
     for process in plan.started:
-        named = (*process.argv, *process.env.values(), process.cwd or "")
-        outside = [word for word in named if "${build_dir}/.." in word]
+        outside = [word for word in process.texts if "${build_dir}/.." in word]
         gaps += [
             f"{process.name} needs {word}, which is outside of {folder}: add a volume"
             for word in outside

@@ -1,0 +1,104 @@
+"""The table of a process's keys: neither a key nor another system's word is in many files."""
+
+import ast
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from tests.support.house import PACKAGE
+from tfcompose.model.plan import Component, Plan, PlanProcess, RosSettings
+from tfcompose.model.process_keys import (
+    EXTRA_ARGUMENTS,
+    LOADED,
+    PROCESS_KEYS,
+    Exported,
+    ProcessKey,
+)
+from tfcompose.spec.language.process import ContainerSpec, ProcessSpec
+from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
+
+ROWS = (*PROCESS_KEYS, EXTRA_ARGUMENTS)
+TABLE = PACKAGE / "model" / "process_keys.py"
+FILES = {file: file.read_text("utf-8") for file in sorted(PACKAGE.rglob("*.py"))}
+#: A unit that starts a whole plan, which no process's key is about.
+UNIT_OF_THE_LAUNCHER = PACKAGE / "tools" / "deploy" / "unit.py"
+#: So many files know a key: its row, the plan's field, where it acts, and two more.
+MOST_FILES = 5
+#: Names that are everyday words as well: of these only what is read of a process counts.
+EVERYDAY = {"env", "cwd", "output", "prefix", "restart", "required", "stop"}
+#: What features of their own set or ask of any process: the fence and Zenoh's router variables,
+#: the launcher's parts what the end of a process means.
+ASKED_WIDELY = {"env", "required", "restart"}
+
+
+def files_with(word: str) -> set[Path]:
+    return {file for file, text in FILES.items() if re.search(rf"\b{word}\b", text)}
+
+
+def files_that_read(name: str) -> set[Path]:
+    """Return the files that read an attribute of this name of what is called a process."""
+    return {
+        file
+        for file, text in FILES.items()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Attribute)
+        and node.attr == name
+        and re.search(r"\bprocess$", ast.unparse(node.value))
+    }
+
+
+@pytest.mark.parametrize(
+    "row", [row for row in ROWS if row.name not in ASKED_WIDELY], ids=lambda row: row.name
+)
+def test_a_key_is_known_in_few_files(row: ProcessKey) -> None:
+    count = files_that_read if row.name in EVERYDAY else files_with
+    known_in = count(row.name) | {TABLE, PACKAGE / "model" / "plan" / "plan.py"}
+    assert len(known_in) <= MOST_FILES, sorted(map(str, known_in))
+
+
+def foreign_words() -> set[str]:
+    """Return other systems' words but for everyday ones: CamelCase, or with a separator."""
+    process = PlanProcess("p", "run", restart="on-failure", component=Component("c", "p", "x::Y"))
+    words = set()
+    for row in ROWS:
+        exported = Exported(process, awaited=True)
+        dialects = (row.systemd, row.compose, row.kubernetes)
+        words |= {setting.name for one in dialects for setting in one.settings(exported)}
+        keywords = row.launch.keywords if row.launch else ()
+        words |= {word for one in keywords for word in (one.name, one.attribute)}
+    return {word for word in words if re.search(r"[a-z][A-Z]|[_-]", word)}
+
+
+def test_a_word_of_another_system_stands_in_the_table_alone() -> None:
+    words = foreign_words() - {row.name for row in ROWS} - {"on_exit"}  # event handlers' as well
+    assert {"RestartSec", "stop_grace_period", "backoffLimit", "respawn_delay"} <= words
+    elsewhere = {word: files_with(word) - {TABLE, UNIT_OF_THE_LAUNCHER} for word in words}
+    assert not {word: files for word, files in elsewhere.items() if files}
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+def test_a_row_and_the_plan_have_the_same_default(row: ProcessKey) -> None:
+    holder = Component if row.to == LOADED else PlanProcess
+    assert row.name in {one.name for one in fields(holder)}
+    unset = PlanProcess("p", "run", component=Component("c", "p", "x::Y"))
+    assert not row.is_set(unset)
+    assert row.default is None or row.default == row.value_of(unset)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+def test_a_key_of_the_language_is_its_row(row: ProcessKey) -> None:
+    models = (ProcessSpec,) if row.to == LOADED else (ProcessSpec, ContainerSpec)
+    for model in models:
+        key = model.model_fields[row.name]
+        assert (key.description, key.default) == (row.help, row.default)
+
+
+def test_a_key_without_a_word_elsewhere_is_the_launchers_there() -> None:
+    process = PlanProcess("p", "run", argv=("x",), prefix=("nice",), env={"A": "b"})
+    plan = Plan("r", "", None, RosSettings(), (), (process,))
+    for export in (systemd, compose):
+        text = "".join(file.text or "" for file in export(plan, Machine("/plan"))[0])
+        assert "nice" not in text
+        assert "tfcompose.launcher.exec" in text

@@ -23,7 +23,6 @@ from tfcompose.guard.verdict.ownership import (
     SentEdge,
     Start,
     Violation,
-    violation_finding,
 )
 from tfcompose.guard.verdict.stamps import Clocks, StampHistory
 from tfcompose.model.messages import Clear, Found, GuardEvent
@@ -57,12 +56,12 @@ STRANGE_S = 1.0
 class JudgeMemory:
     """What the guard that follows this one must know of one pair of topics; the launcher keeps it, part by part.
 
-    ``owners`` holds by frame who sent it last and before, ``senders`` are by publishers' ids,
+    ``owners`` holds by frame who sent it, the last one last, ``senders`` are by publishers' ids,
     ``reported`` publishers.
     """
 
     start: Start
-    owners: dict[str, tuple[str, str]]
+    owners: dict[str, tuple[str, ...]]
     senders: dict[str, SenderMemory]
     cases: tuple[CaseMemory, ...]
     reported: tuple[tuple[str, str], ...]
@@ -94,6 +93,8 @@ class Judge:
     _verdicts: Verdicts = field(init=False)
     _publishers: PublisherReports = field(init=False)
     _sent: SentPoses = field(init=False)
+    #: The processes that the plan starts, by their nodes.
+    _started: dict[str, str] = field(init=False)
     _finds_until: float = 0.0
     admitted: frozenset[tuple[str, str]] | None = None
 
@@ -107,6 +108,7 @@ class Judge:
         self._verdicts = Verdicts(self._rules, self._senders, self.cases, self._start)
         self._publishers = PublisherReports(self.plan)
         self._sent = SentPoses(self.plan, self._senders)
+        self._started = {node: each.name for each in self.plan.managed for node in each.nodes}
 
     def message(self, message: Message, now: float) -> list[GuardEvent]:
         """Take a message and return which edges it brings to life; ``tick`` reports violations."""
@@ -131,8 +133,15 @@ class Judge:
         return self._sent.frames
 
     def name_of(self, gid: bytes | None) -> str:
-        """Return the publisher's node, or all that it may be; empty while that is not known."""
-        return " or ".join(self._senders.nodes(gid, static=False)) if gid is not None else ""
+        """Return the publisher's node, or all that it may be; empty while that is not known.
+
+        One with the name of a process's node that is not of that process is another one.
+        """
+        nodes = self._senders.nodes(gid, static=False) if gid is not None else ()
+        process, is_ours = self._senders.process(gid), self._senders.is_ours(gid)
+        if len(nodes) != 1 or is_ours is None or self._started.get(nodes[0], process) == process:
+            return " or ".join(nodes)
+        return f"another {nodes[0]}" + (f" of {process}" if process else "")
 
     def graph(self, publishers: Sequence[Publisher], now: float) -> list[GuardEvent]:
         """Take who publishes on /tf and /tf_static now, and return what that means."""
@@ -211,12 +220,7 @@ class Judge:
 
     def wrong(self) -> list[Finding]:
         """Return what was reported and is not over, worst first; silence and low rates are part of ``health``."""
-        found = [
-            violation_finding([case.violation], self.plan)
-            for case in self.cases.open.values()
-            if case.reported
-        ]
-        return sorted(found, key=lambda one: (one.severity, one.code))
+        return sorted(self.cases.wrong(), key=lambda finding: (finding.severity, finding.code))
 
     def absent(self, owner: str) -> None:
         """Take the owner as stopped on purpose; who publishes its edges next is no second one."""

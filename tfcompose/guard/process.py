@@ -97,9 +97,7 @@ class TopicWatch:
             node, topics, None if private is None else tuple(private.values()), ours=marks
         )
         feedback = None if private is None else Feedback(node, private, self.data.own)
-        self.relay = (
-            Relay(node, self._graph, judge.plan, self.data.own, feedback) if strict else None
-        )
+        self.relay = Relay(node, self._graph, self.data.own, feedback) if strict else None
         self.judge = judge
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None

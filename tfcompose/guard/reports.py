@@ -29,11 +29,10 @@ from tfcompose.guard.verdict.publishers import (
 )
 from tfcompose.model.messages import Found, GuardEvent, Recovered, Taken, Unfenced
 from tfcompose.model.plan.topics import GLOBAL
-from tfcompose.tf.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
-from tfcompose.tf.live.state import NAMELESS
+from tfcompose.tf.live.publishers import FEWEST_GAPS, NAMELESS_S, PARTICIPANT, UNCOUNTED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.guard.verdict.ownership import Start
@@ -84,20 +83,30 @@ _UNFENCED = "TF852"
 #: All that another robot publishes is one finding.
 OTHER_ROBOT = "TF854"
 
-Key = tuple[str, str, str, str]
-#: Code and node, and whether it is about the end.
-Group = tuple[str, str, bool]
+#: Code, parent, child and publisher's id.
+Key = tuple[str, str, str, bytes]
+#: Code, node, and the plan's process that it is proven to be of, empty where none is.
+Group = tuple[str, str, str]
 
 
 @dataclass(slots=True)
 class Case:
-    """A violation, observed first at ``since`` and last at ``last``, and whether it was ``reported``."""
+    """A violation by a publisher, observed first at ``since`` and last at ``last``, and whether it was ``reported``.
+
+    ``named`` are the publishers that were named of a violation by several that alternate.
+    """
 
     violation: Violation
     gid: bytes | None
     since: float
     last: float
     reported: bool = False
+    named: frozenset[bytes] = frozenset()
+
+    @property
+    def edge(self) -> tuple[str, str]:
+        """The edge."""
+        return (self.violation.parent, self.violation.child)
 
 
 class Cases:
@@ -110,8 +119,10 @@ class Cases:
         self._senders = senders
         self._start = start
         self._drives = drives_of(plan)
-        self._reported: dict[Group, tuple[float, float]] = {}
+        self._reported: dict[tuple[Group, bool], tuple[float, float]] = {}
         self._ended: dict[Group, list[tuple[Violation, bool]]] = {}
+        #: Edges of which some publishers have ended, and others go on, with where these ran.
+        self._left: dict[Group, dict[tuple[str, str], list[str]]] = {}
         started = [
             process for process in plan.processes if process.kind not in {"external", "guard"}
         ]
@@ -123,14 +134,15 @@ class Cases:
         key = self._key(violation, gid)
         case = self.open.setdefault(key, Case(violation, gid, now, now))
         case.gid, case.last = gid, now
-        if violation.nodes:  # what was blamed on nobody has a name now
-            self.open.pop((violation.code, violation.parent, violation.child, NAMELESS), None)
+        if violation.nodes and not case.violation.nodes:  # what was blamed on nobody has a name
+            case.violation, case.reported = violation, False
         return case
 
     def _key(self, violation: Violation, gid: bytes | None) -> Key:
-        """Return what the case is known by; where ids do not say whose, who may have done it changes all the time."""
-        who = violation.who if self._senders.is_sure(gid) else ""
-        return (violation.code, violation.parent, violation.child, who)
+        """Return what the case is known by: its publisher, unless several may have done it."""
+        is_sure = self._senders.is_sure(gid) and not violation.alternates
+        key = gid if gid is not None and is_sure else b""
+        return (violation.code, violation.parent, violation.child, key)
 
     def undeclared(self, gid: bytes | None) -> int:
         """Return how many cases there are about edges of a publisher that nobody declared."""
@@ -148,10 +160,10 @@ class Cases:
         """
         grouped: dict[Group, list[Case]] = {}
         for case in self._ripe(now) if at_once is None else self._new(at_once):
-            grouped.setdefault((*self._group(case), False), []).append(case)
+            grouped.setdefault(self._group(case), []).append(case)
         events: list[GuardEvent] = []
         for group, cases in grouped.items():
-            if not self._is_due(group, now):
+            if not self._is_due((group, False), now):
                 continue
             self.changes += 1
             if group[0] != OTHER_ROBOT or not self._is_reported(group[1], now, cases):
@@ -160,10 +172,37 @@ class Cases:
                 case.reported = True
         return events
 
-    def _group(self, case: Case) -> tuple[str, str]:
+    def _group(self, case: Case) -> Group:
         """Return with what a case is reported: its code and node, or the robot whose run the publisher is of."""
         run = self._senders.run(case.gid)
-        return (OTHER_ROBOT, run.name) if run else (case.violation.code, case.violation.who)
+        if run:
+            return (OTHER_ROBOT, run.name, "")
+        return (case.violation.code, case.violation.who, self._senders.process(case.gid))
+
+    def _publishers(self, cases: Sequence[Case]) -> list[bytes | None]:
+        """Return who publishes the edges of these cases of one group now: an id of each process."""
+        group, edges = self._group(cases[0]), {case.edge for case in cases}
+        gids: list[bytes | None] = [
+            gid
+            for case in self.open.values()
+            if case.edge in edges and self._group(case) == group
+            for gid in self._gids_of(case)
+        ]
+        if not all(map(self._senders.is_sure, gids)):
+            return [cases[0].gid]
+        present = [gid for gid in gids if self._senders.is_present(gid)] or gids
+        return list({self._process_of(gid): gid for gid in present}.values())
+
+    def _process_of(self, gid: bytes | None) -> str | bytes:
+        """Return what tells the publisher's process from others."""
+        return self._senders.where(gid) or (gid or b"")[:PARTICIPANT]
+
+    def _gids_of(self, case: Case) -> list[bytes | None]:
+        """Return the publishers of a case: one, or all of the name, of which any may be the owner."""
+        violation = case.violation
+        if not violation.alternates or not self._senders.is_sure(case.gid):
+            return [case.gid]
+        return [*self._senders.named(violation.nodes, static=violation.static)] or [case.gid]
 
     def _is_reported(self, robot: str, now: float, cases: list[Case]) -> bool:
         """Return whether it was reported that the robot runs here, with edges that are as wrong as these."""
@@ -173,7 +212,7 @@ class Cases:
         known = [
             one
             for one in self.open.values()
-            if one.reported and self._group(one) == (OTHER_ROBOT, robot)
+            if one.reported and self._group(one) == (OTHER_ROBOT, robot, "")
         ]
         return any(not severe or one.violation.edge for one in known)
 
@@ -205,8 +244,11 @@ class Cases:
                 case.violation = replace(case.violation, nodes=nodes or case.violation.nodes)
             yield case
 
-    def _is_due(self, group: Group, now: float) -> bool:
-        """Return whether the group is reported now, and note it: the more often it is, the longer others wait."""
+    def _is_due(self, group: tuple[Group, bool], now: float) -> bool:
+        """Return whether the group, or its end, is reported now, and note it.
+
+        The more often it is, the longer others wait.
+        """
         at, collected_s = self._reported.get(group, (-COLLECTED_AT_MOST_S, 0.0))
         if now - at < collected_s:
             return False
@@ -220,27 +262,31 @@ class Cases:
             del self._reported[next(iter(self._reported))]
         return True
 
-    def _event(self, cases: list[Case], now: float) -> GuardEvent:
-        where, run = self._senders.where(cases[0].gid), self._senders.run(cases[0].gid)
+    def _event(self, cases: list[Case], now: float) -> Found | Taken:
+        run, publishers = self._senders.run(cases[0].gid), self._publishers(cases)
+        runs = [self._senders.where(gid) for gid in publishers]
         ours = self._senders.process(cases[0].gid)
-        violations = [replace(case.violation, stranger=bool(where) and not ours) for case in cases]
+        is_stranger = any(runs) and not ours
+        violations = [replace(case.violation, stranger=is_stranger) for case in cases]
+        for case in cases:
+            if case.violation.alternates:
+                case.named = frozenset(gid for gid in self._gids_of(case) if gid)
         if any(self._was_first(case, now) for case in cases):
             found = (
                 other_robot_finding(violations, run, self._plan)
                 if run
-                else taken_finding(violations, where)
+                else taken_finding(violations, runs)
             )
             return Taken(found)
         if run:
             return Found(other_robot_finding(violations, run, self._plan))
         driven = sensor_of(violations[0], self._drives)
-        found = violation_finding(violations, self._plan, where, driven)
+        found = violation_finding(violations, self._plan, runs, driven)
         if advice := misnamed_help(violations, self._plan, ours):
             found = replace(found, help=advice)
         if self._says_fate(violations[0]):
-            found = replace(
-                found, notes=(*found.notes, Note(_FATE[self._senders.is_held_back(cases[0].gid)]))
-            )
+            fates = dict.fromkeys(map(self._senders.is_held_back, publishers))
+            found = replace(found, notes=(*found.notes, *(Note(_FATE[fate]) for fate in fates)))
         process = self._process(violations[0], cases[0].gid)
         if not process and self._may_be_ours(violations[0]):
             found = replace(
@@ -304,29 +350,95 @@ class Cases:
             self.open[self._key(case.violation, case.gid)] = case
 
     def over(self, now: float) -> list[GuardEvent]:
-        """Forget violations that have ended, and report that; the next of their kind is a new case."""
+        """Forget violations that have ended, and report that; the next of their kind is a new case.
+
+        An edge that others of the same name go on with is not over: these are reported again.
+        """
         ended = [
             key for key, case in self.open.items() if case.reported and self._has_ended(case, now)
         ]
         self.changes += len(ended)
-        for key in ended:
-            case = self.open.pop(key)
-            one = case.violation
-            kept = (
-                one.static and not one.is_of_stamps and not self._senders.was_held_back(case.gid)
-            )
-            self._ended.setdefault((*self._group(case), True), []).append((one, kept))
-        due = [group for group in self._ended if self._is_due(group, now)]
-        return [Recovered(text) for group in due for text in _over(group, self._ended.pop(group))]
+        cases = [self.open.pop(key) for key in ended]
+        going_on = {
+            (self._group(c), c.edge): c for c in self.open.values() if c.reported and cases
+        }
+        for case in cases:
+            group, violation = self._group(case), case.violation
+            if other := going_on.get((group, case.edge)):
+                if group[0] != OTHER_ROBOT:
+                    self._note_left(other, {case.gid}, set(self._publishers([other])))
+                continue
+            is_latched = violation.static and not violation.is_of_stamps
+            kept = is_latched and not self._senders.was_held_back(case.gid)
+            self._ended.setdefault(group, []).append((violation, kept))
+        self._note_alternating()
+        due = [group for group in self._ended if self._is_due((group, True), now)]
+        over = [Recovered(text) for group in due for text in _over(group, self._ended.pop(group))]
+        return [*over, *self._report_remaining(now)]
+
+    def _note_alternating(self) -> None:
+        """Note where others alternate than those that were named."""
+        for case in self.open.values():
+            if case.reported and case.violation.alternates:
+                gids = frozenset(gid for gid in self._gids_of(case) if gid)
+                if len(gids) > 1 and gids != case.named:
+                    self._note_left(case, case.named, gids)
+                    case.named = gids
+
+    def _note_left(
+        self, case: Case, before: Collection[bytes | None], gids: Collection[bytes | None]
+    ) -> None:
+        """Note that these publish the edge, and who did ``before``, where that is not the same."""
+        processes = {self._process_of(gid) for gid in gids}
+        ended = {self._process_of(gid): gid for gid in before}
+        is_new = case.violation.alternates and not processes <= ended.keys()
+        if is_new or not ended.keys() <= processes:
+            runs = self._left.setdefault(self._group(case), {}).setdefault(case.edge, [])
+            runs += [
+                where
+                for process, gid in ended.items()
+                if process not in processes and (where := self._senders.where(gid))
+            ]
+
+    def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
+        """Report who still publishes edges of which some publishers have ended, or others are there now."""
+        for group in [group for group in self._left if self._is_due((group, False), now)]:
+            left = self._left.pop(group)
+            rows = (c for c in self.open.values() if c.edge in left and self._group(c) == group)
+            cases = list({case.edge: case for case in rows if case.reported}.values())
+            if not cases:
+                continue
+            event = self._event(cases, now)
+            who = cases[0].violation.who
+            ended = dict.fromkeys(where for case in cases for where in left[case.edge])
+            notes = [Note(f"{who} has ended, which ran {where}") for where in ended]
+            found = replace(event.found, notes=(*event.found.notes, *notes))
+            yield Found(found, event.process if isinstance(event, Found) else "")
 
     def _has_ended(self, case: Case, now: float) -> bool:
-        if self._senders.is_present(case.gid) and not case.violation.is_of_stamps:
-            return not case.violation.static and now - case.last > OVER_WHILE_PRESENT_S
+        violation = case.violation
+        if violation.alternates and self._senders.is_sure(case.gid):
+            is_alone = len(self._gids_of(case)) < 2  # noqa: PLR2004 (two)
+            return now - case.last > (OVER_S if is_alone else OVER_WHILE_PRESENT_S)
+        if self._senders.is_present(case.gid) and not violation.is_of_stamps:
+            return not violation.static and now - case.last > OVER_WHILE_PRESENT_S
         return now - case.last > OVER_S
+
+    def wrong(self) -> Iterator[Finding]:
+        """Yield what was reported and is not over, as a finding for each edge and name."""
+        edges = {(self._group(c), c.edge): c for c in self.open.values() if c.reported}
+        for case in edges.values():
+            runs = [self._senders.where(gid) for gid in self._publishers([case])]
+            yield violation_finding([case.violation], self._plan, runs)
 
 
 def _over(group: Group, ended: list[tuple[Violation, bool]]) -> list[str]:
     """Return in words that these of one group are over, each with whether listeners keep what was latched."""
+    kept_by_edge: dict[tuple[str, str], tuple[Violation, bool]] = {}
+    for one, kept in ended:
+        edge = (one.parent, one.child)
+        kept_by_edge[edge] = (one, kept or kept_by_edge.get(edge, (one, False))[1])
+    ended = list(kept_by_edge.values())
     if group[0] == OTHER_ROBOT:
         kept = any(kept for _, kept in ended)
         return [ended[0][0].over(len(ended) - 1, kept=kept, who=group[1])]
@@ -346,6 +458,7 @@ class CaseMemory:
     static: bool
     is_planned: bool
     namesake: bool
+    alternates: bool
     loop: tuple[str, ...]
     detail: str
     gid: str | None
@@ -355,15 +468,16 @@ class CaseMemory:
         """Return what must be known of the case."""
         one = case.violation
         what = (one.code, one.parent, one.child, one.nodes, one.static, one.edge is not None)
-        return cls(
-            *what, one.namesake, one.loop, one.detail, None if case.gid is None else case.gid.hex()
-        )
+        how = (one.namesake, one.alternates, one.loop, one.detail)
+        return cls(*what, *how, None if case.gid is None else case.gid.hex())
 
     def case(self, planned: dict[str, PlanEdge], last: float) -> Case:
         """Return the case, as going on until then at least."""
         edge = planned.get(self.child) if self.is_planned else None
         what = (self.code, self.parent, self.child, self.nodes, self.static)
-        violation = Violation(*what, edge, self.namesake, self.loop, self.detail)
+        violation = Violation(
+            *what, edge, self.namesake, self.loop, self.detail, alternates=self.alternates
+        )
         return Case(
             violation,
             None if self.gid is None else bytes.fromhex(self.gid),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -34,6 +34,8 @@ _WARNINGS = frozenset({SELF, TWO_PUBLISHERS, stamps.REPEATED, stamps.BACK})
 #: Frames that were sent otherwise than expected, or were not expected.
 _OTHERWISE = frozenset({"TF802", "TF803"})
 LISTED_AT_MOST = 12
+#: So many publishers of one name have a note each.
+RUNS_AT_MOST = 50
 #: The publishers that a plan starts once and never again.
 _OWN = ("static", "joints")
 #: tf2's buffers keep moving edges for 10 s; one that did not come for so long closes no loop any
@@ -41,6 +43,8 @@ _OWN = ("static", "joints")
 KEPT_S = 10.0
 #: Of frames that nobody planned so many are remembered.
 MOST_FRAMES = 10_000
+#: Of one frame so many senders are remembered.
+MOST_SENDERS = 16
 #: Of one publisher's undeclared edges so many are judged; further ones are neither reported nor
 #: admitted.
 MOST_UNDECLARED = 1000
@@ -54,19 +58,17 @@ class Violation:
     """One edge that was published by a node that may not, or in a way that it may not.
 
     Attributes:
-        code: the finding's code.
-        parent: the frame in which the pose was given.
-        child: the frame whose pose it was.
-        nodes: the nodes of which one did it: a single one where the rmw says who sent a message,
-            none where the sender has no name.
-        static: whether it came on /tf_static.
-        edge: the planned edge of that child, None where nobody declared one.
-        namesake: whether the publisher has the owner's name and is not the owner.
-        loop: the frames of a loop that the edge closes.
-        detail: what was seen of stamps, or who the other publisher is.
-        recorded: whether it is from a recording, in which nobody has a name.
-        stranger: whether the publisher is seen to be of no process that the plan starts, whatever
-            its name.
+        code: the finding's code. parent: the frame in which the pose was given. child: the frame
+        whose pose it was. nodes: the nodes of which one did it: a single one where the rmw says
+        who sent a message, none where the sender
+            has no name.
+        static: whether it came on /tf_static. edge: the planned edge of that child, None where
+        nobody declared one. namesake: whether the publisher has the owner's name and is not the
+        owner. loop: the frames of a loop that the edge closes. detail: what was seen of stamps, or
+        who the other publisher is. recorded: whether it is from a recording, in which nobody has a
+        name. stranger: whether the publisher is seen to be of no process that the plan starts,
+        whatever its name. alternates: whether it is one of several with the owner's name that
+        send by turns, of which any may be the owner. publishers: how many do it.
     """
 
     code: str
@@ -80,6 +82,8 @@ class Violation:
     detail: str = ""
     recorded: bool = False
     stranger: bool = False
+    alternates: bool = False
+    publishers: int = 1
 
     @property
     def who(self) -> str:
@@ -87,11 +91,14 @@ class Violation:
         if len(self.nodes) > 1:
             return f"one of {', '.join(self.nodes)}"
         name = self.nodes[0] if self.nodes else "somebody" if self.recorded else NAMELESS
-        return f"another {name}" if self.namesake else name
+        name = f"another {name}" if self.namesake else name
+        return f"{name} ({self.publishers} processes)" if self.publishers > 1 else name
 
     @property
     def whom(self) -> str:
         """The publisher, as the one to do something about: one without a name was named just before."""
+        if self.publishers > 1:
+            return "all but one of them" if self.alternates else "them"
         if (not self.nodes and not self.recorded and not self.namesake) or self.nodes == (
             NO_NODE,
         ):
@@ -158,22 +165,24 @@ def may_be_owners(
 
 
 def violation_finding(
-    found: Sequence[Violation],
+    violations: Sequence[Violation],
     plan: Plan,
-    where: str = "",
+    runs: Sequence[str] = (),
     driven: Driven | None = None,
     place: Span | None = None,
 ) -> Finding:
-    """Return the finding for violations of one kind by one node, that runs ``where`` and may drive a sensor.
+    """Return the finding for violations of one kind by publishers of one name, which may drive a sensor.
 
-    ``place`` is where the edge is in the robot's file, if that is at hand.
+    ``runs`` says of each of the publishers where it runs, empty where that is not known; ``place``
+    is where the edge is in the robot's file, if that is at hand.
     """
+    found = _by_edge(violations, runs)
     first = found[0]
     mild = first.code in _WARNINGS or (
         first.code == "TF803" and plan.guard.unknown_edges == "warn"
     )
     severity: Severity = "warning" if mild else "error"
-    notes = [*_others(found), *([] if place else _declared(first)), *_runs(first, where)]
+    notes = [*_others(found), *([] if place else _declared(first)), *_runs(first, runs)]
     message = _unexpected_frames(first, _more(found), driven) or _message(found, plan)
     advice = (
         _driver_help(first, driven)
@@ -183,8 +192,9 @@ def violation_finding(
     return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
 
 
-def taken_finding(found: Sequence[Violation], where: str = "") -> Finding:
-    """Return the finding for edges that a node, that runs ``where``, published before the start."""
+def taken_finding(violations: Sequence[Violation], runs: Sequence[str] = ()) -> Finding:
+    """Return the finding for edges that publishers of one name, which run there, published before the start."""
+    found = _by_edge(violations, runs)
     first = found[0]
     message = (
         f"{first.name}{_more(found)} {'are' if len(found) > 1 else 'is'} already published by"
@@ -195,7 +205,7 @@ def taken_finding(found: Sequence[Violation], where: str = "") -> Finding:
         message += " or ".join((first.edge.parent, *first.edge.switched))
     if first.loop:
         message += f", which closes the loop {tree.way(first.loop)}"
-    notes = [*_others(found), *_declared(first), *_runs(first, where)]
+    notes = [*_others(found), *_declared(first), *_runs(first, runs)]
     advice = f"end {first.whom}"
     if first.namesake:
         advice += ": is the robot running already?"
@@ -367,7 +377,13 @@ def _help_about(first: Violation, plan: Plan) -> str:
         component = plan.process(process).component
         which = f", a component of {component.container}," if component else ""
         return f"let {first.who}{which} leave {first.child} out{owns}"
-    return f"end {first.whom}, or switch its TF off; tf2 takes whatever came last"
+    if first.nodes == (NO_NODE,):
+        return (
+            f"end {first.whom}, or start it with another DDS domain: ss -lunp lists the programs"
+            " that use UDP ports of DDS, which begin at 7400"
+        )
+    its = "their" if first.publishers > 1 else "its"
+    return f"end {first.whom}, or switch {its} TF off; tf2 takes whatever came last"
 
 
 def _run_by(first: Violation, plan: Plan) -> str:
@@ -419,26 +435,47 @@ def _declared(first: Violation) -> list[Note]:
     return [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")] if edge else []
 
 
-def _runs(first: Violation, where: str) -> list[Note]:
-    return [Note(f"{first.who} runs {where}")] if where and len(first.nodes) <= 1 else []
+def _by_edge(violations: Sequence[Violation], runs: Sequence[str]) -> list[Violation]:
+    """Return one violation for each edge, by as many publishers as ``runs`` has."""
+    edges = {(violation.parent, violation.child): violation for violation in violations}
+    # Each of two publishers of an edge is named with the other; of those that alternate one may be
+    # the owner.
+    is_pair = violations[0].code == TWO_PUBLISHERS
+    number = 1 if is_pair else max(1, len(runs) - violations[0].alternates)
+    return [replace(violation, publishers=number) for violation in edges.values()]
+
+
+def _runs(first: Violation, runs: Sequence[str]) -> list[Note]:
+    """Return a note for each publisher with where it runs."""
+    who = replace(first, publishers=1, namesake=first.namesake and not first.alternates).who
+    notes = [Note(f"{who} runs {where}") for where in runs if where and len(first.nodes) <= 1]
+    more = len(notes) - RUNS_AT_MOST
+    return [*notes[:RUNS_AT_MOST], Note(f"and {more} more")] if more > 0 else notes
 
 
 # Violations message by message.
 
 
 class LastSenders:
-    """Who sent each frame last, and before: tells two that alternate from one that was restarted."""
+    """Who sent each frame last, and before: tells those that alternate from one that was restarted."""
 
     def __init__(self) -> None:
-        self._gids: OrderedDict[str, tuple[bytes, bytes | None]] = OrderedDict()
+        self._gids: OrderedDict[str, tuple[bytes, ...]] = OrderedDict()
 
-    def take(self, child: str, gid: bytes) -> tuple[bytes, bytes | None]:
-        """Note that this publisher sent the frame now; return the current one until now, and the one before it."""
-        current, before = self._gids.get(child, (gid, None))
-        self._gids[child] = (gid, before if current == gid else current)
+    def take(self, child: str, gid: bytes) -> tuple[bytes, bool]:
+        """Note that this publisher sent the frame now; return the current one until now, and whether ``gid`` is back.
+
+        It is where it has sent the frame before, and another has since.
+        """
+        gids = self._gids.get(child, (gid,))
+        current = gids[-1]
+        if current == gid:
+            self._gids[child] = gids
+        else:
+            self._gids[child] = (*(other for other in gids if other != gid), gid)[-MOST_SENDERS:]
         if len(self._gids) > MOST_FRAMES:
             self._gids.popitem(last=False)
-        return current, before
+        return current, current != gid and gid in gids
 
     def forget(self, child: str) -> None:
         """Take whoever sends the frame next as the first."""
@@ -450,19 +487,16 @@ class LastSenders:
 
     def current(self, child: str) -> bytes | None:
         """Return who sent it last."""
-        return self._gids[child][0] if child in self._gids else None
+        return self._gids[child][-1] if child in self._gids else None
 
-    def memory(self) -> dict[str, tuple[str, str]]:
-        """Return what the next guard must know: by frame who sent it last, and who before, in hexadecimal."""
-        return {
-            child: (gid.hex(), before.hex() if before else "")
-            for child, (gid, before) in self._gids.items()
-        }
+    def memory(self) -> dict[str, tuple[str, ...]]:
+        """Return what the next guard must know: by frame who sent it, the last one last, in hexadecimal."""
+        return {child: tuple(gid.hex() for gid in gids) for child, gids in self._gids.items()}
 
-    def recall(self, memory: dict[str, tuple[str, str]]) -> None:
+    def recall(self, memory: dict[str, tuple[str, ...]]) -> None:
         """Know what the guard before knew."""
-        for child, (gid, before) in memory.items():
-            self._gids[child] = (bytes.fromhex(gid), bytes.fromhex(before) or None)
+        for child, gids in memory.items():
+            self._gids[child] = tuple(map(bytes.fromhex, gids))
 
 
 class KnownTree:
@@ -544,27 +578,19 @@ class OwnershipRules:
         edge = self.planned.get(sent.child)
         parent, child, static = sent.parent, sent.child, sent.static
         if parent == child:
-            return Violation(SELF, parent, child, nodes=nodes, static=static, edge=edge)
+            return Violation(SELF, parent, child, nodes, static, edge)
         if edge is None:
             return self._unplanned(sent, nodes, now)
         code = code_of(edge, parent, static=static, owner=edge.node in nodes, sure=len(nodes) == 1)
         loop = self._tree.loop(parent, child, now) if code == "TF802" else ()
-        namesake = code in {"", "TF809"} and self._is_namesake(edge, sent)
-        code = LOOP if loop else "TF801" if namesake else code
-        return (
-            Violation(
-                code,
-                parent,
-                child,
-                nodes=nodes,
-                static=static,
-                edge=edge,
-                namesake=namesake,
-                loop=loop,
-            )
-            if code
-            else None
-        )
+        may_be_owner = code in {"", "TF809"}
+        namesake = may_be_owner and self._is_namesake(edge, sent)
+        alternates = may_be_owner and not namesake and self._alternates(edge, sent)
+        code = LOOP if loop else "TF801" if namesake or alternates else code
+        if not code:
+            return None
+        found = Violation(code, parent, child, nodes, static, edge, namesake or alternates, loop)
+        return replace(found, alternates=True) if alternates else found
 
     def may_be_undeclared(self, parent: str, child: str) -> bool:
         """Return whether the plan lets somebody publish the edge though nobody declared it."""
@@ -579,46 +605,56 @@ class OwnershipRules:
         loop = self._tree.loop(parent, child, now)
         ours = any(self._tree.is_planned(*edge) for edge in pairwise(loop))
         if loop and (ours or undeclared):
-            return Violation(LOOP, parent, child, nodes=nodes, static=static, edge=None, loop=loop)
+            return Violation(LOOP, parent, child, nodes, static, None, loop=loop)
         if undeclared:
-            return Violation("TF803", parent, child, nodes=nodes, static=static, edge=None)
+            return Violation("TF803", parent, child, nodes, static, None)
         if sent.gid is None:
             return None
-        current, before = self._others.take(child, sent.gid)
+        current, is_back = self._others.take(child, sent.gid)
         self.changes += current != sent.gid
-        if not (current != sent.gid == before and self._senders.is_present(current)):
+        if not (is_back and self._senders.is_present(current)):
             return None
         named = self._senders.nodes(current, static=static)
         other = named[0] if len(named) == 1 else "another"
-        return Violation(
-            TWO_PUBLISHERS, parent, child, nodes=nodes, static=static, edge=None, detail=other
-        )
+        return Violation(TWO_PUBLISHERS, parent, child, nodes, static, None, detail=other)
 
     def _is_namesake(self, edge: PlanEdge, sent: SentEdge) -> bool:
-        """Return whether a publisher has the owner's name and is not the owner.
+        """Return whether a publisher has the owner's name and is surely not the owner.
 
         A process of this run proves by its environment which one it is: where the plan starts the
         owner, no other process is it, and nobody else while it is there itself. Without proof it
-        is another where it spoke before the start; where two alternate: A, B, and A again; and
-        where tfcompose's own publisher, which is never restarted, is there twice.
+        is another where it spoke before the start, and where tfcompose's own publisher, which is
+        never restarted, is there already.
         """
         gid, sender, start = sent.gid, self._senders.sender(sent.gid), self._start
-        if gid is None or sender is None:
+        if gid is None or sender is None or not self.started.get(edge.owner, False):
             return False
-        proven = ""
-        if self.started.get(edge.owner, False):
-            proven = self._senders.process(gid)
-            if proven != edge.owner:
-                early = start.cleared is None or sender.first_ns < start.cleared_ns
-                shown = self._senders.shows_process(edge.owner, edge.node, static=sent.static)
-                if proven or early or (shown and self._senders.is_sure(gid)):
-                    return True
-        current, before = self.owners.take(edge.child, gid)
+        proven = self._senders.process(gid)
+        if proven != edge.owner:
+            early = start.cleared is None or sender.first_ns < start.cleared_ns
+            shown = self._senders.shows_process(edge.owner, edge.node, static=sent.static)
+            if proven or early or (shown and self._senders.is_sure(gid)):
+                return True
+        current = self.owners.current(edge.child)
+        if edge.owner not in _OWN or current in {None, gid}:
+            return False
+        is_proven = bool(proven) and self._senders.process(current) != proven
+        return self._senders.is_present(current) and not is_proven
+
+    def _alternates(self, edge: PlanEdge, sent: SentEdge) -> bool:
+        """Return whether several with the owner's name send the edge by turns: A, B, and A again.
+
+        Any of them may be the owner, unless one has proven that it is. Fixed edges come again
+        whenever a subscription is made anew.
+        """
+        gid = sent.gid
+        if gid is None or self._senders.sender(gid) is None:
+            return False
+        current, is_back = self.owners.take(edge.child, gid)
         if current == gid:
             return False
         self.changes += 1
+        proven = self._senders.process(gid) if self.started.get(edge.owner, False) else ""
         if proven and self._senders.process(current) != proven:
             return False
-        return (before == gid and not sent.static) or (
-            edge.owner in _OWN and self._senders.is_present(current)
-        )
+        return is_back and not sent.static

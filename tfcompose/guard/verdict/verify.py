@@ -357,19 +357,18 @@ def _key(one: Difference) -> tuple[object, ...]:
 
 def _violation_finding(group: Group, state: TreeState, plan: Plan, place: Span | None) -> Finding:
     violations = [one.violation for one in group if one.violation is not None]
-    first = group[0]
-    where = state.where(first.live) if first.live else ""
+    runs = dict.fromkeys(state.where(one.live) for one in group if one.live)
     found = violation_finding(
-        violations, plan, where, sensor_of(violations[0], drives_of(plan)), place
+        violations, plan, list(runs), sensor_of(violations[0], drives_of(plan)), place
     )
     found = replace(found, notes=(*found.notes, *_elsewhere(group)))
     if not violations[0].namesake:
         return found
-    gid = first.live.stream.gid if first.live else None
+    gids = {one.live.stream.gid for one in group if one.live}
     others = [
         one
         for one in state.publishers
-        if one.node in violations[0].nodes and one.gid != gid and one.where
+        if one.node in violations[0].nodes and one.gid not in gids and one.where
     ]
     notes = [Note(f"{one.node} runs {one.where}") for one in others]
     return replace(found, notes=(*found.notes, *dict.fromkeys(notes)))

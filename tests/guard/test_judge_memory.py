@@ -44,7 +44,7 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(
         }
         for who, pause in sends:
             if forgets:
-                running.judge._verdicts._verdicts.clear()
+                running.judge.ledger._judged.clear()
             running.send(*senders[who]).wait(pause)
         running.wait(1)
         reports.append(running.events)

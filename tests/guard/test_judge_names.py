@@ -560,17 +560,27 @@ def test_the_publishers_of_one_process_are_one(running: History) -> None:
     assert (running.over(), len(running.found())) == ([], 1)
 
 
-def test_who_remains_is_known_to_the_guard_that_follows(running: History) -> None:
-    slam = running.joins("/slam", process="slam", pid=10)
-    rogues = [running.joins("/slam", process="", pid=pid) for pid in (11, 12)]
-    send_all(running, [slam, *rogues], "map odom", 2.0)
-    assert pids_of(running.only()) == [11, 12]
+@pytest.mark.parametrize(("owner", "process"), [("slam", "slam"), ("drive", None)])
+def test_who_remains_is_known_to_the_guard_that_follows(
+    running: History, owner: str, process: str | None
+) -> None:
+    """It finds them one after the other."""
+    edges = {"slam": "map odom", "drive": "odom base"}[owner]
+    own = running.joins(f"/{owner}", process=process, pid=10)
+    rogues = [running.joins(f"/{owner}", process="", pid=pid) for pid in (11, 12)]
+    there, anybody = [own, *rogues], [10] if process is None else []
+    send_all(running, there, edges, 2.0)
+    assert pids_of(running.found()[-1]) == [*anybody, 11, 12]
+    running.graph.clear()
     running.dies()
-    send_all(running, [slam, *rogues], "map odom", 10.0)
+    for publisher in there:
+        running.graph.append(publisher)
+        send_all(running, there, edges, 1.0)
+    send_all(running, there, edges, 10.0)
     assert running.found() == []
     running.leaves(rogues[0])
-    send_all(running, [slam, rogues[1]], "map odom", 10.0)
-    assert pids_of(running.only()) == [12]
+    send_all(running, [own, rogues[1]], edges, 10.0)
+    assert pids_of(running.only()) == [*anybody, 12]
     assert running.over() == []
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
-from tfcompose.guard.judge import MOST_VERDICT_EDGES, Judge
-from tfcompose.guard.verdict.ownership import MOST_UNDECLARED
+from tfcompose.guard.judge import Judge
+from tfcompose.guard.ledger import MOST_UNDECLARED, MOST_VERDICT_EDGES
 from tfcompose.model.messages import Found, Taken
 from tfcompose.model.plan import EdgePattern, GuardPolicy, Plan, RosSettings
 from tfcompose.tf.live.publishers import Publisher
@@ -254,10 +254,9 @@ def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:
     running.check()
     for number in range(60):
         running.send(rogue, flood_of(500, number * 500)).wait(0.1)
-    assert len(running.judge.cases.open) <= MOST_UNDECLARED + len(EDGES) + 500
-    assert (
-        sum(len(edges) for _, _, edges in running.judge._verdicts._verdicts) <= MOST_VERDICT_EDGES
-    )
+    assert len(running.judge.ledger.entries) <= MOST_UNDECLARED + len(EDGES) + 500
+    judged = running.judge.ledger._judged
+    assert sum(len(edges) for _, _, edges in judged) <= MOST_VERDICT_EDGES
     assert [one.code for one in running.found()].count("TF853") == 1
 
 

@@ -134,8 +134,9 @@ class History:
     ) -> Publisher:
         """Let a publisher come; one that is hidden is not in the graph yet.
 
-        ``pid`` is its process's number, where that can be seen. ``process`` is the plan's process that it is seen to be of, empty: one that is not of this
-        run; None: its process cannot be seen.
+        ``pid`` is its process's number, where that can be seen. ``process`` is the plan's process
+        that it is seen to be of, empty: one that is not of this run; None: its process cannot be
+        seen.
         """
         self.made += 1
         ours = None if process is None else bool(process)

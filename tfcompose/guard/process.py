@@ -28,8 +28,8 @@ from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.flood import WAIT_S, FloodReader
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
+from tfcompose.guard.ledger import MOST_UNDECLARED
 from tfcompose.guard.relay import Feedback, Relay
-from tfcompose.guard.verdict.ownership import MOST_UNDECLARED
 from tfcompose.model.messages import Clear, Complete
 from tfcompose.model.plan.codec import decode
 from tfcompose.model.plan.middleware import IMPLEMENTATIONS

@@ -13,7 +13,7 @@ from tests.support.guard_history import Publisher as Publishes
 from tfcompose.foundation.findings import Finding
 from tfcompose.guard.judge import Judge
 from tfcompose.guard.verdict.publishers import unfenced
-from tfcompose.model.messages import Clear, Found, Live, Recovered, Taken, Unfenced
+from tfcompose.model.messages import Clear, FindingShown, Live, Recovered, Taken, Unfenced
 from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import OtherRun, Publisher
 from tfcompose.tf.live.state import NAMELESS, NO_NODE
@@ -239,7 +239,7 @@ def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
         assert running.judge.admitted is None, "the owner's messages pass"
         running.send(other, edges).wait(0.1)
         assert running.judge.admitted == frozenset(), "the other's do not"
-    found = [event for event in running.events if isinstance(event, Found)]
+    found = [event for event in running.events if isinstance(event, FindingShown)]
     assert {one.found.code for one in found} == {"TF801"}
     assert {one.process for one in found} == ({"joints"} if process == "joints" else {""})
     expect(found[0].found, "TF801", f"another {node}")
@@ -353,7 +353,7 @@ def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped
     slam.ours, slam.process, slam.fenced = True, "slam", True
     renamed.ours, renamed.process, renamed.fenced = True, "drive", False
     running.check().send(slam, "map odom").send(renamed, "map odom").check()
-    found = [one.found.code for one in running.events if isinstance(one, (Found, Unfenced))]
+    found = [one.found.code for one in running.events if isinstance(one, (FindingShown, Unfenced))]
     assert found == ["TF801", "TF852"]
 
 

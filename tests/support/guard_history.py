@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
-from tfcompose.model.messages import Clear, Found, GuardEvent, Recovered, Taken, Unfenced
+from tfcompose.model.messages import Clear, FindingShown, GuardEvent, Recovered, Taken, Unfenced
 from tfcompose.model.plan import (
     GuardPolicy,
     Plan,
@@ -228,7 +228,9 @@ class History:
 
     @staticmethod
     def findings_in(events: Sequence[GuardEvent]) -> list[Finding]:
-        return [event.found for event in events if isinstance(event, (Found, Taken, Unfenced))]
+        return [
+            event.found for event in events if isinstance(event, (FindingShown, Taken, Unfenced))
+        ]
 
     def reports(self) -> list[str]:
         return [f"{one.code} {one.message}" for one in self.found()]

@@ -17,7 +17,7 @@ from tfcompose.guard.reports import PublisherReports
 from tfcompose.guard.verdict.drivers import SentPoses
 from tfcompose.guard.verdict.faults import Fault
 from tfcompose.guard.verdict.stamps import Clocks
-from tfcompose.model.messages import Clear, Found, GuardEvent
+from tfcompose.model.messages import Clear, FindingShown, GuardEvent
 from tfcompose.tf.live.publishers import SenderMemory, Senders
 
 if TYPE_CHECKING:
@@ -156,7 +156,11 @@ class Judge:
 
     def tick(self, now: float) -> list[GuardEvent]:
         """Return what the passing of time means."""
-        events = [*self._recheck(now), *self.ledger.report(now), *map(Found, self._sent.judge())]
+        events = [
+            *self._recheck(now),
+            *self.ledger.report(now),
+            *map(FindingShown, self._sent.judge()),
+        ]
         events += self._publishers.floods(self._senders, self.ledger.flooders, now)
         if self._start.cleared is not None:
             over = self.ledger.over(now)

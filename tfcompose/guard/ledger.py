@@ -23,7 +23,7 @@ from tfcompose.guard.verdict.drivers import drives_of
 from tfcompose.guard.verdict.faults import Fault, fault_finding, group_of
 from tfcompose.guard.verdict.ownership import code_of
 from tfcompose.guard.verdict.stamps import StampHistory
-from tfcompose.model.messages import Found, Recovered, Taken
+from tfcompose.model.messages import FindingShown, Recovered, Taken
 from tfcompose.tf.live.publishers import NAMELESS_S, PARTICIPANT
 
 if TYPE_CHECKING:
@@ -448,7 +448,7 @@ class Ledger:
     def _is_due(self, key: tuple[Group, bool], now: float) -> bool:
         return self._pace.is_due(key, now, grows=self._start.cleared is not None)
 
-    def _event(self, entries: Sequence[Entry], now: float) -> Found | Taken:
+    def _event(self, entries: Sequence[Entry], now: float) -> FindingShown | Taken:
         gid = entries[0].gid
         run, process = self._senders.run(gid), self._senders.process(gid)
         publishers = self._publishers(entries)
@@ -463,7 +463,7 @@ class Ledger:
         was_first = any(self._was_first(entry, now) for entry in entries)
         if run:
             found = faults.other_robot_finding(known, run, self._plan)
-            return Taken(found) if was_first else Found(found)
+            return Taken(found) if was_first else FindingShown(found)
         if was_first:
             return Taken(faults.taken_finding(group))
         found, first = fault_finding(group), known[0]
@@ -474,7 +474,7 @@ class Ledger:
         offender = process if process in self._stoppable and first.code in _STOPPED_FOR else ""
         if not offender and self._may_be_ours(first):
             notes += [Note("it is not proven which process did it: none is stopped")]
-        return Found(replace(found, notes=(*found.notes, *notes)), offender)
+        return FindingShown(replace(found, notes=(*found.notes, *notes)), offender)
 
     def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
         """Report who sends edges of which some publishers have ended, or others have come."""
@@ -492,7 +492,7 @@ class Ledger:
             ended = dict.fromkeys(where for ends in by_edge for where in left[ends])
             notes = [Note(f"{who} has ended, which ran {where}") for where in ended]
             found = replace(event.found, notes=(*event.found.notes, *notes))
-            yield Found(found, event.process if isinstance(event, Found) else "")
+            yield FindingShown(found, event.process if isinstance(event, FindingShown) else "")
 
     def _over_texts(self, group: Group) -> list[str]:
         robot = group[1] if group[0] == OTHER_ROBOT else ""

@@ -13,7 +13,7 @@ from tfcompose.guard.verdict.publishers import (
     unfenced,
     volatile_publisher,
 )
-from tfcompose.model.messages import Found, Unfenced
+from tfcompose.model.messages import FindingShown, Unfenced
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live.publishers import UNCOUNTED
 
@@ -103,7 +103,7 @@ class PublisherReports:
         """How much was reported."""
         return len(self._reported)
 
-    def wrong_settings(self, publishers: Sequence[Publisher]) -> list[Found]:
+    def wrong_settings(self, publishers: Sequence[Publisher]) -> list[FindingShown]:
         """Return the findings for those on the plan's topics whose quality of service no listener accepts."""
         return [
             found
@@ -158,7 +158,7 @@ class PublisherReports:
 
     def floods(
         self, senders: Senders, flooders: dict[bytes | None, Flood], now: float
-    ) -> list[Found]:
+    ) -> list[FindingShown]:
         """Return the findings for publishers of more undeclared edges than are judged; forget those that have left."""
         found = []
         for gid, one in list(flooders.items()):
@@ -172,7 +172,9 @@ class PublisherReports:
                 del flooders[gid]
         return found
 
-    def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[Found]:
+    def leaks(
+        self, publishers: Sequence[Publisher], topics: tuple[str, str]
+    ) -> list[FindingShown]:
         """Return the findings for the plan's nodes on the global topics, while its own (moving, static) are others."""
         inside = f"/{self._plan.ros.namespace.strip('/')}/"
         return [
@@ -184,7 +186,7 @@ class PublisherReports:
 
     def replaced(
         self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float
-    ) -> list[Found]:
+    ) -> list[FindingShown]:
         """Return the findings for nodes that sent latched messages before they were first heard.
 
         ``missing`` are names of fixed edges that did not come, by the node, of which others came.
@@ -210,10 +212,10 @@ class PublisherReports:
     def _is_known(self, code: str, one: Publisher) -> bool:
         return (code, one.gid) in self._reported
 
-    def _once(self, one: Publisher, found: Finding) -> list[Found]:
+    def _once(self, one: Publisher, found: Finding) -> list[FindingShown]:
         if self._is_known(found.code, one):
             return []
         self._reported[found.code, one.gid] = None
         if len(self._reported) > MOST_REPORTED:
             del self._reported[next(iter(self._reported))]
-        return [Found(found)]
+        return [FindingShown(found)]

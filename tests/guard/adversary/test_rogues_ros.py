@@ -139,12 +139,16 @@ def test_of_ten_strangers_and_ten_namesakes_each_is_named(
 ) -> None:
     after = robot.lines()
     names = [*(f"rogue_{number}" for number in range(10)), *["slam"] * 10]
-    rogues = {rogue(node(name, OTHER_X, "map odom")).pid for name in names}
-    assert until(lambda: accused(robot, after) == rogues, 90), robot.output_after(after)
+    rogues = [rogue(node(name, OTHER_X, "map odom")) for name in names]
+    pids = {one.pid for one in rogues}
+    assert until(lambda: accused(robot, after) == pids, 90), robot.output_after(after)
     PlainListener().until("odom", OWNER_X)
     assert f"pid {robot.pid_of('slam')}:" not in robot.text, "the owner is not accused"
     guard = [line for line in robot.output_after(after).splitlines() if line.startswith("guard")]
     assert not [line for line in guard if "/slam" in line]
+    for one in rogues:
+        robot.stop(one)
+    robot.says("over", "map → odom", "another /slam", after=after)
 
 
 @of_each(*GUARDS)

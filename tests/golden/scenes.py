@@ -61,7 +61,7 @@ from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.files import Target
-from tfcompose.model.messages import Alive, Clear, Found, GateShut, Live, ProcessRequest
+from tfcompose.model.messages import Alive, Clear, FindingShown, GateShut, Live, ProcessRequest
 from tfcompose.model.plan import (
     Driven,
     EdgePattern,
@@ -546,9 +546,9 @@ def _machines() -> Iterator[Any]:
         yield hangs
     stops = GuardPolicy(on_violation="stop-offender")
     offender = begin(GUARD, STATIC, drive, SLAM, guard=stops).feed(
-        Clear(), Found(AN_EXAMPLE, "drive"), Found(AN_EXAMPLE, "slam")
+        Clear(), FindingShown(AN_EXAMPLE, "drive"), FindingShown(AN_EXAMPLE, "slam")
     )
-    yield offender.feed(Exited("slam", -2), Found(AN_EXAMPLE, "slam"))
+    yield offender.feed(Exited("slam", -2), FindingShown(AN_EXAMPLE, "slam"))
     lidar = PlanProcess("lidar", "run", nodes=("/lidar",))
     gates = {
         "topic": "/scan",

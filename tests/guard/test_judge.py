@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import FIXED, SETTLE_S, TICK_S, History, Publisher
-from tfcompose.model.messages import Clear, Complete, Found, Live, OwnerReady, Recovered
+from tfcompose.model.messages import Clear, Complete, FindingShown, Live, OwnerReady, Recovered
 from tfcompose.model.plan import EdgePattern, GuardPolicy
 
 
@@ -276,7 +276,7 @@ def test_of_who_has_new_frames_again_and_again_is_reported_ever_more_rarely_and_
         assert len(texts) < 20
         counted = [re.search(r"and (\d+) more", one) for one in texts]
         assert sum(1 + int(more[1]) if more else 1 for more in counted) == 600
-    found = [event.found for event in running.events if isinstance(event, Found)]
+    found = [event.found for event in running.events if isinstance(event, FindingShown)]
     assert "child: 'tag_*'}" in (found[-1].help or "")
     running.send(tracker, "base tag_600").wait(0.5)
     assert "base → tag_600" in running.reports()[-1], "after some quiet it is told at once again"

@@ -10,7 +10,7 @@ from tests.support.findings import expect
 from tests.support.guard_history import EDGES, FIXED, History, edge, wall
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.diagnostics import statuses
-from tfcompose.model.messages import Clear, Found, Live, Recovered
+from tfcompose.model.messages import Clear, FindingShown, Live, Recovered
 from tfcompose.model.plan import (
     EdgePattern,
     GuardPolicy,
@@ -44,7 +44,7 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(
         }
         for who, pause in sends:
             if forgets:
-                running.judge._verdicts._verdicts.clear()
+                running.judge.ledger._judged.clear()
             running.send(*senders[who]).wait(pause)
         running.wait(1)
         reports.append(running.events)
@@ -236,7 +236,7 @@ def test_only_a_process_that_is_proven_to_have_done_it_can_be_stopped_for_it(
     )
     running = History(GuardPolicy(on_violation="stop-offender"), processes).clear()
     running.repeat(running.joins("/slam", process=process), "odom base", 5)
-    (found,) = [event for event in running.events if isinstance(event, Found)]
+    (found,) = [event for event in running.events if isinstance(event, FindingShown)]
     assert (found.found.code, found.process) == ("TF801", stopped)
     assert bool(found.found.notes) is True
 
@@ -255,6 +255,6 @@ def test_an_owner_whose_node_has_another_name_is_advised_to_declare_it_and_not_t
     writer = Publisher(other.gid, "/other", static=False, ours=True, process=process)
     running.judge.graph([writer], running.now)
     (found,) = running.judge.tick(running.now + 0.2)
-    assert isinstance(found, Found)
+    assert isinstance(found, FindingShown)
     assert (found.found.code, "node: /other" in found.found.help) == ("TF801", ours)
     assert found.found.help.startswith("end /other") is not ours

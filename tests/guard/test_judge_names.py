@@ -1,18 +1,25 @@
 """Whom the guard names: names that come late, two of one name, ids that do not say whose they are."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import pytest
 
-from tests.support.findings import expect
+from tests.support.findings import expect, words_of
 from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History, edge
+from tests.support.guard_history import Publisher as Publishes
+from tfcompose.foundation.findings import Finding
 from tfcompose.guard.judge import Judge
 from tfcompose.guard.verdict.publishers import unfenced
-from tfcompose.model.messages import Clear, Found, Live, Recovered, Taken, Unfenced
-from tfcompose.model.plan import GuardPolicy, Plan, RosSettings
+from tfcompose.model.messages import Clear, FindingShown, Live, Recovered, Taken, Unfenced
+from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import OtherRun, Publisher
 from tfcompose.tf.live.state import NAMELESS, NO_NODE
 from tfcompose.tf.live.topics import Identity, RunMarks
+
+GuardMode = Literal["watch", "strict"]
 
 
 def test_a_publisher_whose_name_comes_later_is_judged_when_it_is_known(running: History) -> None:
@@ -232,7 +239,7 @@ def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
         assert running.judge.admitted is None, "the owner's messages pass"
         running.send(other, edges).wait(0.1)
         assert running.judge.admitted == frozenset(), "the other's do not"
-    found = [event for event in running.events if isinstance(event, Found)]
+    found = [event for event in running.events if isinstance(event, FindingShown)]
     assert {one.found.code for one in found} == {"TF801"}
     assert {one.process for one in found} == ({"joints"} if process == "joints" else {""})
     expect(found[0].found, "TF801", f"another {node}")
@@ -361,7 +368,7 @@ def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped
     slam.ours, slam.process, slam.fenced = True, "slam", True
     renamed.ours, renamed.process, renamed.fenced = True, "drive", False
     running.check().send(slam, "map odom").send(renamed, "map odom").check()
-    found = [one.found.code for one in running.events if isinstance(one, (Found, Unfenced))]
+    found = [one.found.code for one in running.events if isinstance(one, (FindingShown, Unfenced))]
     assert found == ["TF801", "TF852"]
 
 
@@ -460,3 +467,152 @@ def test_the_environment_of_another_robots_process_says_whose_run_it_is() -> Non
     ]
     for environments in unsure:
         assert marks.identify(environments).run is None
+
+
+# Several of one name: each is named by its process.
+
+
+def pids_of(found: Finding) -> list[int]:
+    """Return the processes that a finding says to run, in order."""
+    runs = (re.search(r" runs on this machine as pid (\d+)", one.message) for one in found.notes)
+    return sorted(int(match[1]) for match in runs if match)
+
+
+def send_all(
+    running: History, publishers: Sequence[Publishes], edges: str, seconds: float
+) -> None:
+    """Let all of them send, by turns, each ten times a second."""
+    for _ in range(round(seconds / 0.1)):
+        for publisher in publishers:
+            running.send(publisher, edges)
+        running.wait(0.1)
+
+
+@pytest.mark.parametrize("mode", ["watch", "strict"])
+@pytest.mark.parametrize("owner", ["slam", "drive"])
+def test_each_of_three_with_the_owners_name_is_named_and_who_remains_when_one_ends(
+    mode: GuardMode, owner: str
+) -> None:
+    """The plan starts slam, whose processes prove that; of drive, which is external, any may be it."""
+    running = History(GuardPolicy(mode=mode)).clear()
+    edges = {"slam": "map odom", "drive": "odom base"}[owner]
+    process = owner if owner == "slam" else None
+    own = running.joins(f"/{owner}", process=process, pid=10)
+    send_all(running, [own], edges, 1.0)
+    namesakes = [running.joins(f"/{owner}", process="", pid=pid) for pid in (11, 12, 13)]
+    present = [own, *namesakes]
+    anybody = [10] if owner == "drive" else []
+    send_all(running, present, edges, 2.0)
+    assert pids_of(running.found()[-1]) == [*anybody, 11, 12, 13]
+    for ended, remaining in ((12, [11, 13]), (11, [13])):
+        before = len(running.events)
+        one = next(one for one in present if one.pid == ended)
+        running.leaves(one)
+        present.remove(one)
+        send_all(running, present, edges, 10.0)
+        new = History.findings_in(running.events[before:])
+        assert [pids_of(found) for found in new] == [[*anybody, *remaining]]
+        expect(new[0], "TF801", f"another /{owner}", f"pid {ended}")
+    assert running.over() == []
+    running.leaves(namesakes[2])
+    before = len(running.found())
+    send_all(running, [own], edges, 5.0)
+    assert (len(running.over()), len(running.found())) == (1, before)
+
+
+@pytest.mark.parametrize("mode", ["watch", "strict"])
+def test_of_ten_strangers_and_ten_namesakes_each_is_named(mode: GuardMode) -> None:
+    running = History(GuardPolicy(mode=mode)).clear()
+    slam = running.joins("/slam", process="slam", pid=10)
+    rogues = [running.joins(f"/rogue_{pid}", process="", pid=pid) for pid in range(20, 30)]
+    rogues += [running.joins("/slam", process="", pid=pid) for pid in range(30, 40)]
+    send_all(running, [slam, *rogues], "map odom", 2.0)
+    found = running.found()
+    assert sorted(pid for one in found for pid in pids_of(one)) == list(range(20, 40))
+    assert len(found) == 11
+    assert {pid for one in running.judge.wrong() for pid in pids_of(one)} == {*range(20, 40)}
+
+
+def test_namesakes_that_come_one_after_the_other_are_all_named_in_the_end(
+    running: History,
+) -> None:
+    slam = running.joins("/slam", process="slam", pid=10)
+    there = [slam]
+    for pid in range(30, 40):
+        there.append(running.joins("/slam", process="", pid=pid))
+        send_all(running, there, "map odom", 0.5)
+    send_all(running, there, "map odom", 20.0)
+    assert pids_of(running.found()[-1]) == list(range(30, 40))
+    assert len(running.found()) < 10, "they are collected"
+    assert running.over() == []
+
+
+def test_an_edge_is_over_when_nobody_of_that_name_sends_it_and_others_are_not(
+    running: History,
+) -> None:
+    one, other = (running.joins("/rogue", process="", pid=pid) for pid in (11, 12))
+    for _ in range(10):
+        running.send(one, "map odom").send(other, "map odom, odom base").wait(0.1)
+    assert [pids_of(found) for found in running.found()] == [[11, 12]]
+    running.leaves(other)
+    send_all(running, [one], "map odom", 5.0)
+    (over,) = running.over()
+    assert words_of(over) >= {"odom", "base", "/rogue"}
+    assert "map" not in words_of(over)
+    expect(running.found()[-1], "TF801", "map → odom", "pid 12")
+    assert pids_of(running.found()[-1]) == [11]
+
+
+def test_the_publishers_of_one_process_are_one(running: History) -> None:
+    moving, fixed = (
+        running.joins("/rogue", static=static, process="", pid=11) for static in (False, True)
+    )
+    running.send(fixed, "base lidar").repeat(moving, "base lidar", 5)
+    (found,) = running.found()
+    assert pids_of(found) == [11]
+    running.leaves(fixed)
+    running.repeat(moving, "base lidar", 50)
+    assert (running.over(), len(running.found())) == ([], 1)
+
+
+@pytest.mark.parametrize(("owner", "process"), [("slam", "slam"), ("drive", None)])
+def test_who_remains_is_known_to_the_guard_that_follows(
+    running: History, owner: str, process: str | None
+) -> None:
+    """It finds them one after the other."""
+    edges = {"slam": "map odom", "drive": "odom base"}[owner]
+    own = running.joins(f"/{owner}", process=process, pid=10)
+    rogues = [running.joins(f"/{owner}", process="", pid=pid) for pid in (11, 12)]
+    there, anybody = [own, *rogues], [10] if process is None else []
+    send_all(running, there, edges, 2.0)
+    assert pids_of(running.found()[-1]) == [*anybody, 11, 12]
+    running.graph.clear()
+    running.dies()
+    for publisher in there:
+        running.graph.append(publisher)
+        send_all(running, there, edges, 1.0)
+    send_all(running, there, edges, 10.0)
+    assert running.found() == []
+    running.leaves(rogues[0])
+    send_all(running, [own, rogues[1]], edges, 10.0)
+    assert pids_of(running.only()) == [*anybody, 12]
+    assert running.over() == []
+
+
+def test_a_stranger_that_is_started_again_and_again_is_not_reported_each_time(
+    running: History,
+) -> None:
+    for pid in range(100, 200):
+        rogue = running.joins("/rogue", process="", pid=pid)
+        running.repeat(rogue, "map odom", 5).leaves(rogue)
+    assert 3 < len(running.found()) < 10
+
+
+def test_the_name_of_an_owner_is_not_given_to_who_is_not_its_process() -> None:
+    running = History(processes=(PlanProcess("slam", "run", nodes=("/slam",)),), edges=EDGES[:1])
+    for process, name in (("slam", "/slam"), ("", "another /slam"), (None, "/slam")):
+        slam = running.joins("/slam", process=process)
+        running.check()
+        assert running.judge.name_of(slam.gid) == name
+    child = running.joins("/slam", process="joints")
+    assert running.check().judge.name_of(child.gid) == "another /slam of joints"

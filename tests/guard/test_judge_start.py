@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tests.support.findings import expect
 from tests.support.guard_history import History
-from tfcompose.model.messages import Clear, Found, Taken
+from tfcompose.model.messages import Clear, FindingShown, Taken
 
 
 def test_a_planned_edge_that_is_published_before_the_start_is_taken_and_the_node_named(
@@ -50,9 +50,9 @@ def test_a_publisher_that_was_there_first_and_is_discovered_late_is_taken(
     rogue = running.joins("/rogue")
     rogue.sent = 5 * hertz
     running.wait(2).repeat(rogue, "map odom", hertz, every=1 / hertz)
-    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [
-        Taken
-    ]
+    assert [
+        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
+    ] == [Taken]
 
 
 def test_a_latched_message_from_before_the_start_is_taken_however_late_it_comes(
@@ -69,18 +69,18 @@ def test_a_publisher_that_began_after_the_start_is_found_within_a_second(
     rogue = running.joins("/rogue")
     rogue.sent = max(1, hertz // 5)
     running.wait(0.5).repeat(rogue, "map odom", round(0.9 * hertz), every=1 / hertz)
-    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [
-        Found
-    ]
+    assert [
+        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
+    ] == [FindingShown]
 
 
 def test_a_publisher_that_began_just_before_the_start_is_found_and_not_taken_for_first(
     running: History,
 ) -> None:
     running.send(running.joins("/rogue", static=True), "base lidar", ago=0.4).wait(1)
-    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [
-        Found
-    ]
+    assert [
+        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
+    ] == [FindingShown]
 
 
 def test_lost_messages_do_not_make_a_newcomer_one_that_was_first(running: History) -> None:
@@ -120,6 +120,6 @@ def test_jitter_and_a_hiccup_do_not_make_a_newcomer_one_that_was_first(
 
 def test_a_publisher_is_not_taken_for_first_long_after_the_start(running: History) -> None:
     running.wait(20).send(running.joins("/rogue", static=True), "base lidar", ago=60).wait(1)
-    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [
-        Found
-    ]
+    assert [
+        type(event) for event in running.events if isinstance(event, (FindingShown, Taken))
+    ] == [FindingShown]

@@ -7,9 +7,9 @@ import pytest
 
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
-from tfcompose.guard.judge import MOST_VERDICT_EDGES, Judge
-from tfcompose.guard.verdict.ownership import MOST_UNDECLARED
-from tfcompose.model.messages import Found, Taken
+from tfcompose.guard.judge import Judge
+from tfcompose.guard.ledger import MOST_UNDECLARED, MOST_VERDICT_EDGES
+from tfcompose.model.messages import FindingShown, Taken
 from tfcompose.model.plan import EdgePattern, GuardPolicy, Plan, RosSettings
 from tfcompose.tf.live.publishers import Publisher
 
@@ -92,7 +92,7 @@ def test_a_loop_is_reported_to_be_over_and_to_have_been_there_before_the_start(
     assert words_of(over) >= {"base", "map", "/rogue"}
     early = History()
     early.repeat(early.joins("/rogue"), "base map", 20)
-    assert early.all(Found) == []
+    assert early.all(FindingShown) == []
     assert isinstance(early.events[0], Taken)
     expect(early.only(), "TF807", "base → map", "/rogue", "map → odom → base → map")
 
@@ -138,7 +138,7 @@ def test_only_the_plans_own_nodes_leak_to_the_global_topic() -> None:
         for _ in range(3)
         for event in judge.leaks(writers, ("/rover/tf", "/rover/tf_static"))
     ]
-    first, second = [event.found for event in events if isinstance(event, Found)]
+    first, second = [event.found for event in events if isinstance(event, FindingShown)]
     expect(first, "TF827", "/rover/ekf", " /tf,", "/rover/tf")
     expect(second, "TF827", "/rover/static", " /tf_static,", "/rover/tf_static")
 
@@ -160,7 +160,7 @@ def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> Non
     running.repeat(running.joins("/slam", process="slam"), "odom base", 3)
     running.repeat(running.joins("/rogue", process=""), "base lidar", 3)
     running.repeat(running.joins("/drive", process=""), "base camera", 3)
-    found = [event for event in running.events if isinstance(event, Found)]
+    found = [event for event in running.events if isinstance(event, FindingShown)]
     assert [(event.found.code, event.process) for event in found] == [
         ("TF801", "slam"),
         ("TF801", ""),
@@ -254,10 +254,9 @@ def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:
     running.check()
     for number in range(60):
         running.send(rogue, flood_of(500, number * 500)).wait(0.1)
-    assert len(running.judge.cases.open) <= MOST_UNDECLARED + len(EDGES) + 500
-    assert (
-        sum(len(edges) for _, _, edges in running.judge._verdicts._verdicts) <= MOST_VERDICT_EDGES
-    )
+    assert len(running.judge.ledger.entries) <= MOST_UNDECLARED + len(EDGES) + 500
+    judged = running.judge.ledger._judged
+    assert sum(len(edges) for _, _, edges in judged) <= MOST_VERDICT_EDGES
     assert [one.code for one in running.found()].count("TF853") == 1
 
 

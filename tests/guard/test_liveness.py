@@ -16,7 +16,7 @@ from tfcompose.guard.liveness import Liveness
 from tfcompose.model.messages import (
     GUARD_EVENTS,
     Complete,
-    Found,
+    FindingShown,
     GuardEvent,
     Live,
     OwnerReady,
@@ -72,7 +72,7 @@ class History:
         )
 
     def found(self) -> list[Finding]:
-        return [event.found for event in self.events if isinstance(event, Found)]
+        return [event.found for event in self.events if isinstance(event, FindingShown)]
 
     def only(self) -> Finding:
         (found,) = self.found()
@@ -277,7 +277,7 @@ def test_jitter_and_checks_at_uneven_times_find_nothing(
             live.arrived(("odom",), now if pause > TICK_S else at)
             sent += 1
         if sent < len(times):
-            assert [event for event in live.judge(now) if isinstance(event, Found)] == []
+            assert [event for event in live.judge(now) if isinstance(event, FindingShown)] == []
 
 
 def test_a_latching_owner_that_leaves_the_graph_is_reported_once_with_its_edges_and_when_it_is_back(
@@ -291,7 +291,7 @@ def test_a_latching_owner_that_leaves_the_graph_is_reported_once_with_its_edges_
     live.arrived(("imu",), 1)
     assert live.static_writers(["/static", "/other"]) == []
     (found,) = live.static_writers(["/other"])
-    assert isinstance(found, Found)
+    assert isinstance(found, FindingShown)
     expect(found.found, "TF804", "static (/static)", "base → lidar, base → imu")
     assert live.static_writers([]) == []
     (back,) = live.static_writers(["/static"])

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
-from tests.support.guard_history import EDGES, PROCESSES
 from tfcompose.guard import relay
 from tfcompose.guard.relay import Feedback, Relay
-from tfcompose.model.plan import Plan, RosSettings
 from tfcompose.tf.live.publishers import Message, Publisher
 from tfcompose.tf.live.topics import TFData
 from tfcompose.tf.ros.node import Received
@@ -57,6 +55,9 @@ class Bus:
 
     def may_pass(self, gid: bytes) -> bool | None:
         return self.fenced.get(gid, True)
+
+    def where(self, gid: bytes) -> str:
+        return f"on this machine as pid 7: {gid.decode()}"
 
     def latched(self, topic: str = TOPICS[1]) -> list[set[tuple[str, str]]]:
         """Return the edges of the newest message of each latched publisher on the topic."""
@@ -117,10 +118,9 @@ class Passing:
     now: float = 100.0
 
     def __post_init__(self) -> None:
-        plan = Plan("rover", "0", "base", RosSettings(), EDGES, PROCESSES)
         node, graph = cast("Node", self.bus), cast("TFGraph", self.bus)
         feedback = None if self.remapped is None else Feedback(node, self.remapped, self.own)
-        self.relay = Relay(node, graph, plan, self.own, feedback)
+        self.relay = Relay(node, graph, self.own, feedback)
 
     def send(
         self, gid: bytes, edges: str, admitted: str | None = None, *, who: str = "/x", **more: Any
@@ -226,6 +226,21 @@ def test_what_comes_past_the_fence_or_from_nobody_that_is_known_is_not_passed_on
         pairs("base camera"),
         pairs("base lidar"),
     ]
+
+
+def test_a_publisher_from_which_nothing_is_passed_on_is_named_by_its_process_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Its node may have an owner's name, which would accuse the owner."""
+    running = Passing()
+    running.bus.fenced |= {SLAM: False, DRIVE: True}
+    running.send(DRIVE, "map odom", "", who="/slam", fenced=False)
+    assert not capsys.readouterr().out
+    for _ in range(3):
+        running.send(SLAM, "map odom", static=False, who="/slam")
+    log = capsys.readouterr().out
+    assert log.count("as pid 7: ") == len(log.splitlines()) == 1
+    assert "/slam" not in log
 
 
 def test_a_remapped_process_receives_the_rest_of_the_tree_and_nothing_of_its_own() -> None:

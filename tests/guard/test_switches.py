@@ -14,7 +14,7 @@ from tfcompose.guard import gates
 from tfcompose.guard.channel import SwitchMemory, recalled
 from tfcompose.guard.gates import Switches
 from tfcompose.guard.verdict.drivers import not_taken
-from tfcompose.model.messages import Found, GuardEvent, Remember
+from tfcompose.model.messages import FindingShown, GuardEvent, Remember
 from tfcompose.model.plan import Driven, Plan, PlanProcess, RosSettings
 from tfcompose.model.variables import MEMORY_FD
 
@@ -136,13 +136,13 @@ def test_a_guard_that_follows_one_that_died_tells_no_switch_twice(
     watch: Watch, left: Callable[[], dict[str, Any]]
 ) -> None:
     watch.run_for(10)
-    assert len(watch.all(Found)) == 1
+    assert len(watch.all(FindingShown)) == 1
     watch.follow(left())
     watch.reader.is_there = False  # it is found after a while
     watch.run_for(2)
     watch.reader.is_there = True
     watch.run_for(10)
-    assert (len(watch.all(Found)), watch.reader.requested) == (1, 1)
+    assert (len(watch.all(FindingShown)), watch.reader.requested) == (1, 1)
 
 
 def test_a_node_that_comes_back_after_the_guard_has_is_queried_anew(
@@ -155,4 +155,4 @@ def test_a_node_that_comes_back_after_the_guard_has_is_queried_anew(
     watch.run_for(2)
     watch.reader.is_there = True
     watch.run_for(10)
-    assert len(watch.all(Found)) == 2
+    assert len(watch.all(FindingShown)) == 2

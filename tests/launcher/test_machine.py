@@ -28,7 +28,7 @@ from tfcompose.model.messages import (
     Clear,
     Complete,
     Ended,
-    Found,
+    FindingShown,
     Live,
     Missing,
     OwnerLive,
@@ -304,10 +304,10 @@ def test_what_the_guard_finds_is_reported_with_the_seconds_since_the_start() -> 
 
 def test_a_violation_ends_everything_with_exit_1_where_the_policy_is_stop() -> None:
     history = begin(GUARD, STATIC, guard=GuardPolicy(on_violation="stop")).feed(
-        Clear(), Found(WARNING)
+        Clear(), FindingShown(WARNING)
     )
     assert history.killed == []
-    history.feed(Found(ERROR))
+    history.feed(FindingShown(ERROR))
     assert history.found() == [WARNING, ERROR]
     assert history.all(Stopping) == [Stopping("TF801 foreign_publisher")]
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
@@ -320,9 +320,9 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
     history = begin(GUARD, STATIC, run_process("slam", restart="always"), guard=policy).feed(
         Clear()
     )
-    history.feed(Found(WARNING, "slam"), Found(ERROR))
+    history.feed(FindingShown(WARNING, "slam"), FindingShown(ERROR))
     assert (history.killed, history.found()) == ([], [WARNING, ERROR])
-    history.feed(Found(ERROR, "slam"))
+    history.feed(FindingShown(ERROR, "slam"))
     assert history.killed == [("slam", SIGINT)]
     expect(history.found()[-1], "TF801", "slam is stopped")
     history.feed(Exited("slam", -SIGINT)).wait(60)
@@ -331,7 +331,12 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
         "stopped",
         None,
     )
-    expect(history.feed(Found(ERROR, "slam")).found()[-1], "TF801", "nothing is stopped", "slam")
+    expect(
+        history.feed(FindingShown(ERROR, "slam")).found()[-1],
+        "TF801",
+        "nothing is stopped",
+        "slam",
+    )
 
 
 def test_a_process_past_the_fence_is_stopped_where_violations_are_only_reported() -> None:
@@ -364,13 +369,13 @@ def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:
     history = begin(GUARD, DRIVE, STATIC, guard=GuardPolicy(on_violation="stop-offender")).feed(
         Clear()
     )
-    history.feed(Found(ERROR, "drive"))
+    history.feed(FindingShown(ERROR, "drive"))
     expect(history.found()[-1], "TF801", "nothing is stopped", "drive")
     assert history.killed == []
 
 
 def test_a_violation_is_only_shown_where_the_policy_is_report() -> None:
-    history = begin(GUARD, STATIC).feed(Clear(), Found(ERROR))
+    history = begin(GUARD, STATIC).feed(Clear(), FindingShown(ERROR))
     assert history.found() == [ERROR]
     assert (history.killed, history.exit_code) == ([], None)
 
@@ -455,7 +460,7 @@ def test_the_first_ctrl_c_while_a_failure_ends_everything_changes_nothing() -> N
 def test_what_the_guard_says_while_everything_stops_is_not_shown() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), Signalled(SIGINT))
     notices = len(history.notices)
-    history.feed(Found(ERROR), Taken(ERROR), Complete(1), Live("static", ("laser",)))
+    history.feed(FindingShown(ERROR), Taken(ERROR), Complete(1), Live("static", ("laser",)))
     assert history.notices[notices:] == []
     assert history.feed(Exited("static", 1), Exited("guard", 1)).exit_code == 0
     assert history.found() == []
@@ -487,12 +492,12 @@ def test_output_that_nobody_reads_any_more_ends_everything_with_exit_141() -> No
 
 
 def test_time_is_up_ends_with_0_when_the_tree_was_complete() -> None:
-    history = begin(GUARD, STATIC).feed(Clear(), Complete(1), Found(WARNING), TimeUp())
+    history = begin(GUARD, STATIC).feed(Clear(), Complete(1), FindingShown(WARNING), TimeUp())
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 0
 
 
 def test_time_is_up_ends_with_1_when_an_error_was_shown() -> None:
-    history = begin(GUARD, STATIC).feed(Clear(), Complete(1), Found(ERROR), TimeUp())
+    history = begin(GUARD, STATIC).feed(Clear(), Complete(1), FindingShown(ERROR), TimeUp())
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
 
 

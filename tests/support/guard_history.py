@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
-from tfcompose.model.messages import Clear, Found, GuardEvent, Recovered, Taken, Unfenced
+from tfcompose.model.messages import Clear, FindingShown, GuardEvent, Recovered, Taken, Unfenced
 from tfcompose.model.plan import (
     GuardPolicy,
     Plan,
@@ -23,6 +23,8 @@ from tfcompose.tf.live.publishers import Message, OtherRun
 from tfcompose.tf.live.publishers import Publisher as TFPublisher
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import Clock, EdgeKind
 
@@ -80,6 +82,7 @@ class Publisher:
     fenced: bool | None = None
     run: OtherRun | None = None
     profile: str = ""
+    pid: int | None = None
 
 
 @dataclass
@@ -119,7 +122,7 @@ class History:
     def wall_ns(self) -> int:
         return 1_700_000_000_000_000_000 + round(self.now * 1e9)
 
-    def joins(
+    def joins(  # noqa: PLR0913 (what a publisher can be, each with a default)
         self,
         node: str | None,
         *,
@@ -127,16 +130,20 @@ class History:
         volatile: bool = False,
         hidden: bool = False,
         process: str | None = None,
+        pid: int | None = None,
     ) -> Publisher:
         """Let a publisher come; one that is hidden is not in the graph yet.
 
-        ``process`` is the plan's process that it is seen to be of, empty: one that is not of this
-        run; None: its process cannot be seen.
+        ``pid`` is its process's number, where that can be seen. ``process`` is the plan's process
+        that it is seen to be of, empty: one that is not of this run; None: its process cannot be
+        seen.
         """
         self.made += 1
         ours = None if process is None else bool(process)
         gid = bytes([self.made]) * 16
-        publisher = Publisher(node, static, volatile, gid, ours=ours, process=process or "")
+        publisher = Publisher(
+            node, static, volatile, gid, ours=ours, process=process or "", pid=pid
+        )
         if not hidden:
             self.graph.append(publisher)
         return publisher
@@ -175,6 +182,7 @@ class History:
                 p.node,
                 p.static,
                 latched=not p.volatile,
+                where="" if p.pid is None else f"on this machine as pid {p.pid}: node.py",
                 ours=p.ours,
                 process=p.process,
                 fenced=p.fenced,
@@ -216,8 +224,12 @@ class History:
         return self
 
     def found(self) -> list[Finding]:
+        return self.findings_in(self.events)
+
+    @staticmethod
+    def findings_in(events: Sequence[GuardEvent]) -> list[Finding]:
         return [
-            event.found for event in self.events if isinstance(event, (Found, Taken, Unfenced))
+            event.found for event in events if isinstance(event, (FindingShown, Taken, Unfenced))
         ]
 
     def reports(self) -> list[str]:

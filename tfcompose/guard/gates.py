@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.text import listed
 from tfcompose.guard.judge import FINDING_S
 from tfcompose.guard.verdict.drivers import not_taken
-from tfcompose.model.messages import Found, Gate, GateOpen, GateShut
+from tfcompose.model.messages import FindingShown, Gate, GateOpen, GateShut
 from tfcompose.tf.process import say
 from tfcompose.tf.ros.graph import is_offered, services, writers
 
@@ -237,7 +237,7 @@ class Switches:
         else:
             one.done = True
             for wrong in not_taken(one.node, one.wanted, found, one.drives):
-                self._emit(Found(wrong))
+                self._emit(FindingShown(wrong))
 
 
 def _reader(node: Node, name: str, parameters: tuple[str, ...]) -> ParameterReader:

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.text import listed
 from tfcompose.guard.verdict.rates import left, silent, slow
-from tfcompose.model.messages import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
+from tfcompose.model.messages import (
+    Complete,
+    FindingShown,
+    GuardEvent,
+    Live,
+    OwnerReady,
+    Recovered,
+)
 from tfcompose.model.plan import SLOW_BELOW
 from tfcompose.tf.live.arrivals import Arrivals
 
@@ -367,7 +374,9 @@ class Liveness:
             edge = tracks[0].edge
             if edge.node not in nodes and owner not in self._gone:
                 self._gone.add(owner)
-                events.append(Found(left([edge for track in tracks for edge in track.edges])))
+                events.append(
+                    FindingShown(left([edge for track in tracks for edge in track.edges]))
+                )
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
                 events.append(Recovered(f"{owner} ({edge.node}) is back"))
@@ -381,9 +390,9 @@ def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
     named, are = listed([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
     match change:
         case "silent":
-            return Found(silent(edges, max(now - track.last for track in tracks)))
+            return FindingShown(silent(edges, max(now - track.last for track in tracks)))
         case "slow":
-            return Found(slow(edges, min(track.rate() or 0.0 for track in tracks)))
+            return FindingShown(slow(edges, min(track.rate() or 0.0 for track in tracks)))
         case "back":
             silence_s = now - min(track.silent_since for track in tracks)
             return Recovered(f"{named} {are} back after {silence_s:.1f} s")

@@ -29,8 +29,8 @@ from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.flood import WAIT_S, FloodReader
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
+from tfcompose.guard.ledger import MOST_UNDECLARED
 from tfcompose.guard.relay import Feedback, Relay
-from tfcompose.guard.verdict.ownership import MOST_UNDECLARED
 from tfcompose.model.messages import Clear, Complete
 from tfcompose.model.plan.codec import decode
 from tfcompose.model.plan.middleware import IMPLEMENTATIONS
@@ -98,9 +98,7 @@ class TopicWatch:
             node, topics, None if private is None else tuple(private.values()), ours=marks
         )
         feedback = None if private is None else Feedback(node, private, self.data.own)
-        self.relay = (
-            Relay(node, self._graph, judge.plan, self.data.own, feedback) if strict else None
-        )
+        self.relay = Relay(node, self._graph, self.data.own, feedback) if strict else None
         self.judge = judge
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None

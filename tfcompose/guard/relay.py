@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from tfcompose.model.plan import Plan
     from tfcompose.tf.live.publishers import Publisher
     from tfcompose.tf.live.topics import TFData, TFGraph
 
@@ -38,6 +37,8 @@ MOST_COUNTED = 1000
 NAMED_AT_MOST = 6
 #: So many messages with fixed edges wait for their senders' names.
 MOST_WAITING = 200
+#: So many publishers are named from which nothing is passed on.
+MOST_REFUSED = 100
 
 
 @dataclass(slots=True)
@@ -61,7 +62,6 @@ class Relay:
         self,
         node: Node,
         graph: TFGraph,
-        plan: Plan,
         own: set[bytes | None],
         feedback: Feedback | None = None,
     ) -> None:
@@ -72,7 +72,7 @@ class Relay:
         self._moving = TFPublisher(node, static=False, topic=graph.topics[0])
         own.add(self._moving.raw_gid)
         self._fixed: dict[bytes, _Latched] = {}
-        self._nodes = {name for process in plan.managed for name in process.nodes}
+        self._refused: dict[bytes, None] = {}
         self._finds_until = 0.0
         self.changes = 0
         self.waiting: list[tuple[TFData, Message]] = []
@@ -86,14 +86,24 @@ class Relay:
             self._feed(self._feedback, sent, message)  # everybody has it
             return
         gid = sent.received.gid
-        may_pass = False if gid is None else self._graph.may_pass(gid)
-        if gid is None or not sent.fenced or may_pass is False:
-            self._complain(who)  # it has reached everybody, or nobody knows whose it is
-            return
-        if not who or may_pass is None:
-            if message.static and len(self.waiting) < MOST_WAITING:
+        if gid is None or not sent.fenced:
+            return  # it has reached everybody, or nobody knows whose it is
+        match self._graph.may_pass(gid):
+            case True if who:
+                self._pass_admitted(gid, sent, message, admitted, who)
+            case False:
+                self._refuse(gid)
+            case _ if message.static and len(self.waiting) < MOST_WAITING:
                 self.waiting.append((sent, message))
-            return
+
+    def _pass_admitted(
+        self,
+        gid: bytes,
+        sent: TFData,
+        message: Message,
+        admitted: Collection[Edge] | None,
+        who: str,
+    ) -> None:
         if admitted is not None:
             self.held.count(message, admitted, who)
         elif not message.exact:
@@ -150,10 +160,14 @@ class Relay:
             return
         self._feedback.forget([source for source in others if source not in present])
 
-    def _complain(self, who: str) -> None:
-        if who in self._nodes:
-            self._nodes.discard(who)
-            say(f"{who} is not seen to be a process of this run: what it sends is not passed on")
+    def _refuse(self, gid: bytes) -> None:
+        """Say once of a publisher that nothing of it is passed on. Its node's name may be an owner's."""
+        if gid in self._refused or len(self._refused) >= MOST_REFUSED:
+            return
+        self._refused[gid] = None
+        where = self._graph.where(gid)
+        who = f"a publisher that runs {where}" if where else "a publisher of an unknown process"
+        say(f"nothing is passed on from {who}: it is not seen to be a process of this run")
 
     def _send(self, data: bytes, process: str) -> None:
         self._moving.publish(data)

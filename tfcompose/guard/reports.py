@@ -1,24 +1,10 @@
-"""What the guard reports, once: violations as cases, and publishers whose settings are wrong.
-
-A violation is reported together with others of its kind and node, and said to be over when it has
-ended.
-"""
+"""Reports of publishers that listeners do not receive, and the pace of reports."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-from tfcompose.foundation.findings import Note
-from tfcompose.guard.verdict.drivers import drives_of
-from tfcompose.guard.verdict.ownership import (
-    Violation,
-    misnamed_help,
-    other_robot_finding,
-    sensor_of,
-    taken_finding,
-    violation_finding,
-)
 from tfcompose.guard.verdict.publishers import (
     best_effort_publisher,
     flood,
@@ -28,350 +14,53 @@ from tfcompose.guard.verdict.publishers import (
     unmarked,
     volatile_publisher,
 )
-from tfcompose.model.messages import Found, GuardEvent, Recovered, Taken, Unfenced
+from tfcompose.model.messages import FindingShown, Unfenced
 from tfcompose.model.plan.topics import GLOBAL
-from tfcompose.tf.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
-from tfcompose.tf.live.state import NAMELESS
+from tfcompose.tf.live.publishers import UNCOUNTED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.guard.verdict.ownership import Start
-    from tfcompose.model.plan import Plan, PlanEdge
+    from tfcompose.model.plan import Plan
     from tfcompose.tf.live.publishers import Publisher, Senders
 
-#: For how long after the start a publisher can turn out to have been there first, and by how much
-#: it must have been.
-FIRST_S = 15.0
-FIRST_BY_NS = 500_000_000
-#: How long messages are waited for that tell from their count when a publisher began.
-COUNTING_S = 0.7
-#: A violation is over when its publisher has left and nothing came for so long, or for longer from
-#: one that stays.
-OVER_S = 3.0
-OVER_WHILE_PRESENT_S = 30.0
-#: Further edges of an offender that was just reported are collected for so long, and for longer
-#: while more come and come: who names frames after what it tracks has new ones each second.
+Key = TypeVar("Key")
+#: How long further reports of one kind are collected after one; longer while more come and come:
+#: a tracker that names frames after what it tracks has new ones each second.
 COLLECTED_S = 0.5
 COLLECTED_AT_MOST_S = 60.0
-#: Of so many publishers, and groups of cases, it is known that they were reported.
+#: The most publishers, and kinds of reports, that are remembered as reported.
 MOST_REPORTED = 2000
-#: So long a flood is counted before it is reported, in seconds.
+#: How long a flood is counted before it is reported, in seconds.
 FLOOD_COUNTED_S = 1.0
-#: So many edges have a line each when they are over; more are reported in one.
-OVER_IN_LINES = 3
 #: So long after it was first heard, an owner's latched message is surely all that is left of those
 #: before, in seconds.
 ALL_HEARD_S = 2.0
-#: What a publisher can do before the start that keeps the plan from starting.
-_TAKES = frozenset({"TF801", "TF802", "TF820"})
-#: What becomes of it in a strict plan, by whether it is behind the fence.
-_FATE = {
-    True: "held back: no listener receives it",
-    False: "not fenced off, so it cannot be held back: listeners receive it",
-    None: "whether it is fenced off is unknown; if it is, it is held back",
-}
-#: So long a strict guard waits until it knows whether listeners get it, in seconds.
-FATE_S = 0.3
-#: Violations that ``stop-offender`` ends: who commits them breaks the tree.
-_STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
-
-#: So long what a publisher past the fence sends is waited for, so that it is reported before that
-#: is stopped.
+#: How long messages of a publisher past the fence are waited for, so that they are reported before
+#: it is stopped.
 UNFENCED_SILENT_S = 0.5
 _UNFENCED = "TF852"
 
-#: All that another robot publishes is one finding.
-OTHER_ROBOT = "TF854"
 
-Key = tuple[str, str, str, str]
-#: Code and node, and whether it is about the end.
-Group = tuple[str, str, bool]
+class Pace(Generic[Key]):
+    """When reports of each kind are due: the more often one is, the longer the next ones wait."""
 
+    def __init__(self) -> None:
+        self._reported: dict[Key, tuple[float, float]] = {}
 
-@dataclass(slots=True)
-class Case:
-    """A violation, observed first at ``since`` and last at ``last``, and whether it was ``reported``."""
-
-    violation: Violation
-    gid: bytes | None
-    since: float
-    last: float
-    reported: bool = False
-
-
-class Cases:
-    """All violations that are not over; ``changes`` counts the reports."""
-
-    def __init__(self, plan: Plan, senders: Senders, start: Start) -> None:
-        self.open: dict[Key, Case] = {}
-        self.changes = 0
-        self._plan = plan
-        self._senders = senders
-        self._start = start
-        self._drives = drives_of(plan)
-        self._reported: dict[Group, tuple[float, float]] = {}
-        self._ended: dict[Group, list[tuple[Violation, bool]]] = {}
-        started = [
-            process for process in plan.processes if process.kind not in {"external", "guard"}
-        ]
-        self._started = {process.name for process in started}
-        self._nodes = {node for process in started for node in process.nodes}
-
-    def note(self, violation: Violation, gid: bytes | None, now: float) -> Case:
-        """Note that the violation is observed now."""
-        key = self._key(violation, gid)
-        case = self.open.setdefault(key, Case(violation, gid, now, now))
-        case.gid, case.last = gid, now
-        if violation.nodes:  # what was blamed on nobody has a name now
-            self.open.pop((violation.code, violation.parent, violation.child, NAMELESS), None)
-        return case
-
-    def _key(self, violation: Violation, gid: bytes | None) -> Key:
-        """Return what the case is known by; where ids do not say whose, who may have done it changes all the time."""
-        who = violation.who if self._senders.is_sure(gid) else ""
-        return (violation.code, violation.parent, violation.child, who)
-
-    def undeclared(self, gid: bytes | None) -> int:
-        """Return how many cases there are about edges of a publisher that nobody declared."""
-        return sum(case.gid == gid and case.violation.edge is None for case in self.open.values())
-
-    @property
-    def unreported(self) -> bool:
-        """Whether there is something that was not reported yet."""
-        return not all(case.reported for case in self.open.values())
-
-    def report(self, now: float, *, at_once: bytes | None = None) -> list[GuardEvent]:
-        """Report new cases, those of one kind and node in one finding.
-
-        With ``at_once`` they are that publisher's, also those of which more may come to be known.
-        """
-        grouped: dict[Group, list[Case]] = {}
-        for case in self._ripe(now) if at_once is None else self._new(at_once):
-            grouped.setdefault((*self._group(case), False), []).append(case)
-        events: list[GuardEvent] = []
-        for group, cases in grouped.items():
-            if not self._is_due(group, now):
-                continue
-            self.changes += 1
-            if group[0] != OTHER_ROBOT or not self._is_reported(group[1], now, cases):
-                events.append(self._event(cases, now))
-            for case in cases:
-                case.reported = True
-        return events
-
-    def _group(self, case: Case) -> tuple[str, str]:
-        """Return with what a case is reported: its code and node, or the robot whose run the publisher is of."""
-        run = self._senders.run(case.gid)
-        return (OTHER_ROBOT, run.name) if run else (case.violation.code, case.violation.who)
-
-    def _is_reported(self, robot: str, now: float, cases: list[Case]) -> bool:
-        """Return whether it was reported that the robot runs here, with edges that are as wrong as these."""
-        severe = any(case.violation.edge for case in cases) or any(
-            self._was_first(case, now) for case in cases
-        )
-        known = [
-            one
-            for one in self.open.values()
-            if one.reported and self._group(one) == (OTHER_ROBOT, robot)
-        ]
-        return any(not severe or one.violation.edge for one in known)
-
-    def _new(self, gid: bytes) -> Iterator[Case]:
-        """Yield the cases of a publisher that were not reported."""
-        yield from [case for case in self.open.values() if case.gid == gid and not case.reported]
-
-    def _ripe(self, now: float) -> Iterator[Case]:
-        """Yield the cases to report: those of which nothing more comes to be known.
-
-        Where ids do not say whose they are, whoever takes turns with the owner may not be in the
-        graph yet; all that it shows a while later are named.
-        """
-        for case in self.open.values():
-            if (
-                case.reported
-                or self._may_learn_more(case.gid, now)
-                or self._may_see_fate(case, now)
-            ):
-                continue
-            if (
-                case.violation.namesake
-                and case.gid is not None
-                and not self._senders.is_sure(case.gid)
-            ):
-                if now - case.since < NAMELESS_S:
-                    continue
-                nodes = self._senders.nodes(case.gid, static=case.violation.static)
-                case.violation = replace(case.violation, nodes=nodes or case.violation.nodes)
-            yield case
-
-    def _is_due(self, group: Group, now: float) -> bool:
-        """Return whether the group is reported now, and note it: the more often it is, the longer others wait."""
-        at, collected_s = self._reported.get(group, (-COLLECTED_AT_MOST_S, 0.0))
-        if now - at < collected_s:
+    def is_due(self, key: Key, now: float, *, grows: bool) -> bool:
+        """Return whether a report is due, and take it as given; if it ``grows``, later ones wait."""
+        reported, collected_s = self._reported.pop(key, (-COLLECTED_AT_MOST_S, 0.0))
+        if now - reported < collected_s:
+            self._reported[key] = (reported, collected_s)
             return False
-        goes_on = self._start.cleared is not None and now - at < 2 * collected_s
-        self._reported.pop(group, None)  # the newest comes last
-        self._reported[group] = (
-            now,
-            min(2 * collected_s, COLLECTED_AT_MOST_S) if goes_on else COLLECTED_S,
-        )
+        goes_on = grows and now - reported < 2 * collected_s
+        waits_s = min(2 * collected_s, COLLECTED_AT_MOST_S) if goes_on else COLLECTED_S
+        self._reported[key] = (now, waits_s)  # the newest comes last
         if len(self._reported) > MOST_REPORTED:
             del self._reported[next(iter(self._reported))]
         return True
-
-    def _event(self, cases: list[Case], now: float) -> GuardEvent:
-        where, run = self._senders.where(cases[0].gid), self._senders.run(cases[0].gid)
-        ours = self._senders.process(cases[0].gid)
-        violations = [replace(case.violation, stranger=bool(where) and not ours) for case in cases]
-        if any(self._was_first(case, now) for case in cases):
-            found = (
-                other_robot_finding(violations, run, self._plan)
-                if run
-                else taken_finding(violations, where)
-            )
-            return Taken(found)
-        if run:
-            return Found(other_robot_finding(violations, run, self._plan))
-        driven = sensor_of(violations[0], self._drives)
-        found = violation_finding(violations, self._plan, where, driven)
-        if advice := misnamed_help(violations, self._plan, ours):
-            found = replace(found, help=advice)
-        if self._says_fate(violations[0]):
-            found = replace(
-                found, notes=(*found.notes, Note(_FATE[self._senders.is_held_back(cases[0].gid)]))
-            )
-        process = self._process(violations[0], cases[0].gid)
-        if not process and self._may_be_ours(violations[0]):
-            found = replace(
-                found,
-                notes=(
-                    *found.notes,
-                    Note("it is not proven which process did it: none is stopped"),
-                ),
-            )
-        return Found(found, process)
-
-    def _process(self, violation: Violation, gid: bytes | None) -> str:
-        """Return the plan's process that is proven to have done it, where it can be stopped for it."""
-        process = self._senders.process(gid) if violation.code in _STOPPED_FOR else ""
-        return process if process in self._started else ""
-
-    def _may_be_ours(self, violation: Violation) -> bool:
-        """Return whether somebody would be stopped for it, if it were proven to be a process of this run."""
-        is_policy = (
-            self._plan.guard.on_violation == "stop-offender" and violation.code in _STOPPED_FOR
-        )
-        return is_policy and not self._nodes.isdisjoint(violation.nodes)
-
-    def _says_fate(self, violation: Violation) -> bool:
-        return self._plan.guard.mode == "strict" and not violation.is_of_stamps
-
-    def _may_see_fate(self, case: Case, now: float) -> bool:
-        """Whether it may be seen soon if listeners get what was sent."""
-        is_open = self._says_fate(case.violation) and self._senders.is_held_back(case.gid) is None
-        return is_open and now - case.since < FATE_S
-
-    def _may_learn_more(self, gid: bytes | None, now: float) -> bool:
-        """Whether more messages of this publisher can tell if it was there before the start."""
-        sender, cleared = self._senders.sender(gid), self._start.cleared
-        if sender is None or cleared is None or now - cleared > FIRST_S:
-            return False
-        began_before = sender.began_before(self._start.cleared_ns - FIRST_BY_NS)
-        return began_before is None and now - sender.first_received < COUNTING_S
-
-    def _was_first(self, case: Case, now: float) -> bool:
-        """Whether the offender had the edge before the plan was started."""
-        if case.violation.code not in _TAKES:
-            return False
-        cleared = self._start.cleared
-        if cleared is None:
-            return True
-        sender = self._senders.sender(case.gid)
-        if sender is None or now - cleared >= FIRST_S:
-            return False
-        return bool(sender.began_before(self._start.cleared_ns - FIRST_BY_NS, FEWEST_GAPS))
-
-    def memory(self) -> tuple[CaseMemory, ...]:
-        """Return what was reported and is not over."""
-        return tuple(CaseMemory.of(case) for case in self.open.values() if case.reported)
-
-    def recall(self, memory: tuple[CaseMemory, ...], until: float) -> None:
-        """Take these as reported by the guard before, and as going on ``until`` then at least."""
-        planned = {edge.child: edge for edge in self._plan.edges}
-        for one in memory:
-            case = one.case(planned, until)
-            self.open[self._key(case.violation, case.gid)] = case
-
-    def over(self, now: float) -> list[GuardEvent]:
-        """Forget violations that have ended, and report that; the next of their kind is a new case."""
-        ended = [
-            key for key, case in self.open.items() if case.reported and self._has_ended(case, now)
-        ]
-        self.changes += len(ended)
-        for key in ended:
-            case = self.open.pop(key)
-            one = case.violation
-            kept = (
-                one.static and not one.is_of_stamps and not self._senders.was_held_back(case.gid)
-            )
-            self._ended.setdefault((*self._group(case), True), []).append((one, kept))
-        due = [group for group in self._ended if self._is_due(group, now)]
-        return [Recovered(text) for group in due for text in _over(group, self._ended.pop(group))]
-
-    def _has_ended(self, case: Case, now: float) -> bool:
-        if self._senders.is_present(case.gid) and not case.violation.is_of_stamps:
-            return not case.violation.static and now - case.last > OVER_WHILE_PRESENT_S
-        return now - case.last > OVER_S
-
-
-def _over(group: Group, ended: list[tuple[Violation, bool]]) -> list[str]:
-    """Return in words that these of one group are over, each with whether listeners keep what was latched."""
-    if group[0] == OTHER_ROBOT:
-        kept = any(kept for _, kept in ended)
-        return [ended[0][0].over(len(ended) - 1, kept=kept, who=group[1])]
-    if len(ended) <= OVER_IN_LINES:
-        return [one.over(kept=kept) for one, kept in ended]
-    return [ended[0][0].over(len(ended) - 1, kept=any(kept for _, kept in ended))]
-
-
-@dataclass(frozen=True, slots=True)
-class CaseMemory:
-    """What the next guard must know of a case that was reported; ``gid`` is the publisher's id in hexadecimal."""
-
-    code: str
-    parent: str
-    child: str
-    nodes: tuple[str, ...]
-    static: bool
-    is_planned: bool
-    namesake: bool
-    loop: tuple[str, ...]
-    detail: str
-    gid: str | None
-
-    @classmethod
-    def of(cls, case: Case) -> CaseMemory:
-        """Return what must be known of the case."""
-        one = case.violation
-        what = (one.code, one.parent, one.child, one.nodes, one.static, one.edge is not None)
-        return cls(
-            *what, one.namesake, one.loop, one.detail, None if case.gid is None else case.gid.hex()
-        )
-
-    def case(self, planned: dict[str, PlanEdge], last: float) -> Case:
-        """Return the case, as going on until then at least."""
-        edge = planned.get(self.child) if self.is_planned else None
-        what = (self.code, self.parent, self.child, self.nodes, self.static)
-        violation = Violation(*what, edge, self.namesake, self.loop, self.detail)
-        return Case(
-            violation,
-            None if self.gid is None else bytes.fromhex(self.gid),
-            last,
-            last,
-            reported=True,
-        )
 
 
 @dataclass(slots=True)
@@ -415,7 +104,7 @@ class PublisherReports:
         """How much was reported."""
         return len(self._reported)
 
-    def wrong_settings(self, publishers: Sequence[Publisher]) -> list[Found]:
+    def wrong_settings(self, publishers: Sequence[Publisher]) -> list[FindingShown]:
         """Return the findings for those on the plan's topics whose quality of service no listener accepts."""
         return [
             found
@@ -473,7 +162,7 @@ class PublisherReports:
 
     def floods(
         self, senders: Senders, flooders: dict[bytes | None, Flood], now: float
-    ) -> list[Found]:
+    ) -> list[FindingShown]:
         """Return the findings for publishers of more undeclared edges than are judged; forget those that have left."""
         found = []
         for gid, one in list(flooders.items()):
@@ -487,7 +176,9 @@ class PublisherReports:
                 del flooders[gid]
         return found
 
-    def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[Found]:
+    def leaks(
+        self, publishers: Sequence[Publisher], topics: tuple[str, str]
+    ) -> list[FindingShown]:
         """Return the findings for the plan's nodes on the global topics, while its own (moving, static) are others."""
         inside = f"/{self._plan.ros.namespace.strip('/')}/"
         return [
@@ -499,7 +190,7 @@ class PublisherReports:
 
     def replaced(
         self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float
-    ) -> list[Found]:
+    ) -> list[FindingShown]:
         """Return the findings for nodes that sent latched messages before they were first heard.
 
         ``missing`` are names of fixed edges that did not come, by the node, of which others came.
@@ -525,10 +216,10 @@ class PublisherReports:
     def _is_known(self, code: str, one: Publisher) -> bool:
         return (code, one.gid) in self._reported
 
-    def _once(self, one: Publisher, found: Finding) -> list[Found]:
+    def _once(self, one: Publisher, found: Finding) -> list[FindingShown]:
         if self._is_known(found.code, one):
             return []
         self._reported[found.code, one.gid] = None
         if len(self._reported) > MOST_REPORTED:
             del self._reported[next(iter(self._reported))]
-        return [Found(found)]
+        return [FindingShown(found)]

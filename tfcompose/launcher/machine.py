@@ -56,7 +56,7 @@ from tfcompose.model.messages import (
     Alive,
     Clear,
     Complete,
-    Found,
+    FindingShown,
     GateOpen,
     GateShut,
     Live,
@@ -214,7 +214,7 @@ def _guard_reported(step: Transition, event: Event) -> None:
             step.update(silent=silent.difference(children) if over else silent.union(children))
         case Complete(edges):
             _complete(step, edges)
-        case Found(found, process):
+        case FindingShown(found, process):
             _violation(step, found, process)
         case Unfenced(found, process, pid):
             _left_the_fence(step, found, process or _process_of(step.state, pid), pid)

@@ -61,11 +61,14 @@ class Complete:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """A violation, once per case; ``process`` is the plan's process that did it, where it can be stopped for it."""
+class FindingShown:
+    """Something is wrong: a notice too, as it goes on to people.
+
+    ``process`` is the plan's process that did it, where it can be stopped for it.
+    """
 
     found: Finding
-    process: str = ""
+    process: str = field(default="", metadata=OMITTED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +152,7 @@ GuardEvent = (
     | Silent
     | OwnerReady
     | Complete
-    | Found
+    | FindingShown
     | Unfenced
     | Recovered
     | GateOpen
@@ -333,13 +336,6 @@ class Waiting:
     """Edges that nobody has published yet, by owner."""
 
     missing: tuple[Missing, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class FindingShown:
-    """Something is wrong."""
-
-    found: Finding
 
 
 @dataclass(frozen=True, slots=True)

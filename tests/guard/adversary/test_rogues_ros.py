@@ -18,6 +18,7 @@ from tests.support.adversary import (
     node,
     running,
 )
+from tests.support.waiting import until
 from tfcompose.tf.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
@@ -67,6 +68,16 @@ def accused(robot: Robot, after: int) -> set[int]:
     }
 
 
+def names_last(robot: Robot, after: int, pids: set[int]) -> bool:
+    """Return whether the last finding behind so many lines names these processes, in the end."""
+
+    def named() -> set[int]:
+        _, _, last = robot.output_after(after).rpartition("error[TF801]")
+        return {int(pid) for pid in re.findall(r"runs on this machine as pid (\d+)", last)}
+
+    return until(lambda: named() == pids, 60)
+
+
 #: A node's name and namespace, and how it is called.
 NODES = {
     "stranger": ("stranger", "/", "/stranger"),
@@ -98,6 +109,46 @@ def test_a_node_is_named_with_its_process_and_the_owner_is_not(
     assert "owner: idle" not in robot.output_after(after), (
         "the plan's idle has nothing to do with it"
     )
+
+
+@of_each("watch", "strict")
+def test_each_of_three_with_the_owners_name_is_named_and_those_that_remain_when_one_ends(
+    robot: Robot, rogue: Callable[..., subprocess.Popen[str]]
+) -> None:
+    after = robot.lines()
+    namesakes = [rogue(node("slam", OTHER_X, "map odom")) for _ in range(3)]
+    assert names_last(robot, after, {one.pid for one in namesakes})
+    while len(namesakes) > 1:
+        after = robot.lines()
+        one = namesakes.pop()
+        robot.stop(one)
+        assert names_last(robot, after, {other.pid for other in namesakes})
+        robot.says("note: another /slam has ended", f"pid {one.pid}:", after=after)
+        assert "over" not in robot.output_after(after)
+    after = robot.lines()
+    robot.stop(namesakes[0])
+    robot.says("over", "map → odom", after=after)
+    assert f"pid {robot.pid_of('slam')}:" not in robot.text, "the owner is not accused"
+    guard = [line for line in robot.text.splitlines() if line.startswith("guard")]
+    assert not [line for line in guard if "/slam" in line]
+
+
+@of_each("watch", "strict")
+def test_of_ten_strangers_and_ten_namesakes_each_is_named(
+    robot: Robot, rogue: Callable[..., subprocess.Popen[str]]
+) -> None:
+    after = robot.lines()
+    names = [*(f"rogue_{number}" for number in range(10)), *["slam"] * 10]
+    rogues = [rogue(node(name, OTHER_X, "map odom")) for name in names]
+    pids = {one.pid for one in rogues}
+    assert until(lambda: accused(robot, after) == pids, 90), robot.output_after(after)
+    PlainListener().until("odom", OWNER_X)
+    assert f"pid {robot.pid_of('slam')}:" not in robot.text, "the owner is not accused"
+    guard = [line for line in robot.output_after(after).splitlines() if line.startswith("guard")]
+    assert not [line for line in guard if "/slam" in line]
+    for one in rogues:
+        robot.stop(one)
+    robot.says("over", "map → odom", "another /slam", after=after)
 
 
 @of_each(*GUARDS)

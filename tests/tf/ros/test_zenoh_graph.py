@@ -17,7 +17,7 @@ from tests.support.guard_history import edge
 from tests.support.waiting import until
 from tests.support.zenoh_peers import RosPeer, free_port, session
 from tfcompose.guard.judge import Judge
-from tfcompose.model.messages import Found
+from tfcompose.model.messages import FindingShown
 from tfcompose.model.plan import Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import MessageReader, Publisher
 from tfcompose.tf.ros.environment import RosError
@@ -199,7 +199,7 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
         (replace(edge("map odom", "slam"), node="/robot1/slam"),),
         (slam,),
     )
-    judge, reader, found = Judge(plan, 0.0, 0.0, 0), MessageReader(), list[Found]()
+    judge, reader, found = Judge(plan, 0.0, 0.0, 0), MessageReader(), list[FindingShown]()
     with ExitStack() as stack:
         opened = open_session(environment_of(peers))
         stack.callback(opened.close)
@@ -223,7 +223,7 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
                     )
                     events += judge.message(reader.read(received, static=False), now)
             found.extend(
-                event for event in [*events, *judge.tick(now)] if isinstance(event, Found)
+                event for event in [*events, *judge.tick(now)] if isinstance(event, FindingShown)
             )
             return bool(found)
 

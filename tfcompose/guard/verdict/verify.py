@@ -26,15 +26,8 @@ from tfcompose.guard.verdict.drivers import (
     is_fixed,
     is_off,
 )
-from tfcompose.guard.verdict.ownership import (
-    SELF,
-    Violation,
-    code_of,
-    may_be_owners,
-    relays_of,
-    sensor_of,
-    violation_finding,
-)
+from tfcompose.guard.verdict.faults import SELF, Fault, fault_finding, group_of, sensor_of
+from tfcompose.guard.verdict.ownership import code_of, may_be_owners, relays_of
 from tfcompose.guard.verdict.publishers import SAME_POSE, flooded, pose_differs
 from tfcompose.guard.verdict.rates import left, never_received, silent, slow
 from tfcompose.guard.verdict.tree import rejected_transforms
@@ -68,7 +61,7 @@ class Difference:
     """One thing that is wrong with one edge.
 
     ``edge`` is the planned one, None where nobody declared it, ``live`` what came, None where
-    nothing did. What else there is depends on the code: an ``violation``; a ``driver``'s frame
+    nothing did. What else there is depends on the code: a ``fault``; a ``driver``'s frame
     that is elsewhere; how far a pose is ``off``, whoever sent it; the ``silence_s`` in which
     nothing came, which are ``over`` or not.
     """
@@ -76,7 +69,7 @@ class Difference:
     code: str
     edge: PlanEdge | None
     live: EdgeState | None = None
-    violation: Violation | None = None
+    fault: Fault | None = None
     driver: Expected | None = None
     off: Offset | None = None
     silence_s: float = 0.0
@@ -126,7 +119,7 @@ class _Comparison:
     def of_planned(self, edge: PlanEdge) -> Iterator[Difference]:
         some = self.by_child.get(edge.child, [])
         for one in some:
-            yield from self._violation(edge, one)
+            yield from self._fault(edge, one)
             yield from self._value(edge, one)
         yield from self._twice(edge, some)
         hanging = [one for one in some if one.parent != edge.child]
@@ -149,12 +142,12 @@ class _Comparison:
             stream = one.stream
             if stream.child in planned or self.plan.may_be_undeclared(stream.parent, stream.child):
                 continue
-            yield self._violated("TF803", None, one)
+            yield self._faulty("TF803", None, one)
 
-    def _violation(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
+    def _fault(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
         stream = one.stream
         if stream.parent == stream.child:
-            yield self._violated(SELF, edge, one)
+            yield self._faulty(SELF, edge, one)
             return
         unknown = not one.nodes and (self.state.recorded or one.known_s < NAMELESS_S)
         owner, sure = unknown or self._may_own(edge, one), unknown or len(one.nodes) == 1
@@ -165,22 +158,22 @@ class _Comparison:
                 if code == "TF801" and stream.rejected_row is not stream.row
                 else None
             )
-            found = self._violated(code, edge, one)
+            found = self._faulty(code, edge, one)
             yield (
                 replace(found, off=off)
                 if off is not None and off.beyond(self.tolerance)
                 else found
             )
 
-    def _violated(
+    def _faulty(
         self, code: str, edge: PlanEdge | None, one: EdgeState, *, namesake: bool = False
     ) -> Difference:
         stream = one.stream
-        violation = Violation(
+        fault = Fault(
             code, stream.parent, stream.child, nodes=one.nodes, static=stream.static, edge=edge,
             namesake=namesake, recorded=self.state.recorded,
         )  # fmt: skip
-        return Difference(code, edge, one, violation)
+        return Difference(code, edge, one, fault)
 
     def _twice(self, edge: PlanEdge, some: Sequence[EdgeState]) -> Iterator[Difference]:
         """Judge publishers that all have the owner's name: there is one too many."""
@@ -194,7 +187,7 @@ class _Comparison:
             if one.stream.static == next(iter(namesakes.values())).stream.static
         ]
         for other in of_kind[1:]:
-            yield self._violated("TF801", edge, other, namesake=True)
+            yield self._faulty("TF801", edge, other, namesake=True)
 
     def _may_own(self, edge: PlanEdge, one: EdgeState) -> bool:
         return may_be_owners(
@@ -292,8 +285,8 @@ def group_finding(
     """Return the finding for differences of one group; ``place`` is where the first edge is in the robot's file."""
     first = group[0]
     found = (
-        _violation_finding(group, state, plan, place)
-        if first.violation
+        _fault_finding(group, state, plan, place)
+        if first.fault
         else _difference_finding(group, state, plan, place, slow_is)
     )
     # Of a recording nobody can mend what its nodes did.
@@ -332,13 +325,13 @@ def _difference_finding(
 
 
 def _key(one: Difference) -> tuple[object, ...]:
-    if one.violation is not None:
+    if one.fault is not None:
         owner = one.edge.owner if one.edge else None
         return (
             one.code,
-            one.violation.who,
+            one.fault.who,
             owner,
-            one.violation.static if one.code == "TF809" else None,
+            one.fault.static if one.code == "TF809" else None,
         )
     if one.edge is None:
         return (one.code,)
@@ -355,21 +348,19 @@ def _key(one: Difference) -> tuple[object, ...]:
     )
 
 
-def _violation_finding(group: Group, state: TreeState, plan: Plan, place: Span | None) -> Finding:
-    violations = [one.violation for one in group if one.violation is not None]
-    first = group[0]
-    where = state.where(first.live) if first.live else ""
-    found = violation_finding(
-        violations, plan, where, sensor_of(violations[0], drives_of(plan)), place
-    )
+def _fault_finding(group: Group, state: TreeState, plan: Plan, place: Span | None) -> Finding:
+    faults = [one.fault for one in group if one.fault is not None]
+    runs = dict.fromkeys(state.where(one.live) for one in group if one.live)
+    driven = sensor_of(faults[0], drives_of(plan))
+    found = fault_finding(group_of(faults, plan, list(runs), driven), place)
     found = replace(found, notes=(*found.notes, *_elsewhere(group)))
-    if not violations[0].namesake:
+    if not faults[0].namesake:
         return found
-    gid = first.live.stream.gid if first.live else None
+    gids = {one.live.stream.gid for one in group if one.live}
     others = [
         one
         for one in state.publishers
-        if one.node in violations[0].nodes and one.gid != gid and one.where
+        if one.node in faults[0].nodes and one.gid not in gids and one.where
     ]
     notes = [Note(f"{one.node} runs {one.where}") for one in others]
     return replace(found, notes=(*found.notes, *dict.fromkeys(notes)))
@@ -377,7 +368,7 @@ def _violation_finding(group: Group, state: TreeState, plan: Plan, place: Span |
 
 def _elsewhere(group: Group) -> list[Note]:
     """Return how far the poses are off that came from a node other than the owner."""
-    off = [(one.violation, one.off) for one in group if one.violation and one.off]
+    off = [(one.fault, one.off) for one in group if one.fault and one.off]
     notes = [
         Note(f"its pose of {what.child} in {what.parent} is off by {far.text}")
         for what, far in off[:MOST_POSES]

@@ -213,6 +213,11 @@ class Publishers:
             )
         )
 
+    def named(self, nodes: Collection[str], *, static: bool) -> list[bytes]:
+        """Return the publishers that are there of these nodes, on that kind of topic."""
+        there = self.present.values()
+        return [one.gid for one in there if one.static == static and one.node in nodes]
+
     def where(self, gid: bytes | None) -> str:
         """Return where the publisher runs, empty where that is not known."""
         return self.known[gid].where if gid is not None and gid in self.known else ""
@@ -302,6 +307,11 @@ class Senders(Publishers):
         """Return the plan's process that the publisher is proven to be of, by its environment; empty: none is."""
         one = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
         return one.process if one and one.ours else ""
+
+    def is_ours(self, gid: bytes | None) -> bool | None:
+        """Return whether the publisher is of the guard's own run; None: that is not known."""
+        one = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
+        return one.ours if one else None
 
     def shows_process(self, process: str, node: str, *, static: bool) -> bool:
         """Return whether a publisher of that node on that kind of topic is there, and proven to be of the process."""

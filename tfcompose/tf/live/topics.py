@@ -278,6 +278,10 @@ class TFGraph:
             return bool(known.ours and known.fenced and gid not in self._public)
         return known.ours is not False
 
+    def where(self, gid: bytes) -> str:
+        """Return where the publisher runs, empty where that is not known."""
+        return self._where.get(gid, "")
+
     def sends_clock(self) -> bool:
         """Return whether /clock has a publisher."""
         return bool(writers(self._node, "/clock"))

@@ -94,7 +94,7 @@ class LiveTree(ShownTree):
 
 def _counts(one: Difference, listened_s: float) -> bool:
     """Return whether it is so now: neither of somebody who has left, nor of what may still come."""
-    if one.violation is not None and one.live is not None and one.live.present is False:
+    if one.fault is not None and one.live is not None and one.live.present is False:
         return False
     return listened_s >= FOUND_S or one.code not in _MISSING
 

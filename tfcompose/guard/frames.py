@@ -1,0 +1,109 @@
+"""Frames of the tree that the guard watches: the parent of each, and its latest senders.
+
+They distinguish publishers that alternate from one that was restarted, and show loops.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.tree import loop_closed_by
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.model.plan import Plan
+
+#: tf2's buffers keep moving edges for 10 s; one that did not come for this long closes no loop.
+KEPT_S = 10.0
+#: The most frames without a planned parent that are remembered.
+MOST_FRAMES = 10_000
+#: The most senders that are remembered of one frame.
+MOST_SENDERS = 16
+#: A loop is searched this many edges up, so that a chain of thousands costs a bounded time. No
+#: robot is that deep.
+DEEPEST_LOOP = 100
+
+
+@dataclass(slots=True)
+class Frame:
+    """A child frame: its parent, when it came last, and who sent it, the newest sender last."""
+
+    parent: str
+    last: float
+    senders: tuple[bytes, ...] = ()
+
+
+class Frames:
+    """Child frames by name: those of the plan, and others that were sent."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._planned = {edge.child: Frame(edge.parent, float("inf")) for edge in plan.edges}
+        self._others: OrderedDict[str, Frame] = OrderedDict()
+
+    def attach(self, parent: str, child: str, now: float, *, static: bool) -> bool:
+        """Note an edge that is not planned; return whether it changes the tree."""
+        frame = self._others.get(child) or Frame("", 0.0)
+        is_new = frame.parent != parent
+        frame.parent, frame.last = parent, float("inf") if static else now
+        self._others[child] = frame
+        self._others.move_to_end(child)
+        if len(self._others) > MOST_FRAMES:
+            self._others.popitem(last=False)
+        return is_new
+
+    def take_sender(self, child: str, gid: bytes) -> tuple[bytes, bool]:
+        """Note who sent the frame; return who did before, and whether ``gid`` alternates.
+
+        A publisher alternates if another has sent the frame since it did.
+        """
+        frame = self._planned.get(child) or self._others[child]
+        senders = frame.senders or (gid,)
+        current = senders[-1]
+        if current != gid:
+            others = tuple(sender for sender in senders if sender != gid)
+            frame.senders = (*others, gid)[-MOST_SENDERS:]
+        else:
+            frame.senders = senders
+        return current, current != gid and gid in senders
+
+    def current_sender(self, child: str) -> bytes | None:
+        """Return who sent a planned frame last; None if nobody has."""
+        senders = self._planned[child].senders if child in self._planned else ()
+        return senders[-1] if senders else None
+
+    def forget_senders(self, child: str) -> None:
+        """Take whoever sends the planned frame next as the first."""
+        self._planned[child].senders = ()
+
+    def loop(self, parent: str, child: str, now: float) -> tuple[str, ...]:
+        """Return the frames of the loop that the edge closes, from ``child`` down to it again."""
+        left = iter(range(DEEPEST_LOOP))
+        return loop_closed_by(
+            (parent, child),
+            lambda name: None if next(left, None) is None else self._parent(name, now),
+        )
+
+    def is_planned(self, parent: str, child: str) -> bool:
+        """Return whether the plan has this edge."""
+        return child in self._planned and self._planned[child].parent == parent
+
+    def _parent(self, name: str, now: float) -> str | None:
+        frame = self._planned.get(name) or self._others.get(name)
+        return frame.parent if frame and now - frame.last < KEPT_S else None
+
+    def memory(self) -> dict[str, tuple[str, ...]]:
+        """Return what the next guard must know: the senders of planned frames, in hexadecimal."""
+        return {
+            child: tuple(gid.hex() for gid in frame.senders)
+            for child, frame in self._planned.items()
+            if frame.senders
+        }
+
+    def recall(self, memory: Mapping[str, tuple[str, ...]]) -> None:
+        """Take over the senders that the guard before this one knew."""
+        for child, senders in memory.items():
+            if child in self._planned:
+                self._planned[child].senders = tuple(map(bytes.fromhex, senders))

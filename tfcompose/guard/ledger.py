@@ -1,0 +1,604 @@
+"""Ledger of edges: which publisher sends which, what is wrong with it, and what was reported.
+
+A message is judged once; the verdict holds for the next one of the same publisher with the same
+edges until the ledger's ``epoch`` changes: with the senders of a frame, the shape of the tree, the
+start, or the end of a fault. What a nameless publisher sent waits for its name, for a while.
+
+A fault is known by its publisher. Faults of one code and one name of publishers are reported
+together, in one finding that names each process; again when some of these end and others go on;
+and they are over with the last of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+from tfcompose.foundation.findings import Note
+from tfcompose.guard.frames import Frames
+from tfcompose.guard.reports import Flood, Pace
+from tfcompose.guard.verdict import faults
+from tfcompose.guard.verdict.drivers import drives_of
+from tfcompose.guard.verdict.faults import Fault, fault_finding, group_of
+from tfcompose.guard.verdict.ownership import code_of
+from tfcompose.guard.verdict.stamps import StampHistory
+from tfcompose.model.messages import FindingShown, Recovered, Taken
+from tfcompose.tf.live.publishers import NAMELESS_S, PARTICIPANT
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.guard.before_start import Start
+    from tfcompose.model.messages import GuardEvent
+    from tfcompose.model.plan import Plan, PlanEdge
+    from tfcompose.tf.live.publishers import Message, Senders
+
+    Edges = tuple[tuple[str, str], ...]
+
+#: How long a publisher that may be the owner can stay without a name before it is judged.
+NAMELESS_OWNER_S = 5.0
+#: The most kinds of messages whose verdicts are kept, and the most edges of these together.
+MOST_VERDICTS = 4096
+MOST_VERDICT_EDGES = 200_000
+#: How long the verdict on a message with undeclared edges holds.
+UNDECLARED_S = 1.0
+#: The most undeclared edges of one publisher that are judged; further ones are neither reported
+#: nor admitted.
+MOST_UNDECLARED = 1000
+#: A fault is over when its publisher has left and nothing came for this long, or for longer from
+#: one that stays.
+OVER_S = 3.0
+OVER_WHILE_PRESENT_S = 30.0
+#: How long a strict guard waits until it knows whether listeners get it.
+FATE_S = 0.3
+#: All that another robot publishes is one finding.
+OTHER_ROBOT = "TF854"
+
+#: Faults before the start that keep the plan from starting.
+_TAKES = frozenset({faults.NOT_OWNER, faults.WRONG_PARENT, faults.LOOP})
+#: Faults that break the tree: ``stop-offender`` stops the process.
+_STOPPED_FOR = _TAKES | {faults.UNDECLARED}
+#: What becomes of a message in a strict plan, by whether it is sent behind the fence.
+_FATE = {
+    True: "held back: no listener receives it",
+    False: "not fenced off, so it cannot be held back: listeners receive it",
+    None: "whether it is fenced off is unknown; if it is, it is held back",
+}
+#: tfcompose's own publishers, which a plan starts once and never again.
+_BUILT_IN = ("static", "joints")
+
+#: Code, parent, child and publisher's id.
+Key = tuple[str, str, str, bytes]
+#: Code, node, and the plan's process that it is proven to belong to.
+Group = tuple[str, str, str]
+
+
+class SentEdge(NamedTuple):
+    """An edge as a publisher sent it."""
+
+    gid: bytes | None
+    parent: str
+    child: str
+    static: bool
+
+
+@dataclass(slots=True)
+class Entry:
+    """A fault of a publisher that is not over."""
+
+    fault: Fault
+    gid: bytes | None
+    #: When it was observed first and last, in monotonic seconds.
+    since: float
+    last: float
+    reported: bool = False
+    #: The publishers that were named of a fault of several that alternate.
+    named: frozenset[bytes | None] = frozenset()
+
+
+@dataclass(slots=True)
+class JudgedMessage:
+    """The verdict on a publisher's messages with the same edges."""
+
+    stamps: StampHistory = field(default_factory=StampHistory)
+    epoch: int = -1
+    #: How long it holds at most, in monotonic seconds.
+    until: float = 0.0
+    entries: tuple[Entry, ...] = ()
+    #: The planned edges that came with it, by their children.
+    children: tuple[str, ...] = ()
+    #: The edges that may pass; None: all.
+    admitted: frozenset[tuple[str, str]] | None = None
+
+
+class Ledger:
+    """Edges that came, by publisher, under a plan; ``epoch`` changes with all that it knows."""
+
+    def __init__(self, plan: Plan, senders: Senders, start: Start) -> None:
+        self.epoch = 0
+        self.planned: dict[str, PlanEdge] = {edge.child: edge for edge in plan.edges}
+        self.frames = Frames(plan)
+        self.entries: dict[Key, Entry] = {}
+        #: Publishers of more undeclared edges than are judged.
+        self.flooders: dict[bytes | None, Flood] = {}
+        self._plan = plan
+        self._senders = senders
+        self._start = start
+        self._judged: dict[tuple[bytes | None, bool, Edges], JudgedMessage] = {}
+        self._judged_edges = 0
+        self._waiting: dict[SentEdge, float] = {}
+        self._pace: Pace[tuple[Group, bool]] = Pace()
+        self._ended: dict[Group, list[tuple[Fault, bool]]] = {}
+        #: Where publishers ran that have ended, by edges that others of the group go on with.
+        self._left: dict[Group, dict[tuple[str, str], list[str]]] = {}
+        self._drives = drives_of(plan)
+        self._starts = {process.name: process.kind != "external" for process in plan.processes}
+        offenders = [process for process in plan.managed if process.kind != "guard"]
+        self._stoppable = {process.name for process in offenders}
+        self._nodes = {node for process in offenders for node in process.nodes}
+
+    # Messages.
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether nothing waits for its sender's name, or to be reported."""
+        return not self._waiting and all(entry.reported for entry in self.entries.values())
+
+    def take(self, message: Message, now: float) -> JudgedMessage:
+        """Return the verdict on a message."""
+        key = (message.gid, message.static, message.edges)
+        judged = self._judged.get(key)
+        if judged is None:
+            self._judged_edges += len(message.edges)
+            if len(self._judged) >= MOST_VERDICTS or self._judged_edges > MOST_VERDICT_EDGES:
+                self._judged.clear()
+                self._judged_edges = len(message.edges)
+            judged = self._judged[key] = JudgedMessage()
+        if judged.epoch != self.epoch or now > judged.until:
+            self.judge(judged, message, now)
+        for entry in judged.entries:
+            entry.last = now
+        return judged
+
+    def judge(self, judged: JudgedMessage, message: Message, now: float) -> None:
+        """Judge the edges of a message; the verdict holds if all of it is certain."""
+        nodes = self._senders.nodes(message.gid, static=message.static)
+        sure = self._senders.is_sure(message.gid)
+        epoch, certain = self.epoch, sure
+        entries, children, admitted = [], [], []
+        unplanned = {child for _, child in message.edges} - self.planned.keys()
+        left = MOST_UNDECLARED - self._undeclared(message.gid) if unplanned else 0
+        for parent, child in dict.fromkeys(message.edges):
+            if child in unplanned and not self._plan.may_be_undeclared(parent, child):
+                left -= 1
+                if left < 0:
+                    continue
+            sent = SentEdge(message.gid, parent, child, message.static)
+            fault = self._fault(sent, nodes, now) if nodes else None
+            # Where ids do not say whose they are, the sender may be one that the graph does not
+            # show yet.
+            if not nodes or (fault and not sure and not fault.namesake):
+                self._waiting.setdefault(sent, now)
+                certain = False
+                continue
+            if fault:
+                entries.append(self.note(fault, message.gid, now))
+                certain = certain and not fault.namesake
+            else:
+                admitted.append((parent, child))
+            if self._has_arrived(sent, fault):
+                children.append(child)
+        judged.admitted = None if {*admitted} == {*message.edges} else frozenset(admitted)
+        judged.entries, judged.children = tuple(entries), tuple(children)
+        if left < 0 and message.gid not in self.flooders:  # its messages count from now on
+            self.count_flood(message.gid, len(message.edges), now)
+        # Of a flood the edges change what is known, and are not judged anew for it.
+        epoch = self.epoch if left < 0 else epoch
+        judged.epoch = epoch if certain and epoch == self.epoch else -1
+        judged.until = now + UNDECLARED_S if unplanned else float("inf")
+
+    def recheck(self, now: float) -> list[tuple[str, ...]]:
+        """Judge what waited for a name; return the planned edges that have come, by sender."""
+        arrived: dict[bytes | None, list[str]] = {}
+        for sent, since in list(self._waiting.items()):
+            nodes = self._senders.nodes(sent.gid, static=sent.static)
+            is_named = nodes and self._senders.is_sure(sent.gid)
+            if not is_named and now - since < self._patience_s(sent, nodes):
+                continue
+            del self._waiting[sent]
+            fault = self._fault(sent, nodes, now)
+            if fault:
+                self.note(fault, sent.gid, now)
+            if self._has_arrived(sent, fault):
+                arrived.setdefault(sent.gid, []).append(sent.child)
+        return [tuple(children) for children in arrived.values()]
+
+    def note(self, fault: Fault, gid: bytes | None, now: float) -> Entry:
+        """Note that the fault is observed now."""
+        entry = self.entries.setdefault(self._key(fault, gid), Entry(fault, gid, now, now))
+        entry.gid, entry.last = gid, now
+        if fault.nodes and not entry.fault.nodes:  # the publisher has got its name
+            entry.fault, entry.reported = fault, False
+        return entry
+
+    def count_flood(self, gid: bytes | None, transforms: int, now: float) -> None:
+        """Count a message from a publisher of more undeclared edges than are judged."""
+        self.flooders.setdefault(gid, Flood(now)).count(transforms, now)
+
+    def clear(self, now: float) -> None:
+        """Note that the observation before the start is over."""
+        self._start.clear(now)
+        self.epoch += 1
+
+    def forget_owners(self, edges: Iterable[PlanEdge]) -> None:
+        """Take whoever sends these edges next as the first: their owner was stopped on purpose."""
+        for edge in edges:
+            self.frames.forget_senders(edge.child)
+        self.epoch += 1
+
+    def forget_stamps(self) -> None:
+        """Take the next stamps as first ones: the clock has gone back."""
+        for judged in self._judged.values():
+            judged.stamps = StampHistory()
+
+    def _key(self, fault: Fault, gid: bytes | None) -> Key:
+        """Return what the fault is known by: its publisher, unless several may have done it."""
+        is_sure = gid is not None and self._senders.is_sure(gid) and not fault.alternates
+        return (fault.code, fault.parent, fault.child, (is_sure and gid) or b"")
+
+    def _undeclared(self, gid: bytes | None) -> int:
+        """Return how many undeclared edges of the publisher are faults, or wait for its name."""
+        known = sum(e.gid == gid and e.fault.edge is None for e in self.entries.values())
+        return known + sum(sent.gid == gid for sent in self._waiting)
+
+    def _patience_s(self, sent: SentEdge, nodes: tuple[str, ...]) -> float:
+        """Return how long to wait for the sender's name; longer for one that may be the owner."""
+        edge = self.planned.get(sent.child)
+        if nodes or edge is None or not edge.may_hang_on(sent.parent):
+            return NAMELESS_S
+        current = self.frames.current_sender(sent.child)
+        is_known = current is not None and self._senders.is_present(current)
+        is_early = self._start.cleared is None and self._starts.get(edge.owner, False)
+        return NAMELESS_S if is_known or is_early else NAMELESS_OWNER_S
+
+    def _has_arrived(self, sent: SentEdge, fault: Fault | None) -> bool:
+        """Return whether the owner's edge has come; any that alternates may be the owner."""
+        if sent.child not in self.planned or fault is None:
+            return sent.child in self.planned
+        return fault.namesake and self.frames.current_sender(sent.child) is not None
+
+    # Rules.
+
+    def _fault(self, sent: SentEdge, nodes: tuple[str, ...], now: float) -> Fault | None:
+        """Return what is wrong with an edge that one of these nodes sent, or None."""
+        gid, parent, child, static = sent
+        edge = self.planned.get(child)
+        if parent == child:
+            return Fault(faults.SELF, parent, child, nodes=nodes, static=static, edge=edge)
+        if edge is None:
+            return self._fault_of_unplanned(sent, nodes, now)
+        owner, sure = edge.node in nodes, len(nodes) == 1
+        code = code_of(edge, parent, static=static, owner=owner, sure=sure)
+        fault = Fault(code, parent, child, nodes=nodes, static=static, edge=edge)
+        if code == faults.WRONG_PARENT and (loop := self.frames.loop(parent, child, now)):
+            return replace(fault, code=faults.LOOP, loop=loop)
+        if gid is not None and code in {"", faults.WRONG_TOPIC}:
+            if self._is_namesake(edge, sent):
+                return replace(fault, code=faults.NOT_OWNER, namesake=True)
+            if self._is_alternating(edge, sent):
+                return replace(fault, code=faults.NOT_OWNER, namesake=True, alternates=True)
+        return fault if code else None
+
+    def _fault_of_unplanned(
+        self, sent: SentEdge, nodes: tuple[str, ...], now: float
+    ) -> Fault | None:
+        gid, parent, child, static = sent
+        self.epoch += self.frames.attach(parent, child, now, static=static)
+        is_undeclared = not self._plan.may_be_undeclared(parent, child)
+        loop = self.frames.loop(parent, child, now)
+        is_ours = any(self.frames.is_planned(*edge) for edge in pairwise(loop))
+        fault = Fault(faults.UNDECLARED, parent, child, nodes=nodes, static=static, edge=None)
+        if loop and (is_ours or is_undeclared):
+            return replace(fault, code=faults.LOOP, loop=loop)
+        if is_undeclared:
+            return fault
+        if gid is None:
+            return None
+        current, alternates = self.frames.take_sender(child, gid)
+        self.epoch += current != gid
+        if not alternates or not self._senders.is_present(current):
+            return None
+        named = self._senders.nodes(current, static=static)
+        other = named[0] if len(named) == 1 else "another"
+        return replace(fault, code=faults.TWO_PUBLISHERS, detail=other)
+
+    def _is_namesake(self, edge: PlanEdge, sent: SentEdge) -> bool:
+        """Return whether a publisher has the owner's name and is surely not the owner.
+
+        A process of this run proves by its environment which one it is: where the plan starts the
+        owner, no other process is it, and no stranger while it is there itself. Without proof it
+        is another where it spoke before the start, and where tfcompose's own publisher, which is
+        never restarted, is there already.
+        """
+        gid, sender, start = sent.gid, self._senders.sender(sent.gid), self._start
+        if sender is None or not self._starts.get(edge.owner, False):
+            return False
+        proven = self._senders.process(gid)
+        if proven != edge.owner:
+            is_early = start.cleared is None or sender.first_ns < start.cleared_ns
+            is_shown = self._senders.shows_process(edge.owner, edge.node, static=sent.static)
+            if proven or is_early or (is_shown and self._senders.is_sure(gid)):
+                return True
+        current = self.frames.current_sender(edge.child)
+        if edge.owner not in _BUILT_IN or current in {None, gid}:
+            return False
+        is_proven = bool(proven) and self._senders.process(current) != proven
+        return self._senders.is_present(current) and not is_proven
+
+    def _is_alternating(self, edge: PlanEdge, sent: SentEdge) -> bool:
+        """Return whether several with the owner's name send the edge by turns: A, B, and A again.
+
+        Any of them may be the owner, unless one has proven that it is. Fixed edges come again
+        whenever a subscription is made anew.
+        """
+        gid = sent.gid
+        if gid is None or self._senders.sender(gid) is None:
+            return False
+        current, alternates = self.frames.take_sender(edge.child, gid)
+        self.epoch += current != gid
+        proven = self._senders.process(gid) if self._starts.get(edge.owner, False) else ""
+        if proven and self._senders.process(current) != proven:
+            return False
+        return alternates and not sent.static
+
+    # Findings.
+
+    def report(self, now: float, *, at_once: bytes | None = None) -> list[GuardEvent]:
+        """Report new faults, those of one group in one finding.
+
+        With ``at_once`` they are that publisher's, whatever may still come to be known of them.
+        """
+        grouped: dict[Group, list[Entry]] = {}
+        for entry in self.entries.values():
+            if entry.reported:
+                continue
+            if self._is_ripe(entry, now) if at_once is None else entry.gid == at_once:
+                grouped.setdefault(self._group(entry), []).append(entry)
+        events: list[GuardEvent] = []
+        for group, entries in grouped.items():
+            if not self._is_due((group, False), now):
+                continue
+            self.epoch += 1
+            if group[0] != OTHER_ROBOT or not self._is_known_robot(group, entries, now):
+                events.append(self._event(entries, now))
+            for entry in entries:
+                entry.reported = True
+        return events
+
+    def over(self, now: float) -> list[GuardEvent]:
+        """Forget faults that have ended, and report it; the next of their kind is a new one.
+
+        An edge that others of the same name go on with is not over: these are reported again.
+        """
+        ended = [
+            key
+            for key, entry in self.entries.items()
+            if entry.reported and self._has_ended(entry, now)
+        ]
+        if ended:
+            self.epoch += 1
+            self._close([self.entries.pop(key) for key in ended])
+        self._note_alternating(now)
+        due = [group for group in self._ended if self._is_due((group, True), now)]
+        texts = [text for group in due for text in self._over_texts(group)]
+        return [*map(Recovered, texts), *self._report_remaining(now)]
+
+    def wrong(self) -> list[Finding]:
+        """Return what was reported and is not over, for each edge and name, worst first."""
+        reported = [entry for entry in self.entries.values() if entry.reported]
+        by_edge = {(self._group(entry), entry.fault.ends): entry for entry in reported}
+        findings = [
+            fault_finding(group_of([entry.fault], self._plan, self._runs_of([entry])))
+            for entry in by_edge.values()
+        ]
+        return sorted(findings, key=lambda finding: (finding.severity, finding.code))
+
+    def memory(self) -> dict[str, tuple[Fault, ...]]:
+        """Return the faults that were reported and are not over, by publisher, in hexadecimal."""
+        reported: dict[str, tuple[Fault, ...]] = {}
+        for entry in self.entries.values():
+            if entry.reported:
+                gid = entry.gid.hex() if entry.gid else ""
+                reported[gid] = (*reported.get(gid, ()), entry.fault)
+        return reported
+
+    def recall(self, memory: Mapping[str, Sequence[Fault]], until: float) -> None:
+        """Take these as reported by the guard before, and as going on ``until`` then at least."""
+        for hexed, known in memory.items():
+            gid = bytes.fromhex(hexed) or None
+            for fault in known:
+                entry = Entry(fault, gid, until, until, reported=True)
+                self.entries[self._key(fault, gid)] = entry
+
+    def _group(self, entry: Entry) -> Group:
+        """Return with what a fault is reported: its code and node, or the robot it belongs to."""
+        if run := self._senders.run(entry.gid):
+            return (OTHER_ROBOT, run.name, "")
+        return (entry.fault.code, entry.fault.who, self._senders.process(entry.gid))
+
+    def _is_ripe(self, entry: Entry, now: float) -> bool:
+        """Return whether nothing more comes to be known of a fault.
+
+        Where ids do not say whose they are, whoever takes turns with the owner may not be in the
+        graph yet; all that it shows a while later are named.
+        """
+        fault, gid = entry.fault, entry.gid
+        sender = self._senders.sender(gid)
+        if self._start.may_show_first(sender, now) or self._may_learn_fate(entry, now):
+            return False
+        if fault.namesake and gid is not None and not self._senders.is_sure(gid):
+            if now - entry.since < NAMELESS_S:
+                return False
+            nodes = self._senders.nodes(gid, static=fault.static)
+            entry.fault = replace(fault, nodes=nodes or fault.nodes)
+        return True
+
+    def _is_due(self, key: tuple[Group, bool], now: float) -> bool:
+        return self._pace.is_due(key, now, grows=self._start.cleared is not None)
+
+    def _event(self, entries: Sequence[Entry], now: float) -> FindingShown | Taken:
+        gid = entries[0].gid
+        run, process = self._senders.run(gid), self._senders.process(gid)
+        publishers = self._publishers(entries)
+        runs = self._runs_of(entries)
+        is_stranger = any(runs) and not process
+        known = [replace(entry.fault, stranger=is_stranger) for entry in entries]
+        for entry in entries:
+            entry.named = frozenset(self._gids_of(entry))
+        group = group_of(
+            known, self._plan, runs, faults.sensor_of(known[0], self._drives), process
+        )
+        was_first = any(self._was_first(entry, now) for entry in entries)
+        if run:
+            found = faults.other_robot_finding(known, run, self._plan)
+            return Taken(found) if was_first else FindingShown(found)
+        if was_first:
+            return Taken(faults.taken_finding(group))
+        found, first = fault_finding(group), known[0]
+        notes = []
+        if self._says_fate(first):
+            fates = dict.fromkeys(map(self._senders.is_held_back, publishers))
+            notes += [Note(_FATE[fate]) for fate in fates]
+        offender = process if process in self._stoppable and first.code in _STOPPED_FOR else ""
+        if not offender and self._may_be_ours(first):
+            notes += [Note("it is not proven which process did it: none is stopped")]
+        return FindingShown(replace(found, notes=(*found.notes, *notes)), offender)
+
+    def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
+        """Report who sends edges of which some publishers have ended, or others have come."""
+        for group in [group for group in self._left if self._is_due((group, False), now)]:
+            left = self._left.pop(group)
+            by_edge = {
+                entry.fault.ends: entry
+                for entry in self.entries.values()
+                if entry.reported and entry.fault.ends in left and self._group(entry) == group
+            }
+            if not by_edge:
+                continue
+            event = self._event([*by_edge.values()], now)
+            who = next(iter(by_edge.values())).fault.who
+            ended = dict.fromkeys(where for ends in by_edge for where in left[ends])
+            notes = [Note(f"{who} has ended, which ran {where}") for where in ended]
+            found = replace(event.found, notes=(*event.found.notes, *notes))
+            yield FindingShown(found, event.process if isinstance(event, FindingShown) else "")
+
+    def _over_texts(self, group: Group) -> list[str]:
+        robot = group[1] if group[0] == OTHER_ROBOT else ""
+        return faults.over_texts(self._ended.pop(group), robot)
+
+    def _close(self, closed: Sequence[Entry]) -> None:
+        """Note which edges of these are over, and which others of their groups go on with."""
+        going_on = {
+            (self._group(entry), entry.fault.ends): entry
+            for entry in self.entries.values()
+            if entry.reported
+        }
+        for entry in closed:
+            group, fault = self._group(entry), entry.fault
+            if other := going_on.get((group, fault.ends)):
+                if group[0] != OTHER_ROBOT:
+                    self._note_left(other, {entry.gid}, set(self._publishers([other])))
+                continue
+            is_latched = fault.static and not fault.is_of_stamps
+            kept = is_latched and not self._senders.was_held_back(entry.gid)
+            self._ended.setdefault(group, []).append((fault, kept))
+
+    def _note_alternating(self, now: float) -> None:
+        """Note where others alternate than those that were named, here or by the guard before."""
+        for entry in self.entries.values():
+            if entry.reported and entry.fault.alternates and now >= entry.since:
+                gids = frozenset(self._gids_of(entry))
+                if len(gids) > 1 and gids != entry.named:
+                    self._note_left(entry, entry.named or gids, gids)
+                    entry.named = gids
+
+    def _note_left(
+        self, entry: Entry, before: Collection[bytes | None], gids: Collection[bytes | None]
+    ) -> None:
+        """Note who sent the edge ``before`` and does no more, while these do."""
+        processes = {self._process_of(gid) for gid in gids}
+        known = {self._process_of(gid): gid for gid in before}
+        ended = [gid for process, gid in known.items() if process not in processes]
+        is_joined = entry.fault.alternates and not processes <= known.keys()
+        if ended or is_joined:
+            runs = self._left.setdefault(self._group(entry), {}).setdefault(entry.fault.ends, [])
+            runs += filter(None, map(self._senders.where, ended))
+
+    def _has_ended(self, entry: Entry, now: float) -> bool:
+        fault, silent_s = entry.fault, now - entry.last
+        if fault.alternates and self._senders.is_sure(entry.gid):
+            is_alone = len(self._gids_of(entry)) == 1
+            return silent_s > (OVER_S if is_alone else OVER_WHILE_PRESENT_S)
+        if self._senders.is_present(entry.gid) and not fault.is_of_stamps:
+            return not fault.static and silent_s > OVER_WHILE_PRESENT_S
+        return silent_s > OVER_S
+
+    # Publishers.
+
+    def _publishers(self, entries: Sequence[Entry]) -> list[bytes | None]:
+        """Return who sends the edges of these entries of one group now: an id of each process."""
+        group, edges = self._group(entries[0]), {entry.fault.ends for entry in entries}
+        gids = [
+            gid
+            for entry in self.entries.values()
+            if entry.fault.ends in edges and self._group(entry) == group
+            for gid in self._gids_of(entry)
+        ]
+        if not all(map(self._senders.is_sure, gids)):
+            return [entries[0].gid]
+        present = [gid for gid in gids if self._senders.is_present(gid)] or gids
+        return list({self._process_of(gid): gid for gid in present}.values())
+
+    def _runs_of(self, entries: Sequence[Entry]) -> list[str]:
+        return [self._senders.where(gid) for gid in self._publishers(entries)]
+
+    def _gids_of(self, entry: Entry) -> list[bytes | None]:
+        """Return the publishers of a fault: one, or all that alternate."""
+        fault = entry.fault
+        if not fault.alternates or not self._senders.is_sure(entry.gid):
+            return [entry.gid]
+        return [*self._senders.named(fault.nodes, static=fault.static)] or [entry.gid]
+
+    def _process_of(self, gid: bytes | None) -> str | bytes:
+        """Return what distinguishes the publisher's process from others."""
+        return self._senders.where(gid) or (gid or b"")[:PARTICIPANT]
+
+    def _is_known_robot(self, group: Group, entries: Sequence[Entry], now: float) -> bool:
+        """Return whether the robot was reported already, with edges as wrong as these."""
+        is_severe = any(entry.fault.edge or self._was_first(entry, now) for entry in entries)
+        return any(
+            entry.reported
+            and self._group(entry) == group
+            and (not is_severe or entry.fault.edge is not None)
+            for entry in self.entries.values()
+        )
+
+    def _may_be_ours(self, fault: Fault) -> bool:
+        """Return whether a process would be stopped for it if it were proven to be of this run."""
+        stops = self._plan.guard.on_violation == "stop-offender" and fault.code in _STOPPED_FOR
+        return stops and not self._nodes.isdisjoint(fault.nodes)
+
+    def _says_fate(self, fault: Fault) -> bool:
+        return self._plan.guard.mode == "strict" and not fault.is_of_stamps
+
+    def _may_learn_fate(self, entry: Entry, now: float) -> bool:
+        """Return whether it may soon be known if listeners get what was sent."""
+        is_open = self._says_fate(entry.fault) and self._senders.is_held_back(entry.gid) is None
+        return is_open and now - entry.since < FATE_S
+
+    def _was_first(self, entry: Entry, now: float) -> bool:
+        """Return whether the publisher had the edge before the plan was started."""
+        sender = self._senders.sender(entry.gid)
+        return entry.fault.code in _TAKES and self._start.was_first(sender, now)

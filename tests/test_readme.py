@@ -12,6 +12,7 @@ from tests.benchmarks import results
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
+from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.compiling import library
 from tfcompose.cli.documentation import FOLDER, for_terminal, page, topic, topics
 from tfcompose.cli.parser import all_commands, parser_of
@@ -50,7 +51,7 @@ def test_every_page_is_a_topic_or_that_of_a_command_and_begins_with_its_title() 
 def test_every_command_and_topic_that_is_named_is_there() -> None:
     for text in (README, *PAGES.values()):
         named = set(re.findall(r"(?:^\$ |`)tfcompose ([a-z]+)\b", text, re.MULTILINE))
-        assert named <= COMMANDS.keys()
+        assert named <= COMMANDS.keys() | PROCESSES.keys()
         for word in re.findall(r"tfcompose help ([a-z.]+[a-z])", text):
             assert page(word, COMMANDS), word
 

@@ -19,10 +19,13 @@ from tfcompose.foundation.catalogue import (
     similar_words,
 )
 from tfcompose.foundation.findings import finding
+from tfcompose.foundation.tool import shipped
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tfcompose"
 FOLDER = PACKAGE / "data" / "codes"
+#: The pages of the codes of the core, and of those of the tools that ship.
+FILES = sorted(PACKAGE.glob("**/codes/*.md"), key=lambda file: file.stem)
 #: Codes of the past, which no other finding may have: TF904 was no_xacro, from when xacro was no
 #: dependency.
 RETIRED = {"TF904"}
@@ -31,7 +34,7 @@ HEAD = "---\nname: pump_off\nseverity: warning\nfamily: live\n---\n\n"
 PAGE = "The pump is off.\n\nSwitch it on.\n"
 
 
-@for_each(sorted(FOLDER.iterdir()))
+@for_each(FILES)
 def test_each_file_is_a_code_and_a_page_whose_first_paragraph_is_a_sentence(file: Path) -> None:
     assert CATALOGUE[file.stem] == read_code(file.stem, file.read_text("utf-8"))
     summary = CATALOGUE.summary(file.stem)
@@ -43,7 +46,7 @@ def test_each_file_is_a_code_and_a_page_whose_first_paragraph_is_a_sentence(file
 
 
 def test_codes_are_in_order_in_families_and_have_one_name_each() -> None:
-    assert list(CATALOGUE) == sorted(file.stem for file in FOLDER.iterdir())
+    assert list(CATALOGUE) == [file.stem for file in FILES]
     assert {code.family for code in CATALOGUE.values()} == set(FAMILIES)
     assert len({code.name for code in CATALOGUE.values()}) == len(CATALOGUE)
     assert not RETIRED & CATALOGUE.keys()
@@ -129,47 +132,40 @@ def test_a_robot_that_cannot_be_built_or_is_not_understood_cannot_be_allowed() -
     assert CATALOGUE["TF301"].can_be_allowed
 
 
-def package(folder: Path, name: str, *codes: str) -> str:
-    """Make a package with these codes; it is imported by its name."""
+def package(folder: Path, name: str, *codes: str) -> Path:
+    """Make a package with these codes; return the folder that they are in."""
     (folder / name / "codes").mkdir(parents=True)
     (folder / name / "__init__.py").touch()
     for code in codes:
         (folder / name / "codes" / f"{code}.md").write_text(HEAD + PAGE, encoding="utf-8")
-    return name
+    return folder / name / "codes"
 
 
-def test_a_package_brings_codes_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_folders_that_come_later_are_looked_up_only_for_what_is_not_found_before(
+    tmp_path: Path,
 ) -> None:
-    monkeypatch.syspath_prepend(tmp_path)
-    acme = Catalogue.of(package(tmp_path, "acme_pumps_1", "ACME101", "ACME102"))
-    assert list(acme) == ["ACME101", "ACME102"]
-    both = Catalogue(FOLDER)
-    assert len(both) == len(CATALOGUE)
-    assert both.add(acme) == []
-    assert list(both) == ["ACME101", "ACME102", *CATALOGUE]
-    assert (both["ACME101"].name, both.page("ACME101")) == ("pump_off", PAGE.rstrip())
+    folder = package(tmp_path, "acme_pumps", "ACME101", "ACME102")
+    lookups = []
+
+    def more() -> list[Path]:
+        lookups.append(1)
+        return [folder]
+
+    both = Catalogue(FOLDER, more=more)
     assert both["TF201"] == CATALOGUE["TF201"]
+    assert not lookups
+    assert (both["ACME101"].name, both.page("ACME101")) == ("pump_off", PAGE.rstrip())
+    assert lookups
+    assert list(both)[:2] == ["ACME101", "ACME102"]
+    assert set(both) >= set(Catalogue(FOLDER))
 
 
-def test_codes_that_are_there_already_are_named_and_nothing_is_taken_in(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.syspath_prepend(tmp_path)
-    acme = Catalogue.of(package(tmp_path, "acme_pumps_2", "ACME101", "TF201"))
-    both = Catalogue(FOLDER)
-    assert both.add(acme) == ["TF201"]
-    assert list(both) == list(CATALOGUE)
-    assert "ACME101" not in both
-
-
-def test_a_package_without_codes_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / package(tmp_path, "acme_pumps_3") / "codes").rmdir()
-    with pytest.raises(FileNotFoundError, match="acme_pumps_3"):
-        Catalogue.of("acme_pumps_3")
+def test_codes_of_tools_are_in_their_folders_and_in_the_catalogue() -> None:
+    for tool in shipped().tools:
+        for code in tool.code_names():
+            assert CATALOGUE[code].code == code
+            assert not (FOLDER / f"{code}.md").exists()
+    assert {"TF886", "TF913", "TF020"} <= CATALOGUE.keys()
 
 
 def test_what_was_loaded_needs_no_file(tmp_path: Path) -> None:
@@ -183,13 +179,13 @@ def test_what_was_loaded_needs_no_file(tmp_path: Path) -> None:
         lazy["ACME101"]
 
 
-def test_the_catalogue_loads_nothing_else_of_the_package() -> None:
+def test_the_catalogue_loads_no_tool_and_nothing_else_of_the_package() -> None:
     loaded = "[name for name in sys.modules if name.startswith('tfcompose')]"
     program = f"import sys, tfcompose.foundation.findings; print(*{loaded})"
     done = processes.run([sys.executable, "-c", program], check=True, cwd=ROOT)
     modules = {
         "tfcompose",
-        *(f"tfcompose.foundation{name}" for name in ("", ".catalogue", ".findings")),
+        *(f"tfcompose.foundation{name}" for name in ("", ".catalogue", ".findings", ".tool")),
     }
     assert set(done.stdout.split()) == modules
 

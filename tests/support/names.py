@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.documentation import TOPICS
 from tfcompose.cli.parser import COMMANDS
 from tfcompose.cli.schemas import LANGUAGES
@@ -27,7 +28,7 @@ def names() -> str:
         "tfcompose": {
             "install": "",
             "names": {
-                "command": sorted(COMMANDS),
+                "command": sorted({*COMMANDS, *PROCESSES}),
                 "key": sorted(RobotSpec.model_fields),
                 "language": sorted(LANGUAGES),
                 "topic": sorted(TOPICS),

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
@@ -132,13 +131,18 @@ class Catalogue(Mapping[str, Code]):
         return self._codes[code]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(_codes_in(chain(self._folders, self._more()))))
+        return iter(sorted(_codes_in(self._all_folders())))
 
     def __len__(self) -> int:
         return len(list(iter(self)))
 
+    def _all_folders(self) -> Iterator[Path]:
+        """Yield the folders; those of ``more`` are looked up when the others are through."""
+        yield from self._folders
+        yield from self._more()
+
     def _text(self, code: str) -> str:
-        for folder in chain(self._folders, self._more()) if _is_code(code) else ():
+        for folder in self._all_folders() if _is_code(code) else ():
             try:
                 return (folder / f"{code}.md").read_text("utf-8")
             except FileNotFoundError:

@@ -114,6 +114,24 @@ def test_its_names_are_in_the_schema_and_the_reference(run: Run) -> None:
     assert "| ACME101 | beeper_on_nothing | error |" in run("help", "codes").stdout
 
 
+def test_its_check_finds_at_its_place(run: Run, tmp_path: Path) -> None:
+    write_robot(tmp_path, "acme: {frame: mast, reach: 1 km}")
+    assert findings(run("lint")) == ["robot.yaml:6:28 ACME102"]
+
+
+def test_its_option_runs_another_command_its_way(run: Run) -> None:
+    assert run("tree", "--beeper").stdout == "tree: mast\n"
+    assert "base_link" in run("tree").stdout
+    assert "--beeper" in run("tree", "--help").stdout
+    assert "--beeper" in run("completion", "--at", 2, "--", "tfcompose", "tree", "--bee").stdout
+
+
+def test_its_own_kind_of_file_has_a_schema_and_a_reference(run: Run) -> None:
+    assert "beepers" in json.loads(run("schema", "beepers").stdout)["properties"]
+    reference = run("schema", "beepers", "--reference").stdout
+    assert reference.startswith("# The language of beepers, version 1\n")
+
+
 def test_its_preset_is_found(run: Run, tmp_path: Path) -> None:
     write_robot(tmp_path, "sensors: {b: {preset: acme/beeper-1, parent: mast, driver: none}}")
     assert "TF601" not in run("lint").stdout

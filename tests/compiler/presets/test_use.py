@@ -452,6 +452,28 @@ def test_a_python_package_adds_presets_by_an_entry_point(
     assert compiled("me/mast").found[0].code == "TF601"
 
 
+@pytest.mark.parametrize(
+    ("text", "folder"),
+    [("", "share/my_sensors/presets"), ("share/presets of mine\n", "share/presets of mine")],
+)
+def test_a_ros_package_adds_presets_by_the_ament_index(
+    text: str, folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    overlay, underlay = tmp_path / "overlay", tmp_path / "underlay"
+    for prefix, model in ((underlay, "me/old"), (overlay, "me/mast")):
+        write(prefix / folder, model, MAST)
+        marker = prefix / compiling.PRESET_INDEX / "my_sensors"
+        marker.parent.mkdir(parents=True)
+        marker.write_text(text)
+    with monkeypatch.context() as patch:
+        patch.setenv("AMENT_PREFIX_PATH", f"{overlay}:{underlay}:")
+        compiling._preset_packages.cache_clear()
+        assert compiled("me/mast").found == ()
+        assert "me/old" not in library().names
+    compiling._preset_packages.cache_clear()
+    assert compiled("me/mast").found[0].code == "TF601"
+
+
 def test_only_the_presets_that_a_robot_uses_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[str] = []
 

@@ -1,11 +1,12 @@
-"""The section acme of a robot file, and the process that it adds."""
+"""The section acme of a robot file, the process that it adds, and a file of beepers."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.units import Size
-from tfcompose.model.robot import Process
+from tfcompose.model.robot import Process, Robot
 from tfcompose.spec.language.spec import Spec, key
 from tfcompose.spec.language.values import Text
 
@@ -31,3 +32,20 @@ def beeper(section: ToolSection) -> Iterator[Process]:
         argv=("sleep", f"{section.value.reach:g}"),
         required=False,
     )
+
+
+class BeepersSpec(Spec):
+    """Several beepers."""
+
+    beepers: dict[Text, AcmeSpec] = key(..., "beepers by name", {"b": {"frame": "base_link"}})
+
+
+#: What a beeper reaches at most, in metres.
+MOST_M = 100
+
+
+def far_beeper(section: ToolSection, robot: Robot) -> Iterator[Finding]:
+    """Yield a finding where the beeper is said to reach too far."""
+    if section.value.reach > MOST_M:
+        message = f"the beeper of {robot.name} does not reach {section.value.reach:g} m"
+        yield finding("ACME102", message, section.at("reach"))

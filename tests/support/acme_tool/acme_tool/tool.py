@@ -1,6 +1,6 @@
 """Acme tool: what it adds to tfcompose."""
 
-from tfcompose.foundation.tool import Command, Key, Tool, Topic
+from tfcompose.foundation.tool import Command, Key, Language, Option, Tool, Topic
 
 TOOL = Tool(
     name="acme",
@@ -15,7 +15,10 @@ TOOL = Tool(
             "the robot's beeper",
             ({"frame": "base_link", "reach": "2 m"},),
             processes="acme_tool.spec:beeper",
+            check="acme_tool.spec:far_beeper",
             rules="acme_tool.rules",
         ),
     ),
+    languages=(Language("beepers", "acme_tool.spec:BeepersSpec", "The language of beepers"),),
+    options=(Option(("tree",), ("--beeper",), "acme_tool.option"),),
 )

@@ -474,7 +474,7 @@ def test_the_environment_of_another_robots_process_says_whose_run_it_is() -> Non
 
 def pids_of(found: Finding) -> list[int]:
     """Return the processes that a finding says to run, in order."""
-    runs = (re.search(r" runs on this machine as pid (\d+)", one.message) for one in found.notes)
+    runs = (re.search(r" runs on this machine as pid (\d+)", note.message) for note in found.notes)
     return sorted(int(match[1]) for match in runs if match)
 
 
@@ -490,9 +490,7 @@ def send_all(
 
 @pytest.mark.parametrize("mode", ["watch", "strict"])
 @pytest.mark.parametrize("owner", ["slam", "drive"])
-def test_each_of_three_with_the_owners_name_is_named_and_who_remains_when_one_ends(
-    mode: GuardMode, owner: str
-) -> None:
+def test_each_of_three_namesakes_is_named_and_who_remains(mode: GuardMode, owner: str) -> None:
     """The plan starts slam, whose processes prove that; of drive, which is external, any may be it."""
     running = History(GuardPolicy(mode=mode)).clear()
     edges = {"slam": "map odom", "drive": "odom base"}[owner]
@@ -506,9 +504,9 @@ def test_each_of_three_with_the_owners_name_is_named_and_who_remains_when_one_en
     assert pids_of(running.found()[-1]) == [*anybody, 11, 12, 13]
     for ended, remaining in ((12, [11, 13]), (11, [13])):
         before = len(running.events)
-        one = next(one for one in present if one.pid == ended)
-        running.leaves(one)
-        present.remove(one)
+        leaving = next(publisher for publisher in present if publisher.pid == ended)
+        running.leaves(leaving)
+        present.remove(leaving)
         send_all(running, present, edges, 10.0)
         new = History.findings_in(running.events[before:])
         assert [pids_of(found) for found in new] == [[*anybody, *remaining]]
@@ -527,10 +525,9 @@ def test_of_ten_strangers_and_ten_namesakes_each_is_named(mode: GuardMode) -> No
     rogues = [running.joins(f"/rogue_{pid}", process="", pid=pid) for pid in range(20, 30)]
     rogues += [running.joins("/slam", process="", pid=pid) for pid in range(30, 40)]
     send_all(running, [slam, *rogues], "map odom", 2.0)
-    found = running.found()
-    assert sorted(pid for one in found for pid in pids_of(one)) == list(range(20, 40))
-    assert len(found) == 11
-    assert {pid for one in running.judge.wrong() for pid in pids_of(one)} == {*range(20, 40)}
+    for findings in (running.found(), running.judge.wrong()):
+        assert sorted(pid for found in findings for pid in pids_of(found)) == [*range(20, 40)]
+        assert len(findings) == 11
 
 
 def test_namesakes_that_come_one_after_the_other_are_all_named_in_the_end(
@@ -547,15 +544,15 @@ def test_namesakes_that_come_one_after_the_other_are_all_named_in_the_end(
     assert running.over() == []
 
 
-def test_an_edge_is_over_when_nobody_of_that_name_sends_it_and_others_are_not(
+def test_an_edge_is_over_when_no_publisher_of_that_name_sends_it(
     running: History,
 ) -> None:
-    one, other = (running.joins("/rogue", process="", pid=pid) for pid in (11, 12))
+    first, other = (running.joins("/rogue", process="", pid=pid) for pid in (11, 12))
     for _ in range(10):
-        running.send(one, "map odom").send(other, "map odom, odom base").wait(0.1)
+        running.send(first, "map odom").send(other, "map odom, odom base").wait(0.1)
     assert [pids_of(found) for found in running.found()] == [[11, 12]]
     running.leaves(other)
-    send_all(running, [one], "map odom", 5.0)
+    send_all(running, [first], "map odom", 5.0)
     (over,) = running.over()
     assert words_of(over) >= {"odom", "base", "/rogue"}
     assert "map" not in words_of(over)
@@ -599,7 +596,7 @@ def test_who_remains_is_known_to_the_guard_that_follows(
     assert running.over() == []
 
 
-def test_a_stranger_that_is_started_again_and_again_is_not_reported_each_time(
+def test_a_stranger_that_restarts_again_and_again_is_reported_rarely(
     running: History,
 ) -> None:
     for pid in range(100, 200):

@@ -228,7 +228,7 @@ def test_what_comes_past_the_fence_or_from_nobody_that_is_known_is_not_passed_on
     ]
 
 
-def test_a_publisher_from_which_nothing_is_passed_on_is_named_by_its_process_once(
+def test_a_refused_publisher_is_named_once_by_its_process(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Its node may have an owner's name, which would accuse the owner."""

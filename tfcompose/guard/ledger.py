@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan, PlanEdge
     from tfcompose.tf.live.publishers import Message, Senders
 
-    Edges = tuple[tuple[str, str], ...]
-
 #: How long a publisher that may be the owner can stay without a name before it is judged.
 NAMELESS_OWNER_S = 5.0
 #: The most kinds of messages whose verdicts are kept, and the most edges of these together.
@@ -73,6 +71,8 @@ _BUILT_IN = ("static", "joints")
 Key = tuple[str, str, str, bytes]
 #: Code, node, and the plan's process that it is proven to belong to.
 Group = tuple[str, str, str]
+#: An edge's parent and child.
+Ends = tuple[str, str]
 
 
 class SentEdge(NamedTuple):
@@ -110,7 +110,7 @@ class JudgedMessage:
     #: The planned edges that came with it, by their children.
     children: tuple[str, ...] = ()
     #: The edges that may pass; None: all.
-    admitted: frozenset[tuple[str, str]] | None = None
+    admitted: frozenset[Ends] | None = None
 
 
 class Ledger:
@@ -126,13 +126,13 @@ class Ledger:
         self._plan = plan
         self._senders = senders
         self._start = start
-        self._judged: dict[tuple[bytes | None, bool, Edges], JudgedMessage] = {}
+        self._judged: dict[tuple[bytes | None, bool, tuple[Ends, ...]], JudgedMessage] = {}
         self._judged_edges = 0
         self._waiting: dict[SentEdge, float] = {}
         self._pace: Pace[tuple[Group, bool]] = Pace()
         self._ended: dict[Group, list[tuple[Fault, bool]]] = {}
         #: Where publishers ran that have ended, by edges that others of the group go on with.
-        self._left: dict[Group, dict[tuple[str, str], list[str]]] = {}
+        self._left: dict[Group, dict[Ends, list[str]]] = {}
         self._drives = drives_of(plan)
         self._starts = {process.name: process.kind != "external" for process in plan.processes}
         offenders = [process for process in plan.managed if process.kind != "guard"]
@@ -366,13 +366,14 @@ class Ledger:
                 continue
             if self._is_ripe(entry, now) if at_once is None else entry.gid == at_once:
                 grouped.setdefault(self._group(entry), []).append(entry)
+        due = [group for group in grouped if self._is_due((group, False), now)]
+        by_group = self._by_group() if due else {}
         events: list[GuardEvent] = []
-        for group, entries in grouped.items():
-            if not self._is_due((group, False), now):
-                continue
+        for group in due:
+            entries, edges = grouped[group], by_group[group]
             self.epoch += 1
-            if group[0] != OTHER_ROBOT or not self._is_known_robot(group, entries, now):
-                events.append(self._event(entries, now))
+            if group[0] != OTHER_ROBOT or not self._is_known_robot(edges, entries, now):
+                events.append(self._event(entries, edges, now))
             for entry in entries:
                 entry.reported = True
         return events
@@ -397,12 +398,13 @@ class Ledger:
 
     def wrong(self) -> list[Finding]:
         """Return what was reported and is not over, for each edge and name, worst first."""
-        reported = [entry for entry in self.entries.values() if entry.reported]
-        by_edge = {(self._group(entry), entry.fault.ends): entry for entry in reported}
-        findings = [
-            fault_finding(group_of([entry.fault], self._plan, self._runs_of([entry])))
-            for entry in by_edge.values()
-        ]
+        findings = []
+        for edges in self._by_group().values():
+            for entries in edges.values():
+                if any(entry.reported for entry in entries):
+                    runs = self._runs_of(self._publishers(entries))
+                    group = group_of([entries[0].fault], self._plan, runs)
+                    findings.append(fault_finding(group))
         return sorted(findings, key=lambda finding: (finding.severity, finding.code))
 
     def memory(self) -> dict[str, tuple[Fault, ...]]:
@@ -428,10 +430,18 @@ class Ledger:
             return (OTHER_ROBOT, run.name, "")
         return (entry.fault.code, entry.fault.who, self._senders.process(entry.gid))
 
+    def _by_group(self) -> dict[Group, dict[Ends, list[Entry]]]:
+        """Return the faults by their group, and then by their edge."""
+        by_group: dict[Group, dict[Ends, list[Entry]]] = {}
+        for entry in self.entries.values():
+            edges = by_group.setdefault(self._group(entry), {})
+            edges.setdefault(entry.fault.ends, []).append(entry)
+        return by_group
+
     def _is_ripe(self, entry: Entry, now: float) -> bool:
         """Return whether nothing more comes to be known of a fault.
 
-        Where ids do not say whose they are, whoever takes turns with the owner may not be in the
+        Where ids do not say whose they are, whoever alternates with the owner may not be in the
         graph yet; all that it shows a while later are named.
         """
         fault, gid = entry.fault, entry.gid
@@ -448,11 +458,18 @@ class Ledger:
     def _is_due(self, key: tuple[Group, bool], now: float) -> bool:
         return self._pace.is_due(key, now, grows=self._start.cleared is not None)
 
-    def _event(self, entries: Sequence[Entry], now: float) -> FindingShown | Taken:
+    def _event(
+        self,
+        entries: Sequence[Entry],
+        edges: Mapping[Ends, Sequence[Entry]],
+        now: float,
+    ) -> FindingShown | Taken:
+        """Return the event for faults of one group, whose ``edges`` these and others send."""
         gid = entries[0].gid
         run, process = self._senders.run(gid), self._senders.process(gid)
-        publishers = self._publishers(entries)
-        runs = self._runs_of(entries)
+        ends = dict.fromkeys(entry.fault.ends for entry in entries)
+        publishers = self._publishers([entry for edge in ends for entry in edges[edge]])
+        runs = self._runs_of(publishers)
         is_stranger = any(runs) and not process
         known = [replace(entry.fault, stranger=is_stranger) for entry in entries]
         for entry in entries:
@@ -478,18 +495,16 @@ class Ledger:
 
     def _report_remaining(self, now: float) -> Iterator[GuardEvent]:
         """Report who sends edges of which some publishers have ended, or others have come."""
-        for group in [group for group in self._left if self._is_due((group, False), now)]:
-            left = self._left.pop(group)
-            by_edge = {
-                entry.fault.ends: entry
-                for entry in self.entries.values()
-                if entry.reported and entry.fault.ends in left and self._group(entry) == group
-            }
-            if not by_edge:
+        due = [group for group in self._left if self._is_due((group, False), now)]
+        by_group = self._by_group() if due else {}
+        for group in due:
+            left, edges = self._left.pop(group), by_group.get(group, {})
+            entries = [entry for ends in left for entry in edges.get(ends, ()) if entry.reported]
+            if not entries:
                 continue
-            event = self._event([*by_edge.values()], now)
-            who = next(iter(by_edge.values())).fault.who
-            ended = dict.fromkeys(where for ends in by_edge for where in left[ends])
+            event = self._event(entries, edges, now)
+            who = entries[0].fault.who
+            ended = dict.fromkeys(where for entry in entries for where in left[entry.fault.ends])
             notes = [Note(f"{who} has ended, which ran {where}") for where in ended]
             found = replace(event.found, notes=(*event.found.notes, *notes))
             yield FindingShown(found, event.process if isinstance(event, FindingShown) else "")
@@ -500,16 +515,13 @@ class Ledger:
 
     def _close(self, closed: Sequence[Entry]) -> None:
         """Note which edges of these are over, and which others of their groups go on with."""
-        going_on = {
-            (self._group(entry), entry.fault.ends): entry
-            for entry in self.entries.values()
-            if entry.reported
-        }
+        by_group = self._by_group()
         for entry in closed:
             group, fault = self._group(entry), entry.fault
-            if other := going_on.get((group, fault.ends)):
+            others = by_group.get(group, {}).get(fault.ends, ())
+            if any(other.reported for other in others):
                 if group[0] != OTHER_ROBOT:
-                    self._note_left(other, {entry.gid}, set(self._publishers([other])))
+                    self._note_left(entry, [entry.gid], self._publishers(others))
                 continue
             is_latched = fault.static and not fault.is_of_stamps
             kept = is_latched and not self._senders.was_held_back(entry.gid)
@@ -548,21 +560,15 @@ class Ledger:
     # Publishers.
 
     def _publishers(self, entries: Sequence[Entry]) -> list[bytes | None]:
-        """Return who sends the edges of these entries of one group now: an id of each process."""
-        group, edges = self._group(entries[0]), {entry.fault.ends for entry in entries}
-        gids = [
-            gid
-            for entry in self.entries.values()
-            if entry.fault.ends in edges and self._group(entry) == group
-            for gid in self._gids_of(entry)
-        ]
+        """Return who is there of the publishers of these entries: an id of each process."""
+        gids = [gid for entry in entries for gid in self._gids_of(entry)]
         if not all(map(self._senders.is_sure, gids)):
             return [entries[0].gid]
         present = [gid for gid in gids if self._senders.is_present(gid)] or gids
         return list({self._process_of(gid): gid for gid in present}.values())
 
-    def _runs_of(self, entries: Sequence[Entry]) -> list[str]:
-        return [self._senders.where(gid) for gid in self._publishers(entries)]
+    def _runs_of(self, publishers: Sequence[bytes | None]) -> list[str]:
+        return [self._senders.where(gid) for gid in publishers]
 
     def _gids_of(self, entry: Entry) -> list[bytes | None]:
         """Return the publishers of a fault: one, or all that alternate."""
@@ -575,15 +581,16 @@ class Ledger:
         """Return what distinguishes the publisher's process from others."""
         return self._senders.where(gid) or (gid or b"")[:PARTICIPANT]
 
-    def _is_known_robot(self, group: Group, entries: Sequence[Entry], now: float) -> bool:
-        """Return whether the robot was reported already, with edges as wrong as these."""
+    def _is_known_robot(
+        self,
+        edges: Mapping[Ends, Sequence[Entry]],
+        entries: Sequence[Entry],
+        now: float,
+    ) -> bool:
+        """Return whether the robot of these ``edges`` was reported, and with ones as wrong."""
         is_severe = any(entry.fault.edge or self._was_first(entry, now) for entry in entries)
-        return any(
-            entry.reported
-            and self._group(entry) == group
-            and (not is_severe or entry.fault.edge is not None)
-            for entry in self.entries.values()
-        )
+        known = [entry for sent in edges.values() for entry in sent if entry.reported]
+        return any(not is_severe or entry.fault.edge for entry in known)
 
     def _may_be_ours(self, fault: Fault) -> bool:
         """Return whether a process would be stopped for it if it were proven to be of this run."""

@@ -112,18 +112,18 @@ def test_a_node_is_named_with_its_process_and_the_owner_is_not(
 
 
 @of_each("watch", "strict")
-def test_each_of_three_with_the_owners_name_is_named_and_those_that_remain_when_one_ends(
+def test_each_of_three_namesakes_is_named_and_who_remains(
     robot: Robot, rogue: Callable[..., subprocess.Popen[str]]
 ) -> None:
     after = robot.lines()
     namesakes = [rogue(node("slam", OTHER_X, "map odom")) for _ in range(3)]
-    assert names_last(robot, after, {one.pid for one in namesakes})
+    assert names_last(robot, after, {namesake.pid for namesake in namesakes})
     while len(namesakes) > 1:
         after = robot.lines()
-        one = namesakes.pop()
-        robot.stop(one)
-        assert names_last(robot, after, {other.pid for other in namesakes})
-        robot.says("note: another /slam has ended", f"pid {one.pid}:", after=after)
+        ended = namesakes.pop()
+        robot.stop(ended)
+        assert names_last(robot, after, {namesake.pid for namesake in namesakes})
+        robot.says("note: another /slam has ended", f"pid {ended.pid}:", after=after)
         assert "over" not in robot.output_after(after)
     after = robot.lines()
     robot.stop(namesakes[0])
@@ -140,14 +140,14 @@ def test_of_ten_strangers_and_ten_namesakes_each_is_named(
     after = robot.lines()
     names = [*(f"rogue_{number}" for number in range(10)), *["slam"] * 10]
     rogues = [rogue(node(name, OTHER_X, "map odom")) for name in names]
-    pids = {one.pid for one in rogues}
+    pids = {process.pid for process in rogues}
     assert until(lambda: accused(robot, after) == pids, 90), robot.output_after(after)
     PlainListener().until("odom", OWNER_X)
     assert f"pid {robot.pid_of('slam')}:" not in robot.text, "the owner is not accused"
     guard = [line for line in robot.output_after(after).splitlines() if line.startswith("guard")]
     assert not [line for line in guard if "/slam" in line]
-    for one in rogues:
-        robot.stop(one)
+    for process in rogues:
+        robot.stop(process)
     robot.says("over", "map → odom", "another /slam", after=after)
 
 

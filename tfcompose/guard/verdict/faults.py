@@ -369,7 +369,7 @@ def _misnamed_help(group: FaultGroup) -> str:
     first = group.first
     if first.code != NOT_OWNER or first.namesake or len(first.nodes) != 1 or first.edge is None:
         return ""
-    owners = {fault.edge.owner if fault.edge else "" for fault in group.faults}
+    owners = {fault.edge.owner for fault in group.faults if fault.edge}
     if not group.process or owners != {group.process} or _run_by(first, group.plan):
         return ""
     return (

@@ -62,6 +62,15 @@ CASES = {
         [[LAST_CPU], os.SCHED_BATCH],
         Schedule(policy="fifo", priority=80),
     ),
+    "oom_score_adj": Case(
+        "500",
+        500,
+        "int(Path('/proc/self/oom_score_adj').read_text())",
+        500,
+        -999,
+        unit="OOMScoreAdjust=500",
+        service="oom_score_adj: 500",
+    ),
 }
 ASKS_AS_NOBODY = """
 import os

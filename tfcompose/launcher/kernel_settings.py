@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, finding
@@ -105,4 +106,31 @@ def _cpus_with(schedule: Schedule) -> set[int]:
     return os.sched_getaffinity(0)
 
 
-SETTINGS = (KernelSetting("schedule", _apply_schedule, _schedule_refusal),)
+# Who ends first when memory runs out.
+
+_SCORE = Path("/proc/self/oom_score_adj")
+
+
+def _apply_score(score: int) -> None:
+    _SCORE.write_text(str(score), encoding="utf-8")
+
+
+def _score_refusal(name: str, score: int) -> Finding | None:
+    """Return that a score is refused: only one below the lowest since a privileged start is."""
+    before = int(_SCORE.read_text(encoding="utf-8"))
+    if score >= before:
+        return None
+    try:
+        _apply_score(score)
+    except OSError:
+        message = f"this user may not start {name} with oom_score_adj {score}"
+        advice = f"{before} or more, or the capability CAP_SYS_RESOURCE"
+        return finding("TF911", message, None, help=advice)
+    _apply_score(before)
+    return None
+
+
+SETTINGS = (
+    KernelSetting("schedule", _apply_schedule, _schedule_refusal),
+    KernelSetting("oom_score_adj", _apply_score, _score_refusal),
+)

@@ -71,6 +71,15 @@ CASES = {
         unit="OOMScoreAdjust=500",
         service="oom_score_adj: 500",
     ),
+    "open_files": Case(
+        "256",
+        256,
+        "list(resource.getrlimit(resource.RLIMIT_NOFILE))",
+        [256, 256],
+        2**30,
+        unit="LimitNOFILE=256",
+        service="nofile: 256",
+    ),
 }
 ASKS_AS_NOBODY = """
 import os

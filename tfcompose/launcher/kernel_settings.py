@@ -7,6 +7,7 @@ what asks beforehand without leaving a trace in this one.
 from __future__ import annotations
 
 import os
+import resource
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -130,7 +131,33 @@ def _score_refusal(name: str, score: int) -> Finding | None:
     return None
 
 
+# How many files are open.
+
+
+def _apply_open_files(count: int) -> None:
+    resource.setrlimit(resource.RLIMIT_NOFILE, (count, count))
+
+
+def _open_files_refusal(name: str, count: int) -> Finding | None:
+    """Return that a limit is refused: above the hard one without a right, or the kernel's."""
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if count <= before[1]:
+        return None
+    try:
+        _apply_open_files(count)
+    except (OSError, ValueError):
+        message = f"this user may not start {name} with open_files {count}"
+        advice = (
+            f"{before[1]} or less, or nofile in /etc/security/limits.conf, LimitNOFILE= in a"
+            " systemd unit, or the capability CAP_SYS_RESOURCE; the most is fs.nr_open"
+        )
+        return finding("TF911", message, None, help=advice)
+    resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    return None
+
+
 SETTINGS = (
     KernelSetting("schedule", _apply_schedule, _schedule_refusal),
     KernelSetting("oom_score_adj", _apply_score, _score_refusal),
+    KernelSetting("open_files", _apply_open_files, _open_files_refusal),
 )

@@ -494,6 +494,11 @@ def _within_pod(key: str) -> Callable[[Exported], Iterator[str]]:
     return gaps
 
 
+def _files_of_service(exported: Exported) -> Iterator[Setting]:
+    if exported.process.open_files is not None:
+        yield Setting("ulimits", {"nofile": exported.process.open_files})
+
+
 def _schedule_lines(process: PlanProcess) -> Iterator[tuple[str, str]]:
     schedule = process.schedule or Schedule()
     cpus = f"CPU {', '.join(map(str, schedule.cpus))}" if schedule.cpus else "any CPU"
@@ -706,6 +711,19 @@ SUPERVISION_KEYS = (
         systemd=Dialect(_plain("oom_score_adj", "OOMScoreAdjust", "Service")),
         compose=Dialect(_plain("oom_score_adj", "oom_score_adj")),
         kubernetes=Dialect(gaps=_within_pod("oom_score_adj")),
+        launch=LaunchDialect(is_external=True),
+    ),
+    ProcessKey(
+        name="open_files",
+        type=Integer(16, 2**30),
+        help="how many files, sockets and pipes it may have open; default: as the launcher",
+        examples=(4096,),
+        to=NOT_EXTERNAL,
+        is_shared=True,
+        habits=(("nofile ulimit ulimits", "a limit of open files is open_files: 4096"),),
+        systemd=Dialect(_plain("open_files", "LimitNOFILE", "Service")),
+        compose=Dialect(_files_of_service),
+        kubernetes=Dialect(gaps=_within_pod("open_files")),
         launch=LaunchDialect(is_external=True),
     ),
     ProcessKey(

@@ -62,6 +62,24 @@ CASES = {
         [[LAST_CPU], os.SCHED_BATCH],
         Schedule(policy="fifo", priority=80),
     ),
+    "oom_score_adj": Case(
+        "500",
+        500,
+        "int(Path('/proc/self/oom_score_adj').read_text())",
+        500,
+        -999,
+        unit="OOMScoreAdjust=500",
+        service="oom_score_adj: 500",
+    ),
+    "open_files": Case(
+        "256",
+        256,
+        "list(resource.getrlimit(resource.RLIMIT_NOFILE))",
+        [256, 256],
+        2**30,
+        unit="LimitNOFILE=256",
+        service="nofile: 256",
+    ),
 }
 ASKS_AS_NOBODY = """
 import os

@@ -7,8 +7,10 @@ what asks beforehand without leaving a trace in this one.
 from __future__ import annotations
 
 import os
+import resource
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, finding
@@ -105,4 +107,57 @@ def _cpus_with(schedule: Schedule) -> set[int]:
     return os.sched_getaffinity(0)
 
 
-SETTINGS = (KernelSetting("schedule", _apply_schedule, _schedule_refusal),)
+# Who ends first when memory runs out.
+
+_SCORE = Path("/proc/self/oom_score_adj")
+
+
+def _apply_score(score: int) -> None:
+    _SCORE.write_text(str(score), encoding="utf-8")
+
+
+def _score_refusal(name: str, score: int) -> Finding | None:
+    """Return that a score is refused: only one below the lowest since a privileged start is."""
+    before = int(_SCORE.read_text(encoding="utf-8"))
+    if score >= before:
+        return None
+    try:
+        _apply_score(score)
+    except OSError:
+        message = f"this user may not start {name} with oom_score_adj {score}"
+        advice = f"{before} or more, or the capability CAP_SYS_RESOURCE"
+        return finding("TF911", message, None, help=advice)
+    _apply_score(before)
+    return None
+
+
+# How many files are open.
+
+
+def _apply_open_files(count: int) -> None:
+    resource.setrlimit(resource.RLIMIT_NOFILE, (count, count))
+
+
+def _open_files_refusal(name: str, count: int) -> Finding | None:
+    """Return that a limit is refused: above the hard one without a right, or the kernel's."""
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if count <= before[1]:
+        return None
+    try:
+        _apply_open_files(count)
+    except (OSError, ValueError):
+        message = f"this user may not start {name} with open_files {count}"
+        advice = (
+            f"{before[1]} or less, or nofile in /etc/security/limits.conf, LimitNOFILE= in a"
+            " systemd unit, or the capability CAP_SYS_RESOURCE; the most is fs.nr_open"
+        )
+        return finding("TF911", message, None, help=advice)
+    resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    return None
+
+
+SETTINGS = (
+    KernelSetting("schedule", _apply_schedule, _schedule_refusal),
+    KernelSetting("oom_score_adj", _apply_score, _score_refusal),
+    KernelSetting("open_files", _apply_open_files, _open_files_refusal),
+)

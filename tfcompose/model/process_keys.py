@@ -471,6 +471,34 @@ def _read_prefix(record: Mapping[str, Any], todo: list[str]) -> list[str] | None
         return None
 
 
+def _plain(key: str, name: str, section: str = "") -> Callable[[Exported], Iterator[Setting]]:
+    """Return what yields a key's value as it is, where it is set, under another system's name."""
+
+    def settings(exported: Exported) -> Iterator[Setting]:
+        value = getattr(exported.process, key)
+        if value is not None:
+            yield Setting(name, value, section)
+
+    return settings
+
+
+def _within_pod(key: str) -> Callable[[Exported], Iterator[str]]:
+    """Return what names a key that no pod has: the process sets it, as far as it may."""
+
+    def gaps(exported: Exported) -> Iterator[str]:
+        value = getattr(exported.process, key)
+        if value is not None:
+            name = exported.process.name
+            yield f"{name} sets {key} {value} itself, and fails where its pod may not have that"
+
+    return gaps
+
+
+def _files_of_service(exported: Exported) -> Iterator[Setting]:
+    if exported.process.open_files is not None:
+        yield Setting("ulimits", {"nofile": exported.process.open_files})
+
+
 def _schedule_lines(process: PlanProcess) -> Iterator[tuple[str, str]]:
     schedule = process.schedule or Schedule()
     cpus = f"CPU {', '.join(map(str, schedule.cpus))}" if schedule.cpus else "any CPU"
@@ -670,6 +698,32 @@ SUPERVISION_KEYS = (
             ("priority sched_priority", "a real-time priority is schedule: {priority: 80}"),
         ),
         shown=_schedule_lines,
+        launch=LaunchDialect(is_external=True),
+    ),
+    ProcessKey(
+        name="oom_score_adj",
+        type=Integer(-1000, 1000),
+        help="which processes the kernel ends first when memory runs out: 1000 first, -1000 never;"
+        " default: as the launcher",
+        examples=(500,),
+        to=NOT_EXTERNAL,
+        is_shared=True,
+        systemd=Dialect(_plain("oom_score_adj", "OOMScoreAdjust", "Service")),
+        compose=Dialect(_plain("oom_score_adj", "oom_score_adj")),
+        kubernetes=Dialect(gaps=_within_pod("oom_score_adj")),
+        launch=LaunchDialect(is_external=True),
+    ),
+    ProcessKey(
+        name="open_files",
+        type=Integer(16, 2**30),
+        help="how many files, sockets and pipes it may have open; default: as the launcher",
+        examples=(4096,),
+        to=NOT_EXTERNAL,
+        is_shared=True,
+        habits=(("nofile ulimit ulimits", "a limit of open files is open_files: 4096"),),
+        systemd=Dialect(_plain("open_files", "LimitNOFILE", "Service")),
+        compose=Dialect(_files_of_service),
+        kubernetes=Dialect(gaps=_within_pod("open_files")),
         launch=LaunchDialect(is_external=True),
     ),
     ProcessKey(

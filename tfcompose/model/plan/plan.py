@@ -297,6 +297,8 @@ class PlanProcess:
     nodes, without a leading slash; None: the plan's. ``restart_delay`` is how long after its end
     it is started again, in seconds; None: longer each time. ``prefix`` are the words before its
     command, a program that runs it. ``emulate_tty`` says that it writes to a pseudo-terminal.
+    ``oom_score_adj`` is as in proc_pid_oom_score_adj(5), ``open_files`` the soft and the hard
+    RLIMIT_NOFILE of getrlimit(2); None: the launcher's own.
     """
 
     name: str
@@ -328,6 +330,8 @@ class PlanProcess:
     component: Component | None = field(default=None, metadata=OMITTED)
     output: OutputPlace = field(default="both", metadata=OMITTED)
     emulate_tty: bool = field(default=False, metadata=OMITTED)
+    oom_score_adj: int | None = field(default=None, metadata=OMITTED)
+    open_files: int | None = field(default=None, metadata=OMITTED)
 
     @property
     def texts(self) -> tuple[str, ...]:

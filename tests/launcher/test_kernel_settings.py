@@ -23,6 +23,8 @@ from tfcompose.launcher.kernel_settings import SETTINGS, refused_settings
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.plan import Plan, PlanProcess, RosSettings, Schedule
 from tfcompose.tf.ros.environment import child_environment
+from tfcompose.tools.exporters.kubernetes import Cluster, kubernetes
+from tfcompose.tools.exporters.launch import launch
 from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 if TYPE_CHECKING:
@@ -139,6 +141,16 @@ def test_a_key_reaches_the_plan_the_process_and_other_supervisors(
     for export, line in ((systemd, case.unit), (compose, case.service)):
         text = "".join(file.text for file in export(plan, Machine("/plan"))[0])
         assert line in [lines.strip() for lines in text.splitlines()] or not line
+
+
+@pytest.mark.parametrize("key", CASES)
+def test_launch_starts_what_has_such_a_key_by_the_launcher_and_a_pod_names_it(key: str) -> None:
+    process = process_with(key, CASES[key])
+    plan = Plan("r", "", None, RosSettings(), (), (process,))
+    text = "".join(file.text for file in launch(plan, Machine("/plan"), "<robot/>")[0])
+    assert 'process("p"' in text
+    gaps = kubernetes(plan, Cluster("image"), {"plan.json": ""})[1]
+    assert any(key in gap for gap in gaps) == (key != "schedule")
 
 
 @pytest.mark.parametrize("key", CASES)

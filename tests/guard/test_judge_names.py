@@ -530,16 +530,18 @@ def test_of_ten_strangers_and_ten_namesakes_each_is_named(mode: GuardMode) -> No
         assert len(findings) == 11
 
 
+@pytest.mark.parametrize(("owner", "process"), [("slam", "slam"), ("drive", None)])
 def test_namesakes_that_come_one_after_the_other_are_all_named_in_the_end(
-    running: History,
+    running: History, owner: str, process: str | None
 ) -> None:
-    slam = running.joins("/slam", process="slam", pid=10)
-    there = [slam]
+    edges = {"slam": "map odom", "drive": "odom base"}[owner]
+    there = [running.joins(f"/{owner}", process=process, pid=10)]
     for pid in range(30, 40):
-        there.append(running.joins("/slam", process="", pid=pid))
-        send_all(running, there, "map odom", 0.5)
-    send_all(running, there, "map odom", 20.0)
-    assert pids_of(running.found()[-1]) == list(range(30, 40))
+        there.append(running.joins(f"/{owner}", process="", pid=pid))
+        send_all(running, there, edges, 0.5)
+    send_all(running, there, edges, 20.0)
+    anybody = [10] if process is None else []
+    assert pids_of(running.found()[-1]) == [*anybody, *range(30, 40)]
     assert len(running.found()) < 10, "they are collected"
     assert running.over() == []
 

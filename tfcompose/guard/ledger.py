@@ -27,7 +27,7 @@ from tfcompose.model.messages import FindingShown, Recovered, Taken
 from tfcompose.tf.live.publishers import NAMELESS_S, PARTICIPANT
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.guard.before_start import Start
@@ -94,7 +94,7 @@ class Entry:
     since: float
     last: float
     reported: bool = False
-    #: The publishers that were named of a fault of several that alternate.
+    #: The publishers that were named, of which several may alternate.
     named: frozenset[bytes | None] = frozenset()
 
 
@@ -388,10 +388,17 @@ class Ledger:
             for key, entry in self.entries.items()
             if entry.reported and self._has_ended(entry, now)
         ]
-        if ended:
-            self.epoch += 1
-            self._close([self.entries.pop(key) for key in ended])
-        self._note_alternating(now)
+        self.epoch += bool(ended)
+        closed = [self.entries.pop(key) for key in ended]
+        alternating = [
+            entry
+            for entry in self.entries.values()
+            if entry.reported and entry.fault.alternates and now >= entry.since
+        ]
+        changed = [*closed, *alternating]
+        by_group = self._by_group() if changed else {}
+        for entry in changed:
+            self._compare(entry, by_group.get(self._group(entry), {}))
         due = [group for group in self._ended if self._is_due((group, True), now)]
         texts = [text for group in due for text in self._over_texts(group)]
         return [*map(Recovered, texts), *self._report_remaining(now)]
@@ -513,39 +520,26 @@ class Ledger:
         robot = group[1] if group[0] == OTHER_ROBOT else ""
         return faults.over_texts(self._ended.pop(group), robot)
 
-    def _close(self, closed: Sequence[Entry]) -> None:
-        """Note which edges of these are over, and which others of their groups go on with."""
-        by_group = self._by_group()
-        for entry in closed:
-            group, fault = self._group(entry), entry.fault
-            others = by_group.get(group, {}).get(fault.ends, ())
-            if any(other.reported for other in others):
-                if group[0] != OTHER_ROBOT:
-                    self._note_left(entry, [entry.gid], self._publishers(others))
-                continue
+    def _compare(self, entry: Entry, edges: Mapping[Ends, Sequence[Entry]]) -> None:
+        """Note whether an edge is over, or who was named does not send it any more, or others do.
+
+        The entry has ended, or is of publishers that alternate; ``edges`` are its group's.
+        """
+        group, fault = self._group(entry), entry.fault
+        others = [other for other in edges.get(fault.ends, ()) if other.reported]
+        if not others:
             is_latched = fault.static and not fault.is_of_stamps
             kept = is_latched and not self._senders.was_held_back(entry.gid)
             self._ended.setdefault(group, []).append((fault, kept))
-
-    def _note_alternating(self, now: float) -> None:
-        """Note where others alternate than those that were named, here or by the guard before."""
-        for entry in self.entries.values():
-            if entry.reported and entry.fault.alternates and now >= entry.since:
-                gids = frozenset(self._gids_of(entry))
-                if len(gids) > 1 and gids != entry.named:
-                    self._note_left(entry, entry.named or gids, gids)
-                    entry.named = gids
-
-    def _note_left(
-        self, entry: Entry, before: Collection[bytes | None], gids: Collection[bytes | None]
-    ) -> None:
-        """Note who sent the edge ``before`` and does no more, while these do."""
-        processes = {self._process_of(gid) for gid in gids}
-        known = {self._process_of(gid): gid for gid in before}
-        ended = [gid for process, gid in known.items() if process not in processes]
-        is_joined = entry.fault.alternates and not processes <= known.keys()
-        if ended or is_joined:
-            runs = self._left.setdefault(self._group(entry), {}).setdefault(entry.fault.ends, [])
+            return
+        sending = {self._process_of(gid) for gid in self._publishers(others)}
+        named = {self._process_of(gid): gid for gid in entry.named or self._gids_of(entry)}
+        entry.named = frozenset(self._gids_of(entry))
+        ended = [gid for process, gid in named.items() if process not in sending]
+        is_joined = fault.alternates and not sending <= named.keys()
+        is_alone = fault.alternates and len(sending) == 1
+        if (ended or is_joined) and not is_alone and group[0] != OTHER_ROBOT:
+            runs = self._left.setdefault(group, {}).setdefault(fault.ends, [])
             runs += filter(None, map(self._senders.where, ended))
 
     def _has_ended(self, entry: Entry, now: float) -> bool:

@@ -13,7 +13,13 @@ from scipy.spatial.transform import Rotation
 from tests.support.findings import expect
 from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.geometry import Offset, Pose, offset_of, quat_from_rpy
-from tfcompose.guard.verdict.verify import verify
+from tfcompose.guard.verdict.verify import (
+    differences,
+    group_finding,
+    grouped,
+    state_of,
+    verify,
+)
 from tfcompose.model.plan import (
     Driven,
     EdgePattern,
@@ -300,6 +306,32 @@ def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -
         for one in verdict.found
     ]
     expect(found, "TF801", "odom → base", f"another {DRIVE}", f"drive ({DRIVE})")
+
+
+def test_of_three_nodes_of_the_owners_name_two_are_named_with_one_edge(
+    plan: Plan, tree: Tree
+) -> None:
+    for number in (1, 2):
+        tree.send("base", "odom", DRIVE, rate=10.0, gid=b"twin%d" % number)
+    for child, options in tree.sent.items():
+        tree.send(child, **options)
+    where = "on this machine as pid"
+    present = [
+        Publisher(gid, DRIVE, static=False, where=f"{where} {number}")
+        for number, gid in enumerate((DRIVE.encode(), b"twin1", b"twin2"), 10)
+    ]
+    others = [
+        Publisher(options["node"].encode(), options["node"], static=False)
+        for options in tree.sent.values()
+    ]
+    tree.observer.take_graph([*others, *present])
+    state = state_of(tree.observer, TOPICS)
+    twice = [each for each in differences(state, plan) if each.code == "TF801"]
+    [group] = grouped(twice)
+    found = group_finding(group, state, plan)
+    expect(found, "TF801", f"odom → base is published by another {DRIVE} (2 processes)")
+    pids = [note.message.partition(f"{where} ")[2] for note in found.notes]
+    assert sorted(filter(None, pids)) == ["10", "11", "12"]
 
 
 def test_a_publisher_that_has_left_is_reported(plan: Plan, tree: Tree) -> None:

@@ -113,6 +113,19 @@ Paths are relative to the file that contains them, not to the folder in which tf
 It is a TODO comment there, with its file and line: what a robot file cannot say, what could not be understood, or what
 only runs elsewhere. Everything else is imported."""
     ),
+    "TF021": (
+        """A xacro file reads a file that it may not read.
+
+It may read its tree (its folder, its Git repository, its ROS package, and the same of the robot file that names it) and
+ROS packages. Name the package with $(find NAME) or package://NAME, and its folder under packages: if it is not
+installed. tfcompose help sandbox says more. --trust lifts this for files of your own."""
+    ),
+    "TF022": (
+        """An expression of xacro uses a name by which it would reach Python itself.
+
+These are names with two leading underscores, such as __class__, and those of Python's frames, such as gi_frame. No
+value of a robot needs them."""
+    ),
     "TF101": (
         """A key is unknown here.
 
@@ -856,6 +869,13 @@ more."""
         """A command, or a robot of a fleet, needs Zenoh, but eclipse-zenoh is not installed.
 
 pip install 'tfcompose[fleet]' brings it. It needs no ROS, but for fleet share, which reads the robot's TF."""
+    ),
+    "TF921": (
+        """The kernel cannot confine xacro and launch files.
+
+They run nevertheless. Without seccomp they can do what you can do; without Landlock a launch file can read every file
+that you can read. seccomp is there on x86-64 and arm64, Landlock from Linux 5.13 on, if the kernel is built with it and
+lsm= of its command line names it; old container engines refuse both. Do not read files of strangers on this machine."""
     ),
 }
 

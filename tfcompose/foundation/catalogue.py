@@ -78,6 +78,8 @@ CATALOGUE: dict[str, Code] = {
         Code("TF018", "bad_xml", "load", "error"),
         Code("TF019", "file_not_there", "load", "error"),
         Code("TF020", "not_imported", "load", "warning"),
+        Code("TF021", "outside_tree", "load", "error"),
+        Code("TF022", "unsafe_expression", "load", "error"),
         # keys, types, values
         Code("TF101", "unknown_key", "language", "error"),
         Code("TF102", "missing_key", "language", "error"),
@@ -291,6 +293,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF916", "hosts_apart", "environment", "error"),
         Code("TF917", "release_failed", "environment", "error"),
         Code("TF920", "no_zenoh", "environment", "error"),
+        Code("TF921", "not_confined", "environment", "warning"),
     )
 }
 

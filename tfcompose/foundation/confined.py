@@ -164,7 +164,8 @@ def fits(value: Any, shape: Any) -> bool:
     """Return whether a value that was JSON has a shape.
 
     A shape is a type, a list with the shape of all its items, a tuple of shapes of which one has
-    to fit, a mapping of keys to shapes (a key that ends with ``?`` may be missing), None or Any.
+    to fit, a mapping of keys to shapes, None or Any. A key that ends with ``?`` may be missing,
+    the key ``*`` is every key.
     """
     if shape is Any:
         return True
@@ -173,7 +174,11 @@ def fits(value: Any, shape: Any) -> bool:
     if isinstance(shape, list):
         return isinstance(value, list) and all(fits(item, shape[0]) for item in value)
     if isinstance(shape, dict):
-        return isinstance(value, dict) and all(
+        if not isinstance(value, dict):
+            return False
+        if "*" in shape:
+            return all(fits(inner, shape["*"]) for inner in value.values())
+        return all(
             fits(value[key], inner) if (key := name.rstrip("?")) in value else key != name
             for name, inner in shape.items()
         )

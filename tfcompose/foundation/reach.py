@@ -11,6 +11,7 @@ import os
 import posixpath
 import re
 import stat
+import sys
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -20,6 +21,11 @@ _SHARED: Final = frozenset({
     "/usr", "/usr/local", "/usr/share", "/var",
     "/tmp", "/var/tmp",  # noqa: S108 (nothing is written there)
 })  # fmt: skip
+#: What libraries of the system read: themselves, the time zone, and what is no file.
+_SYSTEM: Final = (
+    "/usr/lib", "/usr/lib64", "/lib", "/lib64", "/usr/local/lib", "/usr/share/zoneinfo",
+    "/etc/ld.so.cache", "/etc/localtime", "/dev/null", "/dev/urandom",
+)  # fmt: skip
 _OF_KERNEL: Final = re.compile(r"/(dev|proc|run|sys)(/|$)")
 _HOME: Final = re.compile(r"/home/[^/]+")
 #: Files that lie beside a robot file, and are about it.
@@ -52,6 +58,7 @@ class Reach:
     def __init__(self, *, everything: bool = False) -> None:
         self.everything = everything
         self._roots: dict[str, None] = {}
+        self._libraries: dict[str, None] = {}
 
     def add_tree(self, file: str) -> None:
         """Add the tree of a file."""
@@ -73,6 +80,12 @@ class Reach:
             if not is_shared(path):
                 self._roots[path] = None
 
+    def add_package_around(self, file: str) -> None:
+        """Add the package that a file is in, if it is in one."""
+        folder = _above(posixpath.realpath(posixpath.dirname(file)), _MANIFEST)
+        if folder and is_package(folder):
+            self.add_folder(folder)
+
     def add_prefix(self, prefix: str) -> None:
         """Add the packages that are installed below a prefix of AMENT_PREFIX_PATH."""
         share = posixpath.join(prefix, "share")
@@ -87,6 +100,17 @@ class Reach:
             for folder in (str(above), *_folders_in(str(above))):
                 if is_package(folder):
                     self.add_folder(folder)
+
+    def add_libraries(self) -> None:
+        """Add what Python loads modules from, and the system its libraries."""
+        loaded = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
+        around = posixpath.realpath("")
+        paths = [sys.prefix, sys.base_prefix, *sys.path, *filter(None, loaded)]
+        for path in map(posixpath.realpath, filter(None, paths)):
+            if not is_shared(path) and path != around:  # python -m puts the working folder there
+                self._libraries[path] = None
+        self._libraries.update(dict.fromkeys(map(posixpath.realpath, _SYSTEM)))
+        self._libraries[posixpath.dirname(posixpath.dirname(posixpath.realpath(__file__)))] = None
 
     def allows(self, path: str) -> bool:
         """Return whether a path may be read, wherever links lead."""
@@ -138,6 +162,7 @@ class Reach:
         grants = Grants([], [])
         for root in self._roots:
             _grant(root, _DEPTH, grants)
+        grants.paths.extend(self._libraries)
         return grants
 
 

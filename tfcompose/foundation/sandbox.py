@@ -103,7 +103,7 @@ def _conditions() -> tuple[_Condition, ...]:
 
 
 #: Calls from here on are new, and callers do without them: clone3 and openat2, for example, whose
-#: arguments no filter can read.
+#: arguments no filter reads.
 _NEW_CALLS: Final = 424
 #: From here on numbers are those of x86-64's other calling convention, x32.
 _X32: Final = 0x40000000
@@ -156,7 +156,7 @@ def limit(wall_s: float) -> None:
         resource.setrlimit(kind, (min(soft, most), most))
 
 
-def spare_memory() -> None:
+def take_spare_memory() -> None:
     """Take the memory that is kept for the end."""
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
@@ -280,8 +280,8 @@ class Channel:
         self._reads, self._writes = os.fdopen(reads, "rb"), os.fdopen(writes, "wb")
 
     def send(self, message: Any) -> None:
-        """Send a message."""
-        self._writes.write(json.dumps(message).encode() + b"\n")
+        """Send a message; of what JSON does not have, its text."""
+        self._writes.write(json.dumps(message, default=str).encode() + b"\n")
         self._writes.flush()
 
     def receive(self) -> Any:

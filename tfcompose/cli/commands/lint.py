@@ -28,7 +28,7 @@ from tfcompose.cli.terminal import (
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from tfcompose.cli.fixing import Fixer
     from tfcompose.compiler.compile import Compiled
@@ -171,7 +171,7 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
         is_changed = bool(arguments.diff and fixer.texts)
     else:
         cases = {file: lint(file, read) for file in robots}
-    cases |= {file: _selected(_lint_urdf(file, arguments.given), arguments) for file in urdfs}
+    cases |= {file: _selected(_lint_urdf(file, arguments), arguments) for file in urdfs}
     found = [one for case in cases.values() for one in case]
     _print(cases, arguments, len(robots) + len(urdfs))
     if exit_code_of(found) == UNREADABLE:
@@ -249,13 +249,15 @@ def _failing(arguments: Namespace) -> frozenset[str]:
     return frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
 
 
-def _lint_urdf(file: str, given: Mapping[str, str]) -> list[Finding]:
-    """Return what is wrong with a URDF or xacro file, of which these arguments are given."""
+def _lint_urdf(file: str, arguments: Namespace) -> list[Finding]:
+    """Return what is wrong with a URDF or xacro file."""
     from tfcompose.cli.compiling import disk
     from tfcompose.compiler.urdf.lint import lint_urdf
     from tfcompose.compiler.urdf.packages import Packages
 
-    return lint_urdf(file, Packages(disk(), advice="source the workspace's setup file"), given)
+    files = disk(trusts_files=arguments.trust)
+    packages = Packages(files, advice="source the workspace's setup file")
+    return lint_urdf(file, packages, arguments.given)
 
 
 def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
@@ -357,8 +359,10 @@ def lint_file(
         names = given.args.keys() & (declared if isinstance(declared, dict) else {}).keys()
         given = replace(given, args={name: given.args[name] for name in names})
 
+    files = disk(trusts_files=arguments.trust, sources=[file])
+
     def compiled(given: Given, names: Sequence[str]) -> Compiled:
-        return compile_source(source, presets, names, overlays, read, disk(), given)
+        return compile_source(source, presets, names, overlays, read, files, given)
 
     found, judged = _judged(source, arguments, overlays, given, compiled)
     if profiles or overlays:

@@ -12,11 +12,14 @@ from playwright.sync_api import sync_playwright
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    import viser
     from playwright.sync_api import Page
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
+#: The token of servers of tests.
+TOKEN = "token-of-a-test"
 #: How long a page may take to do something, in milliseconds: software draws slowly.
 TIMEOUT_MS = 60_000
 _SOFTWARE = [
@@ -25,6 +28,11 @@ _SOFTWARE = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
+
+
+def address_of(server: viser.ViserServer, host: str = "127.0.0.1") -> str:
+    """Return the address that lets a page in."""
+    return f"http://{host}:{server.get_port()}/?token={TOKEN}"
 
 
 @contextmanager

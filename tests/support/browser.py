@@ -19,7 +19,7 @@ CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
 #: The token of servers of tests.
-TOKEN = "token-of-a-test"
+TOKEN = "token-of-a-test"  # noqa: S105 (no secret)
 #: How long a page may take to do something, in milliseconds: software draws slowly.
 TIMEOUT_MS = 60_000
 _SOFTWARE = [

@@ -17,6 +17,7 @@ import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
 from websockets.typing import Origin, Subprotocol
 
 from tests.support import processes
@@ -50,7 +51,7 @@ def is_refused(port: int, query: str = "", origin: str | None = None, **headers:
     return False
 
 
-def receive_to_the_end(connection: ClientConnection) -> None:
+def receive_to_the_end(connection: Connection) -> None:
     """Receive until the other side closes; raises ConnectionClosed then."""
     while True:
         connection.recv(timeout=20)

@@ -25,6 +25,7 @@ from tfcompose.cli.terminal import (
     print_findings,
     warn,
 )
+from tfcompose.foundation.reading import is_file, read_bytes
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -47,11 +48,16 @@ _ROBOT = re.compile(
 )
 
 URDF_ENDINGS = (".urdf", ".xacro")
+_YAML = (".yaml", ".yml")
 #: How often --watch checks the files, in seconds.
 CHECK_EVERY_S = 0.3
 #: For how long a file is judged in combinations of its arguments, in seconds; the first is always
 #: judged.
 JUDGE_FOR_S = 60.0
+#: After this time a search for robot files says what it does, in seconds.
+SAY_AFTER_S = 5.0
+#: What the kernel shows as files: reading some waits, or does something.
+_OF_KERNEL = frozenset({"/proc", "/sys", "/dev"})
 #: Moves the cursor home and clears the screen (ECMA-48).
 CLEAR = "\033[H\033[2J"
 
@@ -215,7 +221,7 @@ def _stamp(file: str) -> _Stamp:
     """Return the file's time of change and size, or None if it is not there."""
     try:
         found = Path(file).stat()
-    except OSError:
+    except (OSError, ValueError):
         return None
     return found.st_mtime_ns, found.st_size
 
@@ -226,9 +232,7 @@ def _files(arguments: Namespace) -> list[str]:
     files = dict.fromkeys(file for name in names for file in robots_in(name))
     if not arguments.skip_foreign:
         return list(files)
-    return [
-        file for file in files if not file.endswith((".yaml", ".yml")) or _is_robot(Path(file))
-    ]
+    return [file for file in files if not file.endswith(_YAML) or is_robot(file)]
 
 
 def _selected(found: list[Finding], arguments: Namespace) -> list[Finding]:
@@ -281,24 +285,66 @@ def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
 
 
 def robots_in(name: str) -> list[str]:
-    """Return the file itself, or the robot files below a folder: YAML files with a line that begins with tfcompose:."""
+    """Return the file itself, or the robot files below a folder.
+
+    Those are YAML files with a line that begins with tfcompose:. Folders that hold no files of
+    people, and those on other file systems, as ``find -xdev`` has them, are left out.
+    """
     robots: list[str] = []
+    progress = _Progress(name)
+    device = _device(name)
     for top, folders, files in os.walk(name):
-        folders[:] = sorted(inner for inner in folders if not inner.startswith("."))
-        paths = [Path(top, file) for file in sorted(files) if file.endswith((".yaml", ".yml"))]
-        robots += [str(path) for path in paths if path.is_file() and _is_robot(path)]
+        folders[:] = [
+            folder
+            for folder in sorted(folders)
+            if not folder.startswith(".") and _is_searched(f"{top}/{folder}", device)
+        ]
+        paths = [str(Path(top, file)) for file in sorted(files) if file.endswith(_YAML)]
+        robots += [path for path in paths if is_file(path) and is_robot(path)]
+        progress.count_files(len(paths))
     return robots or [name]
 
 
-def _is_robot(file: Path) -> bool:
+class _Progress:
+    """Says what a long search does, once."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._say_at = time.monotonic() + SAY_AFTER_S
+        self._files = 0
+
+    def count_files(self, count: int) -> None:
+        """Count YAML files that were looked at."""
+        self._files += count
+        if time.monotonic() >= self._say_at:
+            self._say_at = float("inf")
+            warn(
+                f"looking for robot files below {self._name}: {self._files} YAML files so far;"
+                " name a folder with fewer to be faster"
+            )
+
+
+def _device(folder: str) -> int:
+    """Return the file system of a folder, 0 if it cannot be looked at."""
+    try:
+        return os.stat(folder).st_dev  # noqa: PTH116 (as os.walk has it)
+    except (OSError, ValueError):
+        return 0
+
+
+def _is_searched(folder: str, device: int) -> bool:
+    """Return whether a folder is on this file system and holds files of people."""
+    return os.path.realpath(folder) not in _OF_KERNEL and _device(folder) == device
+
+
+def is_robot(file: str) -> bool:
     """Return whether it is one, or cannot be read: its own lint says why."""
-    from tfcompose.cli.reading import MOST_BYTES
+    from tfcompose.foundation.findings import RejectedError
 
     try:
-        with file.open("rb") as stream:
-            return bool(_ROBOT.search(stream.read(MOST_BYTES)))
-    except OSError:
-        return True
+        return bool(_ROBOT.search(read_bytes(file)))
+    except RejectedError as error:  # what is larger than a robot may be is none
+        return all(found.code == "TF001" for found in error.findings)
 
 
 def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) -> None:

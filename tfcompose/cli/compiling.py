@@ -23,6 +23,7 @@ from tfcompose.compiler.urdf.inertia import UnmeasurableError
 from tfcompose.compiler.urdf.packages import FETCH, Disk
 from tfcompose.foundation.findings import RejectedError, Span, did_you_mean, finding
 from tfcompose.foundation.reach import Reach
+from tfcompose.foundation.reading import is_file, is_folder
 from tfcompose.spec.language import Given, GivenArg, set_value, with_includes
 from tfcompose.spec.load import load
 
@@ -52,17 +53,22 @@ def library(read: Callable[[str], str] = read_text) -> Library:
 
 @dataclass(frozen=True, slots=True)
 class PresetFolders:
-    """Presets in folders of this machine; ``open_text`` returns the text of a file or raises RejectedError."""
+    """Presets in folders of this machine.
+
+    ``open_text`` returns the text of a file or raises RejectedError, ``allows`` tells whether a
+    path may be looked at.
+    """
 
     open_text: Callable[[str], str] = read_text
+    allows: Callable[[str], bool] = lambda _: True
 
     def has(self, path: str) -> bool:
         """Return whether the file is there."""
-        return Path(path).is_file()
+        return self.allows(path) and is_file(path)
 
     def is_folder(self, path: str) -> bool:
         """Return whether the folder is there."""
-        return Path(path).is_dir()
+        return self.allows(path) and is_folder(path)
 
     def read(self, path: str) -> str:
         """Return its text; raises RejectedError."""
@@ -70,7 +76,11 @@ class PresetFolders:
 
     def models(self, folder: str) -> list[str]:
         """Return the names, vendor/model, of the presets in the folder."""
-        files = sorted((file.parent.name, file.stem) for file in Path(folder).glob("*/*.yaml"))
+        files = sorted(
+            (file.parent.name, file.stem)
+            for file in Path(folder).glob("*/*.yaml")
+            if self.allows(str(file))
+        )
         return [f"{vendor}/{model}" for vendor, model in files if vendor != "nodes"]
 
     def packages(self) -> list[str]:
@@ -200,12 +210,16 @@ _POINTER = b"version https://git-lfs.github.com/spec/"
 
 
 def disk(
-    *, trusts_files: bool = False, sources: Sequence[str] = (), folders: Sequence[str] = ()
+    *,
+    trusts_files: bool = False,
+    sources: Sequence[str] = (),
+    folders: Sequence[str] = (),
+    is_strict: bool = False,
 ) -> Disk:
     """Return this machine's files, with the packages of the workspaces that are sourced.
 
     Xacro files may also read the trees of ``sources``, and these ``folders``; everything if files
-    are trusted.
+    are trusted. With ``is_strict`` none is expanded where the kernel cannot confine it.
     """
     prefixes = tuple(
         prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix
@@ -219,12 +233,17 @@ def disk(
             reach.add_tree(source)
         for folder in folders:
             reach.add_folder(folder)
-        return _expanded(file, packages, arguments, use, reach)
+        if use is None or not use.macro:
+            read_text(file)  # a file that cannot be read is refused as everywhere
+        from tfcompose.compiler.urdf.expand import Sandbox, expand  # loads what runs xacro
+
+        sandbox = Sandbox(reach, print_output, report_missing_confinement, is_strict)
+        return expand(file, packages, arguments, use, sandbox)
 
     return Disk(
         read_text,
-        os.path.isfile,
-        os.path.isdir,
+        is_file,
+        is_folder,
         prefixes=prefixes,
         moments=moments,
         expand=expanded,
@@ -257,22 +276,6 @@ def moments(path: str, scale: Vector) -> Moments:
             "TF905", "trimesh, which computes its volume, is not installed", advice
         ) from None
     return mesh.moments(path, scale)
-
-
-def _expanded(
-    file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None, reach: Reach
-) -> Expansion:
-    """Return what xacro makes of a file, or of a call of one of its macros.
-
-    What runs xacro is loaded only here.
-    """
-    if use is None or not use.macro:
-        read_text(file)  # a file that cannot be read is refused as everywhere
-    from tfcompose.compiler.urdf.expand import Sandbox, expand
-
-    return expand(
-        file, packages, arguments, use, Sandbox(reach, print_output, report_missing_confinement)
-    )
 
 
 def print_output(file: str, text: str) -> None:

@@ -12,7 +12,7 @@ import sys
 import time
 from argparse import ArgumentTypeError
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose import __version__
 from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
@@ -29,11 +29,11 @@ from tfcompose.foundation.reading import is_file, read_bytes
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from tfcompose.cli.fixing import Fixer
     from tfcompose.compiler.compile import Compiled
-    from tfcompose.compiler.resolve import Library
+    from tfcompose.compiler.resolve import Disk, Library
     from tfcompose.foundation.findings import Finding
     from tfcompose.spec.language import Given
     from tfcompose.spec.load import Source
@@ -112,6 +112,10 @@ def arguments(parser: ArgumentParser) -> None:
         help="skip named YAML files that are not robot files",
     )
     parser.add_argument(
+        "--untrusted", action="store_true",
+        help="for files of strangers, as in CI: read nothing but a robot's own tree, and no environment",
+    )  # fmt: skip
+    parser.add_argument(
         "-w",
         "--watch",
         action="store_true",
@@ -149,7 +153,15 @@ def run(arguments: Namespace) -> int:
         fail("standard input cannot be fixed or watched: name a file", UNREADABLE)
     if (arguments.diff or arguments.watch) and arguments.format != "text":
         fail("--diff and --watch are for people: leave out --format", UNREADABLE)
-    return _watch(arguments) if arguments.watch else _lint(arguments, read_text)
+    if arguments.untrusted:
+        for option in ("fix", "diff", "trust"):
+            if getattr(arguments, option):
+                fail(f"--untrusted reports, and trusts nothing: leave out --{option}", UNREADABLE)
+    from tfcompose.cli.untrusted import without_environment
+
+    with without_environment(applies=arguments.untrusted) as environment:
+        arguments.environment = environment
+        return _watch(arguments) if arguments.watch else _lint(arguments, read_text)
 
 
 def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
@@ -177,7 +189,7 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
         is_changed = bool(arguments.diff and fixer.texts)
     else:
         cases = {file: lint(file, read) for file in robots}
-    cases |= {file: _selected(_lint_urdf(file, arguments), arguments) for file in urdfs}
+    cases |= {file: _selected(_lint_urdf(file, arguments, read), arguments) for file in urdfs}
     found = [one for case in cases.values() for one in case]
     _print(cases, arguments, len(robots) + len(urdfs))
     if exit_code_of(found) == UNREADABLE:
@@ -253,13 +265,18 @@ def _failing(arguments: Namespace) -> frozenset[str]:
     return frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
 
 
-def _lint_urdf(file: str, arguments: Namespace) -> list[Finding]:
+def _lint_urdf(file: str, arguments: Namespace, read: Callable[[str], str]) -> list[Finding]:
     """Return what is wrong with a URDF or xacro file."""
     from tfcompose.cli.compiling import disk
     from tfcompose.compiler.urdf.lint import lint_urdf
     from tfcompose.compiler.urdf.packages import Packages
 
-    files = disk(trusts_files=arguments.trust)
+    if arguments.untrusted:
+        from tfcompose.cli.untrusted import UntrustedFiles
+
+        files = UntrustedFiles(file, read).disk()
+    else:
+        files = disk(trusts_files=arguments.trust)
     packages = Packages(files, advice="source the workspace's setup file")
     return lint_urdf(file, packages, arguments.given)
 
@@ -378,6 +395,38 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
         )
 
 
+class _Files(NamedTuple):
+    """Files that a robot file may read, and the variables that its arguments may."""
+
+    read: Callable[[str], str]
+    presets: Library
+    #: Of the file, with what it includes.
+    disk_of: Callable[[Source], Disk]
+    environment_of: Callable[[Source], Mapping[str, str]]
+
+
+def _files_of(
+    file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]
+) -> _Files:
+    """Return all files of this machine; with --untrusted those of the robot's tree."""
+    if not arguments.untrusted:
+        from tfcompose.cli.compiling import disk
+
+        files = disk(trusts_files=arguments.trust, sources=[file])
+        return _Files(read, presets, lambda _: files, lambda _: os.environ)
+    from tfcompose.cli.untrusted import UntrustedFiles, declared_environment
+
+    untrusted = UntrustedFiles(file, read)
+    for overlay in arguments.overlays:
+        untrusted.reach.add_tree(overlay)
+    return _Files(
+        untrusted.read,
+        untrusted.library(),
+        untrusted.disk_for,
+        lambda source: declared_environment(source, arguments.environment),
+    )
+
+
 def lint_file(
     file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]
 ) -> list[Finding]:
@@ -387,28 +436,30 @@ def lint_file(
     """
     from dataclasses import replace
 
-    from tfcompose.cli.compiling import disk, given_by, overlays_of
+    from tfcompose.cli.compiling import given_by, overlays_of
     from tfcompose.compiler.check import unused_allows
     from tfcompose.compiler.compile import compile_source
     from tfcompose.foundation.findings import Note, RejectedError
     from tfcompose.spec.language import profiles_in, with_includes
     from tfcompose.spec.load import load
 
+    files = _files_of(file, presets, arguments, read)
     try:
-        source = with_includes(load(read(file), file), read)
-        overlays = overlays_of(arguments)
+        source = with_includes(load(files.read(file), file), files.read)
+        overlays = overlays_of(arguments, files.read)
     except RejectedError as error:
         return list(error.findings)
     profiles, given = arguments.profiles, given_by(arguments)
+    given = replace(given, environment=files.environment_of(source))
     if not arguments.is_one:  # an argument is one of any of the files
         declared = source.data.get("args")
         names = given.args.keys() & (declared if isinstance(declared, dict) else {}).keys()
         given = replace(given, args={name: given.args[name] for name in names})
 
-    files = disk(trusts_files=arguments.trust, sources=[file])
+    disk = files.disk_of(source)
 
     def compiled(given: Given, names: Sequence[str]) -> Compiled:
-        return compile_source(source, presets, names, overlays, read, files, given)
+        return compile_source(source, files.presets, names, overlays, files.read, disk, given)
 
     found, judged = _judged(source, arguments, overlays, given, compiled)
     if profiles or overlays:

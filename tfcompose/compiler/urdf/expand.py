@@ -73,6 +73,8 @@ class Sandbox:
     reach: Reach = field(default_factory=Reach)
     print_output: Callable[[str, str], None] = lambda _file, _text: None
     report_missing: Callable[[tuple[str, ...]], None] = lambda _: None
+    #: Whether xacro is refused where the kernel cannot confine it.
+    is_strict: bool = False
 
 
 def expand(
@@ -98,7 +100,7 @@ def expand(
     wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
         "file": file, "arguments": given, "call": _document(use) if use and use.macro else None,
-        "is_trusted": trusted, "wall_s": wall_s,
+        "is_trusted": trusted, "is_strict": sandbox.is_strict, "wall_s": wall_s,
     }  # fmt: skip
     with tempfile.TemporaryFile() as noted:
         noted.truncate(_NOTED)
@@ -109,6 +111,10 @@ def expand(
         sandbox.print_output(file, outcome.printed)
         sandbox.report_missing(outcome.missing)
         answer = outcome.answer
+        if sandbox.is_strict and "seccomp" in outcome.missing:
+            message = "xacro was not run: this kernel has no seccomp, which confines it"
+            unconfined = finding("TF921", message, Span(file), severity="error")
+            raise RejectedError([_where_used(unconfined, use)])
         if not (_is_made(answer) or fits(answer, _STOPPED)):
             raise RejectedError([_where_used(_ended(outcome, _text_in(noted), files), use)])
     if "text" not in answer:

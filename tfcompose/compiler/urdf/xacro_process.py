@@ -412,7 +412,10 @@ def main(reads: int, writes: int, noted: int) -> None:
     signal.signal(signal.SIGALRM, refuse_more_time)
     signal.setitimer(signal.ITIMER_REAL, request["wall_s"] - _SPARE_S)
     with mmap.mmap(noted, 0) as kept:
-        channel.send({"missing": [] if request["is_trusted"] else confine(None)})
+        missing = [] if request["is_trusted"] else confine(None)
+        channel.send({"missing": missing})
+        if request["is_strict"] and "seccomp" in missing:  # which alone keeps it from files
+            os._exit(0)
 
         def note(text: str) -> None:
             data = text.encode("utf-8", "replace")[: len(kept) - 1] + b"\0"

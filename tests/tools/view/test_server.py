@@ -23,8 +23,8 @@ from websockets.typing import Origin, Subprotocol
 from tests.support import processes
 from tests.support.browser import TOKEN
 from tests.support.tables import for_each
-from tfcompose.cli.commands import view
 from tfcompose.cli.parser import parser_of
+from tfcompose.tools.view import command as view
 
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 WRONG_TOKENS = ["", f"?token={TOKEN[:-1]}", "?token=", "?token=%C3%A9", f"?token={TOKEN}x"]

@@ -25,7 +25,6 @@ from tfcompose.cli.terminal import (
     print_findings,
     warn,
 )
-from tfcompose.foundation.reading import is_file, read_bytes
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -307,6 +306,8 @@ def robots_in(name: str) -> list[str]:
     Those are YAML files with a line that begins with tfcompose:. Folders that hold no files of
     people, and those on other file systems, as ``find -xdev`` has them, are left out.
     """
+    from tfcompose.foundation.reading import is_file
+
     robots: list[str] = []
     progress = _Progress(name)
     device = _device(name)
@@ -357,6 +358,7 @@ def _is_searched(folder: str, device: int) -> bool:
 def is_robot(file: str) -> bool:
     """Return whether it is one, or cannot be read: its own lint says why."""
     from tfcompose.foundation.findings import RejectedError
+    from tfcompose.foundation.reading import read_bytes
 
     try:
         return bool(_ROBOT.search(read_bytes(file)))

@@ -40,8 +40,8 @@ def is_folder(path: str | Path) -> bool:
 
 
 def exists(path: str | Path) -> bool:
-    """Return whether anything is there that can be looked at, a link that leads nowhere included."""
-    return os.path.lexists(path)
+    """Return whether anything is there that can be looked at."""
+    return os.path.exists(path)  # noqa: PTH110 (as above)
 
 
 def names_in(folder: str | Path) -> list[str]:

@@ -136,13 +136,14 @@ def _import_bringup(arguments: Namespace) -> int:
     from tempfile import TemporaryDirectory
 
     from tfcompose.cli.reading import STDIN, read_text
+    from tfcompose.foundation.reading import is_folder
     from tfcompose.tools.importers.draft import Draft, robot_name
     from tfcompose.tools.importers.shell import add_script
 
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
     draft = Draft(wanted, [f"imported from {name} by tfcompose"])
-    if Path(arguments.file).is_dir():
+    if is_folder(arguments.file):
         _add_vehicles(draft, arguments)
     elif kit := _kit(arguments.file):
         _add_kits(draft, kit, arguments)
@@ -363,7 +364,9 @@ def _check_use(arguments: Namespace) -> None:
             " letter",
             UNREADABLE,
         )
-    if arguments.output and Path(arguments.output).exists() and not arguments.force:
+    from tfcompose.foundation.reading import exists
+
+    if arguments.output and exists(arguments.output) and not arguments.force:
         fail(f"{arguments.output} exists already; --force overwrites it", UNREADABLE)
 
 

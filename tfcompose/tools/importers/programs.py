@@ -477,7 +477,7 @@ def _plain(program: Program) -> str:
             return _CAMEL.sub("_", program.plugin.rpartition("::")[2]).lower()
         case _:
             word = program.executable or (
-                program.argv[0].split()[0] if program.argv and program.argv[0] else ""
+                next(iter(program.argv[0].split()), "") if program.argv else ""
             )
     plain = posixpath.basename(word).partition(".")[0]
     script = next((one for one in program.argv[1:] if one.endswith(".py")), "")

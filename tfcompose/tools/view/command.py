@@ -9,6 +9,7 @@ are where they were recorded, at the time of a slider.
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import ArgumentTypeError
 from contextlib import ExitStack, contextmanager
@@ -209,9 +210,11 @@ def _running_plan(arguments: Namespace) -> str | None:
 
 def _check_output(path: Path, files: Sequence[str]) -> None:
     """Refuse a page that cannot be written, or that would replace one of the robot's files; ends then."""
-    if not path.parent.is_dir():
+    from tfcompose.foundation.reading import is_folder
+
+    if not is_folder(path.parent):
         fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
-    if path.resolve() in {Path(file).resolve() for file in files}:
+    if os.path.realpath(path) in {os.path.realpath(file) for file in files}:
         fail(f"--html {path} would replace a file of the robot", UNREADABLE)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import watchfiles
 
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.reading import is_folder
 from tfcompose.tools.view.findings import findings_html
 from tfcompose.tools.view.panel import Panel
 
@@ -52,7 +54,9 @@ class Files:
     def folders(self) -> set[Path]:
         """The folders of all files that were read: editors replace files by others."""
         several = (*self._texts, *self._meshes)
-        return {folder for file in several if (folder := Path(file).resolve().parent).is_dir()}
+        return {
+            folder for file in several if is_folder(folder := Path(os.path.realpath(file)).parent)
+        }
 
     def differ(self) -> bool:
         """Return whether a file has another text than when it was read, or a mesh was changed."""

@@ -15,6 +15,7 @@ from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.reading import is_file
 from tfcompose.model.plan.file import read_plan
 from tfcompose.tools.view.plan_robot import robot_of_plan
 from tfcompose.tools.view.session import Session
@@ -81,7 +82,7 @@ def _plan_session(file: str, arguments: Namespace, files: Files) -> Session:
         try:
             plan = read_plan(now[file], file)
             description = Path(file).with_name(plan.description)
-            text = files(str(description)) if description.is_file() else None
+            text = files(str(description)) if is_file(description) else None
             return Compiled(robot_of_plan(plan, text, str(description), packages.asset), ())
         except RejectedError as error:
             return Compiled(None, error.findings)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from functools import cache
-
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import RejectedError, Span, finding

@@ -342,7 +342,11 @@ def _hertz(value: float) -> Any:
 
 def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
-    if not program.name and program.package and (name := _named_in_files(program.params, draft.reach)):
+    if (
+        not program.name
+        and program.package
+        and (name := _named_in_files(program.params, draft.reach))
+    ):
         program = replace(program, name=name)
     usual = (
         _usual_name(program.package)

@@ -13,8 +13,8 @@ from tfcompose.cli.parser import parser_of
 from tfcompose.cli.reading import read_text
 from tfcompose.foundation.geometry import Pose
 from tfcompose.tools.view.reload import Files, ReloadedPanel, Watcher
-from tfcompose.tools.view.view_session import session_of
 from tfcompose.tools.view.server import start_server, stop_server
+from tfcompose.tools.view.view_session import session_of
 
 TEXT = """tfcompose: 1
 robot: r

@@ -478,7 +478,7 @@ def test_ctrl_c_while_the_scene_is_made_ends_the_view_without_another_error(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tfcompose.tools.view.reload.ReloadedPanel", interrupted)
+    monkeypatch.setattr("tfcompose.tools.view.windows.Windows", interrupted)
     arguments = parser_of("view").parse_args([str(rover), "--port", "0"])
     with pytest.raises(KeyboardInterrupt):
         command.run(arguments)

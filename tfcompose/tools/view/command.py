@@ -121,6 +121,7 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     """Show the session in the browser until Ctrl-C; return the exit code."""
     from tfcompose.tools.view.reload import ReloadedPanel, Watcher
     from tfcompose.tools.view.server import new_token, start_server, stop_server
+    from tfcompose.tools.view.windows import Windows
 
     bag = _bag_view(session, arguments) if arguments.bag else None
     if arguments.live:
@@ -131,25 +132,26 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     token = new_token()
     port = _free(arguments.host, arguments.port)
     server = start_server(arguments.host, port, session.robot.name, token)
-    shown = None
+    shown: ReloadedPanel | Windows | None = None
     try:
-        joints = arguments.joints or not (arguments.live or arguments.bag)
-        shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=joints)
-        if bag is not None:
-            bag.show(server, shown)
         address = _address(arguments.host, server.get_port(), token)
-        with _announced(address, arguments), Watcher(files) as watcher:
-            if arguments.live:
-                from tfcompose.tools.view.live_view import follow
+        if arguments.live:
+            from tfcompose.tools.view.live_view import follow
 
+            shown = ReloadedPanel(server, session, files, edit=False, joints=arguments.joints)
+            with _announced(address, arguments), Watcher(files) as watcher:
                 return follow(
                     server, shown, watcher.changed, _tolerance(arguments), joints=arguments.joints
                 )
+        extend = bag.show if bag is not None else None
+        shown = Windows(
+            server, session, files, edit=arguments.edit, joints=bag is None, extend=extend
+        )
+        with _announced(address, arguments), Watcher(files) as watcher:
             while True:
                 watcher.changed.wait()
                 watcher.changed.clear()
-                if shown.reload() and bag is not None:
-                    bag.show(server, shown)
+                shown.reload()
     finally:
         if shown is not None:
             shown.end()

@@ -1,9 +1,13 @@
 """``tfcompose lint FOLDER``: the robot files below it, and no other YAML."""
 
+import os
 from pathlib import Path
+
+import pytest
 
 from tfcompose.cli import main
 from tfcompose.cli.commands.lint import robots_in
+from tfcompose.foundation.reading import MOST_BYTES
 
 ROBOT = "# a robot\ntfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 
@@ -36,3 +40,43 @@ def test_a_robot_whose_first_key_is_misspelt_and_a_file_that_cannot_be_read_are_
 def test_a_file_stands_for_itself_and_a_folder_without_robots_too(tmp_path: Path) -> None:
     assert robots_in("nothing.yaml") == ["nothing.yaml"]
     assert robots_in(str(tmp_path)) == [str(tmp_path)], "so that it is said that it is a folder"
+
+
+def test_what_is_larger_than_a_robot_can_be_is_none(tmp_path: Path) -> None:
+    (tmp_path / "data.yaml").write_bytes(b"- 1\n" * (MOST_BYTES // 4 + 1))
+    (tmp_path / "robot.yaml").write_text(ROBOT, encoding="utf-8")
+    assert robots_in(str(tmp_path)) == [str(tmp_path / "robot.yaml")]
+
+
+def test_other_file_systems_and_what_the_kernel_shows_as_files_are_not_searched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("here", "mounted", "proc"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "robot.yaml").write_text(ROBOT, encoding="utf-8")
+    real = os.stat
+
+    def stat(path: str) -> os.stat_result:
+        """Return what is there, the folder ``mounted`` being another file system."""
+        found = list(real(path))
+        found[2] += path.endswith("mounted")
+        return os.stat_result(found)
+
+    monkeypatch.setattr("tfcompose.cli.commands.lint._OF_KERNEL", {str(tmp_path / "proc")})
+    monkeypatch.setattr("tfcompose.cli.commands.lint.os.stat", stat)
+    assert robots_in(str(tmp_path)) == [str(tmp_path / "here" / "robot.yaml")]
+    assert robots_in(str(tmp_path / "mounted")) == [str(tmp_path / "mounted" / "robot.yaml")]
+
+
+def test_a_long_search_says_once_what_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "robot.yaml").write_text(ROBOT, encoding="utf-8")
+    robots_in(str(tmp_path))
+    assert not capsys.readouterr().err
+    monkeypatch.setattr("tfcompose.cli.commands.lint.SAY_AFTER_S", 0.0)
+    robots_in(str(tmp_path))
+    said = capsys.readouterr().err
+    assert said.count(str(tmp_path)) == 1

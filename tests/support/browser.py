@@ -12,11 +12,14 @@ from playwright.sync_api import sync_playwright
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from playwright.sync_api import Page
+    import viser
+    from playwright.sync_api import Browser, Page
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
+#: The token of servers of tests.
+TOKEN = "token-of-a-test"  # noqa: S105 (no secret)
 #: How long a page may take to do something, in milliseconds: software draws slowly.
 TIMEOUT_MS = 60_000
 _SOFTWARE = [
@@ -27,17 +30,29 @@ _SOFTWARE = [
 ]
 
 
+def address_of(server: viser.ViserServer, host: str = "127.0.0.1") -> str:
+    """Return the address that lets a page in."""
+    return f"http://{host}:{server.get_port()}/?token={TOKEN}"
+
+
 @contextmanager
-def page_of(address: str, width: int = 1000, height: int = 700) -> Iterator[Page]:
-    """Open the address in a browser; the test is skipped where there is none."""
+def browser() -> Iterator[Browser]:
+    """Start a browser; the test is skipped where there is none."""
     if CHROMIUM is None:
         pytest.skip("there is no Chromium: apt install chromium")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=_SOFTWARE)
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=_SOFTWARE)
         try:
-            page = browser.new_page(viewport={"width": width, "height": height})
-            page.set_default_timeout(TIMEOUT_MS)
-            page.goto(address, wait_until="load")
-            yield page
+            yield chromium
         finally:
-            browser.close()
+            chromium.close()
+
+
+@contextmanager
+def page_of(address: str, width: int = 1000, height: int = 700) -> Iterator[Page]:
+    """Open the address in a browser; the test is skipped where there is none."""
+    with browser() as chromium:
+        page = chromium.new_page(viewport={"width": width, "height": height})
+        page.set_default_timeout(TIMEOUT_MS)
+        page.goto(address, wait_until="load")
+        yield page

@@ -16,18 +16,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.reading import read_text
-from tfcompose.cli.terminal import fail, print_findings, reject
+from tfcompose.cli.terminal import fail, plain, print_findings, printable, reject
 from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.resolve import Library
 from tfcompose.compiler.urdf.inertia import UnmeasurableError
 from tfcompose.compiler.urdf.packages import FETCH, Disk
-from tfcompose.foundation.findings import RejectedError, Span, did_you_mean
+from tfcompose.foundation.findings import RejectedError, Span, did_you_mean, finding
+from tfcompose.foundation.reach import Reach
+from tfcompose.foundation.reading import is_file, is_folder
 from tfcompose.spec.language import Given, GivenArg, set_value, with_includes
 from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from tfcompose.compiler.urdf.inertia import Moments
     from tfcompose.compiler.urdf.packages import Packages
@@ -51,17 +53,22 @@ def library(read: Callable[[str], str] = read_text) -> Library:
 
 @dataclass(frozen=True, slots=True)
 class PresetFolders:
-    """Presets in folders of this machine; ``open_text`` returns the text of a file or raises RejectedError."""
+    """Presets in folders of this machine.
+
+    ``open_text`` returns the text of a file or raises RejectedError, ``allows`` tells whether a
+    path may be looked at.
+    """
 
     open_text: Callable[[str], str] = read_text
+    allows: Callable[[str], bool] = lambda _: True
 
     def has(self, path: str) -> bool:
         """Return whether the file is there."""
-        return Path(path).is_file()
+        return self.allows(path) and is_file(path)
 
     def is_folder(self, path: str) -> bool:
         """Return whether the folder is there."""
-        return Path(path).is_dir()
+        return self.allows(path) and is_folder(path)
 
     def read(self, path: str) -> str:
         """Return its text; raises RejectedError."""
@@ -69,7 +76,11 @@ class PresetFolders:
 
     def models(self, folder: str) -> list[str]:
         """Return the names, vendor/model, of the presets in the folder."""
-        files = sorted((file.parent.name, file.stem) for file in Path(folder).glob("*/*.yaml"))
+        files = sorted(
+            (file.parent.name, file.stem)
+            for file in Path(folder).glob("*/*.yaml")
+            if self.allows(str(file))
+        )
         return [f"{vendor}/{model}" for vendor, model in files if vendor != "nodes"]
 
     def packages(self) -> list[str]:
@@ -123,6 +134,11 @@ def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) ->
     return [*files, *(set_value(setting) for setting in arguments.settings)]
 
 
+def disk_of(file: str, arguments: Namespace) -> Disk:
+    """Return this machine's files for a robot file that the command line names."""
+    return disk(trusts_files=arguments.trust, sources=[file])
+
+
 def given_by(arguments: Namespace) -> Given:
     """Return what the command line and the environment give the robot's arguments."""
     args = {
@@ -150,7 +166,7 @@ def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Com
         overlays = overlays_of(arguments)
         compiled = compile_robot(
             read_text(file), file, library(), arguments.profiles,
-            overlays=overlays, read=read_text, disk=disk(), given=given_by(arguments),
+            overlays=overlays, read=read_text, disk=disk_of(file, arguments), given=given_by(arguments),
         )  # fmt: skip
     except RejectedError as error:
         reject(error.findings)
@@ -193,18 +209,44 @@ def _ancestry(robot: Robot, frame: str) -> list[Edge]:
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
 
-def disk() -> Disk:
-    """Return this machine's files, with the packages of the workspaces that are sourced."""
+def disk(
+    *,
+    trusts_files: bool = False,
+    sources: Sequence[str] = (),
+    folders: Sequence[str] = (),
+    is_strict: bool = False,
+) -> Disk:
+    """Return this machine's files, with the packages of the workspaces that are sourced.
+
+    Xacro files may also read the trees of ``sources``, and these ``folders``; everything if files
+    are trusted. With ``is_strict`` none is expanded where the kernel cannot confine it.
+    """
     prefixes = tuple(
         prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix
     )
+
+    def expanded(
+        file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None
+    ) -> Expansion:
+        reach = Reach(everything=trusts_files)
+        for source in sources:
+            reach.add_tree(source)
+        for folder in folders:
+            reach.add_folder(folder)
+        if use is None or not use.macro:
+            read_text(file)  # a file that cannot be read is refused as everywhere
+        from tfcompose.compiler.urdf.expand import Sandbox, expand  # loads what runs xacro
+
+        sandbox = Sandbox(reach, print_output, report_missing_confinement, is_strict)
+        return expand(file, packages, arguments, use, sandbox)
+
     return Disk(
         read_text,
-        os.path.isfile,
-        os.path.isdir,
+        is_file,
+        is_folder,
         prefixes=prefixes,
         moments=moments,
-        expand=_expanded,
+        expand=expanded,
         is_pointer=_is_pointer,
     )
 
@@ -236,12 +278,24 @@ def moments(path: str, scale: Vector) -> Moments:
     return mesh.moments(path, scale)
 
 
-def _expanded(
-    file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None
-) -> Expansion:
-    """Return what xacro makes of a file, or of a call of one of its macros; xacro is loaded only here."""
-    if use is None or not use.macro:
-        read_text(file)  # a file that cannot be read is refused as everywhere
-    from tfcompose.compiler.urdf.expand import expand
+def print_output(file: str, text: str) -> None:
+    """Print what a file had printed while it was read: each line with the file's name, on stderr."""
+    for line in text.splitlines():
+        sys.stderr.write(f"{printable(file)}: {plain(line)}\n")
 
-    return expand(file, packages, arguments, use)
+
+_reported: set[str] = set()
+_NOT_HELD = {
+    "Landlock": "launch files can read every file that you can read",
+    "seccomp": "xacro and launch files can do what you can do",
+}
+
+
+def report_missing_confinement(missing: Sequence[str]) -> None:
+    """Print, once for each, what the kernel does not have to confine what files run."""
+    for feature in missing:
+        if feature not in _reported:
+            _reported.add(feature)
+            message = f"this kernel has no {feature}: {_NOT_HELD[feature]}"
+            advice = "tfcompose help sandbox; read files of strangers on another machine"
+            print_findings([finding("TF923", message, None, help=advice)], sys.stderr)

@@ -29,6 +29,7 @@ TOPICS = {
     "strict": "holding back what a process does not own",
     "background": "robots without a terminal: ps, logs, restart, down",
     "rmw": "Fast DDS, Cyclone DDS or Zenoh",
+    "sandbox": "what xacro and launch files of other people can do",
     "ci": "lint, diff and verify in CI; exit codes",
     "python": "the TF buffer in Python",
     "costs": "what it costs, measured",

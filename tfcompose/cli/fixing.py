@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import replace_file
 from tfcompose.foundation.findings import edited
+from tfcompose.foundation.reading import is_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -89,7 +90,7 @@ class Fixer:
 
     def _may_edit(self, file: str) -> bool:
         path = _path(file)
-        return path in map(_path, self.files) and Path(path).is_file()
+        return path in map(_path, self.files) and is_file(path)
 
     def _findings(self, files: Iterable[str]) -> list[Finding]:
         return [one for file in files for one in self.lint(file, self.read)]

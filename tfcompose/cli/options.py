@@ -61,6 +61,15 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         metavar="NAME:=VALUE",
         help="the value of an argument of the robot file",
     )
+    add_trust(parser)
+
+
+def add_trust(parser: ArgumentParser) -> None:
+    """Add --trust."""
+    parser.add_argument(
+        "--trust", action="store_true",
+        help="run xacro and launch files of your own without the sandbox: see help sandbox",
+    )  # fmt: skip
 
 
 def pairs(words: list[str], between: str) -> dict[str, str]:

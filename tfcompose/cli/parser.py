@@ -118,12 +118,28 @@ def main(argv: list[str] | None = None) -> int:
         if error.errno == errno.ENOENT and not _has_working_folder():
             sys.stderr.write("tfcompose: the current folder was removed; cd to an existing one\n")
             return UNREADABLE
+        if error.errno in _OF_A_PATH and error.filename is not None:
+            return _refuse_path(error)
         if error.errno != errno.ENOSPC:
             raise
         _discard_output()
         sys.stderr.write(f"tfcompose: the output cannot be written: {error.strerror}\n")
         return UNREADABLE
     return code
+
+
+#: What the disk says of a path that somebody named: no command is at fault.
+_OF_A_PATH = frozenset({
+    errno.EACCES, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EROFS
+})  # fmt: skip
+
+
+def _refuse_path(error: OSError) -> int:
+    from tfcompose.cli.terminal import print_findings
+    from tfcompose.foundation.reading import unreadable
+
+    print_findings(unreadable(os.fsdecode(error.filename), error).findings, sys.stderr)
+    return UNREADABLE
 
 
 def _main(words: list[str]) -> int:

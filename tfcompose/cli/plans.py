@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, reject
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.reading import is_file, read_bytes
 from tfcompose.model.files import with_absolute_addresses
 from tfcompose.model.plan import Plan
 from tfcompose.model.plan.file import read_plan, write_plan
@@ -35,7 +36,7 @@ def is_plan(file: str) -> bool:
 def in_folder(file: str) -> str:
     """Return the plan in the folder that a command was given, as ``build`` writes one; else the file as it is."""
     plan = Path(file) / PLAN
-    return str(plan) if plan.is_file() else file
+    return str(plan) if is_file(plan) else file
 
 
 def built_plan(file: Path) -> Plan:
@@ -145,8 +146,8 @@ def copy_plan(
     }
     try:
         for name in (*descriptions, *(process.params_file for process in plan.processes)):
-            if name is not None and (file.parent / name).is_file():
-                parts[name] = (file.parent / name).read_bytes()
+            if name is not None and is_file(file.parent / name):
+                parts[name] = read_bytes(file.parent / name)
         for name in descriptions & parts.keys():
             parts[name] = _with_absolute_addresses(
                 parts[name], ((build_dir or file.parent) / name).parent
@@ -162,6 +163,8 @@ def copy_plan(
             FileNotFoundError
         ):  # who has won the race for the run removed it as an earlier one's
             _write_copy(parts, folder)
+    except RejectedError as error:
+        reject(error.findings)
     except OSError as error:
         fail(f"the plan cannot be copied to {place.folder}: {error.strerror}", UNREADABLE)
     return folder / PLAN

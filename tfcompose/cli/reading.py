@@ -1,4 +1,4 @@
-"""Files of this machine as text, with findings about what cannot be read."""
+"""Files that the command line names, as text; and lines of files as findings quote them."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import contextlib
 import re
 import sys
 from functools import cache
-from pathlib import Path
 
-from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
+from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.foundation.reading import MOST_BYTES, no_text, read_bytes
 
-MOST_BYTES = 16_000_000
-#: Of files with another ending than these, the robot files are named that are there in their
-#: place.
-_ENDINGS = (".urdf", ".xacro", ".launch", ".py", ".xml", ".sh", ".bash")
 #: The name of standard input.
 STDIN = "-"
-
-#: Pipes that the shell has opened. One with a name would block until it is written to.
-_OPEN_ALREADY = ("/dev/fd/", "/dev/stdin", "/proc/")
+#: XML that findings quote, and parameters, calibrations, plans and launch files that are not XML.
+_XML = re.compile(r"<(?:robot|launch|package|sdf)\b|<xacro:|xmlns:xacro")
+_OTHERS = re.compile(
+    r"\bros__parameters[\"']?\s*:|^\s*[\"']?(?:T_cn_cnm1|T_cam_imu|transform|camera_matrix)[\"']?\s*:"
+    r"|\"spec_digest\"\s*:|^launch\s*:|\bgenerate_launch_description\b",
+    re.MULTILINE,
+)
 
 
 def read_text(path: str) -> str:
@@ -28,23 +28,7 @@ def read_text(path: str) -> str:
         RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too
             large.
     """
-    file = Path(path)
-    try:
-        if file.is_fifo() and not path.startswith(_OPEN_ALREADY):
-            raise RejectedError(
-                [finding("TF001", "cannot be read: it is a pipe, not a file", Span(path))]
-            )
-        if path == STDIN:
-            data = _standard_input()
-        else:
-            with file.open("rb") as stream:
-                data = stream.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise RejectedError([_unreadable(path, error)]) from None
-    except ValueError:
-        raise RejectedError(
-            [finding("TF001", "a file name cannot hold a NUL byte", Span("?"))]
-        ) from None
+    data = _standard_input() if path == STDIN else read_bytes(path)
     if len(data) > MOST_BYTES:
         raise RejectedError(
             [finding("TF008", f"the file is larger than {MOST_BYTES:,} bytes", Span(path))]
@@ -69,41 +53,49 @@ def _decode_as_declared(path: str, data: bytes, error: UnicodeDecodeError) -> st
     if declared:
         with contextlib.suppress(LookupError, UnicodeDecodeError):
             return data.decode(declared[1].decode())
-    before = data[: error.start]
-    line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
-    message = f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8"
     advice = "save it as UTF-8"
     if is_urdf:
         advice += (
             ', or declare its encoding in the first line: <?xml version="1.0"'
             ' encoding="ISO-8859-1"?>'
         )
-    place = Span(path, line, column, line, column + 1)
-    raise RejectedError([finding("TF001", message, place, help=advice)]) from None
+    raise no_text(path, data, error, advice) from None
 
 
-def _unreadable(path: str, error: OSError) -> Finding:
-    advice = ""
-    if isinstance(error, FileNotFoundError):
-        folder = Path(path).parent
-        ending = next((one for one in _ENDINGS if path.endswith(one)), ".yaml")
-        there = sorted(file.name for file in folder.glob(f"*{ending}")) if folder.is_dir() else []
-        advice = (
-            f"in {folder} there is {', '.join(there[:8])}"
-            if there
-            else f"there is no {ending} file in {folder}"
-        )
-    elif isinstance(error, IsADirectoryError):
-        advice = "name a file in it"
-    return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)
+_quoted: set[str] = set()
+_withheld: set[str] = set()
+
+
+def quote(file: str) -> None:
+    """Let ``line_of`` quote a file, whatever it holds: the user named it for a command that reads such files."""
+    _quoted.add(file)
+
+
+def withhold(file: str) -> None:
+    """Let ``line_of`` quote nothing of a file, which may not be read."""
+    _withheld.add(file)
 
 
 @cache
 def _lines(file: str) -> list[str]:
     try:
-        return read_text(file).splitlines()
+        text = read_text(file)
     except RejectedError:
         return []
+    return text.splitlines() if file in _quoted or _is_of_a_robot(text) else []
+
+
+def _is_of_a_robot(text: str) -> bool:
+    """Return whether a text is about robots; others can hold passwords, and lint's output may be public."""
+    if text.lstrip().startswith("<"):
+        return _XML.search(text) is not None
+    if "\0" in text:
+        return False
+    if _OTHERS.search(text):
+        return True
+    from tfcompose.spec.language.recognition import is_recognized  # pydantic is slow to load
+
+    return is_recognized(text)
 
 
 def forget_lines() -> None:
@@ -112,6 +104,8 @@ def forget_lines() -> None:
 
 
 def line_of(file: str, line: int) -> str | None:
-    """Return a line of a file, counted from 1, or None."""
+    """Return a line of a file, counted from 1; None if there is none, or the file is not about robots."""
+    if file in _withheld:
+        return None
     lines = _lines(file)
     return lines[line - 1] if 0 < line <= len(lines) else None

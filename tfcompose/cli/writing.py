@@ -19,6 +19,7 @@ from tfcompose.cli.compiling import compiled_without_errors
 from tfcompose.cli.terminal import UNREADABLE, fail, reject, warn
 from tfcompose.compiler.emit import described, emit
 from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.reading import exists, is_file, is_folder
 from tfcompose.model.files import Target, unaddressed
 from tfcompose.model.plan import DESCRIPTION
 
@@ -38,7 +39,7 @@ def replace_file(path: Path, data: bytes) -> None:
     Raises:
         OSError: if it cannot be written; it is as it was.
     """
-    before = path.stat() if path.exists() else None
+    before = path.stat() if exists(path) else None
     if path.is_symlink() or (before and not stat.S_ISREG(before.st_mode)):
         path.write_bytes(data)
         return
@@ -78,7 +79,7 @@ def write_all(folder: Path, files: Sequence[File]) -> None:
     Raises:
         OSError: if the files cannot be written; then nothing has changed.
     """
-    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    made = [parent for parent in (folder, *folder.parents) if not exists(parent)]
     before, now = _parameter_files(folder), {file.path for file in files}
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -99,18 +100,16 @@ def write_all(folder: Path, files: Sequence[File]) -> None:
 def _move(staging: Path, folder: Path, paths: list[str]) -> None:
     """Move the files into place, all or none: what they replace is kept until the last one is there."""
     made = [
-        parent
-        for parent in {(folder / path).parent: None for path in paths}
-        if not parent.exists()
+        parent for parent in {(folder / path).parent: None for path in paths} if not exists(parent)
     ]
     done: list[str] = []
     try:
         for path in paths:
             target, old = folder / path, staging / "old" / path
-            if target.is_dir() and not target.is_symlink():
+            if is_folder(target) and not target.is_symlink():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
             target.parent.mkdir(parents=True, exist_ok=True)
-            if target.exists():
+            if exists(target):
                 old.parent.mkdir(parents=True, exist_ok=True)
                 _back_up(target, old)
         for path in paths:
@@ -135,7 +134,7 @@ def _back_up(target: Path, old: Path) -> None:
 
 def _put_back(old: Path, target: Path) -> None:
     with contextlib.suppress(OSError):
-        if old.exists():
+        if exists(old):
             old.replace(target)
         else:
             target.unlink()
@@ -156,7 +155,7 @@ def _write_to_disk(path: Path, text: str) -> None:
 
 def _parameter_files(folder: Path) -> list[str]:
     """Return the parameter files that the plan in the folder names: those that an earlier build wrote."""
-    if not (folder / "params").is_dir():
+    if not is_folder(folder / "params"):
         return []
     try:
         processes = json.loads((folder / "plan.json").read_text("utf-8"))["processes"]
@@ -199,7 +198,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
         reject(different)
     try:
         write_all(folder, files)
-        if not arguments.output and Path(arguments.file).is_file():
+        if not arguments.output and is_file(arguments.file):
             replace_file(
                 _source_file(folder), os.fsencode(f"{os.path.relpath(arguments.file, folder)}\n")
             )

@@ -9,6 +9,8 @@ from pathlib import Path
 from struct import Struct
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.reading import exists, is_file, is_folder, names_in
 from tfcompose.model.plan.topics import namespace_options
 from tfcompose.tf.live.edges import nearer_clock
 from tfcompose.tf.live.pose_query import NoPose
@@ -290,12 +292,16 @@ def _files_at(path: Path) -> list[Path]:
     """
     if path.name == "metadata.yaml":
         path = path.parent
-    if not path.exists():
+    if not exists(path):
         raise BagError(f"there is no bag {path}")
-    if path.is_dir():
-        if (path / "metadata.yaml").exists():
+    if is_folder(path):
+        if is_file(path / "metadata.yaml"):
             return [path]
-        files = sorted((file for file in path.iterdir() if file.suffix in ENDINGS), key=_in_order)
+        try:
+            there = [path / name for name in names_in(path)]
+        except RejectedError as error:
+            raise BagError(f"{path} {error.findings[0].message}") from None
+        files = sorted((file for file in there if file.suffix in ENDINGS), key=_in_order)
         if not files:
             advice = "ros2 bag record makes a folder with metadata.yaml, which says what is in it"
             raise BagError(f"{path} has no metadata.yaml and holds no recording", advice)
@@ -347,4 +353,5 @@ def _damaged(path: str, error: Exception) -> BagError:
 
 
 def _is_mcap(path: Path) -> bool:
-    return path.suffix == ".mcap" or any(path.glob("*.mcap"))
+    names = names_in(path) if is_folder(path) else [path.name]
+    return any(name.endswith(".mcap") for name in names)

@@ -277,6 +277,8 @@ def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
     cell: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert cell  # writes the package
+    manifest = tmp_path / "third/arm/package.xml"
+    manifest.write_text("<package><name>arm</name></package>", "utf-8")
     (tmp_path / "robots").mkdir()
     text = (
         HEAD.replace("third/arm", "../third/arm")

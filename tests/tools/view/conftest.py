@@ -6,15 +6,16 @@ from pathlib import Path
 import pytest
 import viser
 
+from tests.support.browser import TOKEN
 from tests.tools.view.test_view import ROVER
-from tfcompose.tools.view.server import started, stop
+from tfcompose.tools.view.server import start_server, stop_server
 
 
 @pytest.fixture
 def server() -> Iterator[viser.ViserServer]:
-    one = started("127.0.0.1", 0, "test")
+    one = start_server("127.0.0.1", 0, "test", TOKEN)
     yield one
-    stop(one)
+    stop_server(one)
 
 
 @pytest.fixture

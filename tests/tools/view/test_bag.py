@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.bags import START_S, UP, Sent, write_bag
+from tests.support.browser import TOKEN
 from tests.support.cli import tfcompose_in
 from tests.tools.view.test_live import TEXT, TOLERANCE, robot_of
 from tests.tools.view.test_view import session_of
@@ -16,7 +17,7 @@ from tfcompose.tf.bags import BagError
 from tfcompose.tools.view.bag import BagTree, Recorded
 from tfcompose.tools.view.live_panel import BagPanel
 from tfcompose.tools.view.panel import Panel
-from tfcompose.tools.view.server import started, stop
+from tfcompose.tools.view.server import start_server, stop_server
 
 SECONDS = 10
 
@@ -113,7 +114,7 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         TEXT.replace("{base_link: {}", "{base_link: {visual: {box: [1, 1, 1]}}"), "utf-8"
     )
     session = session_of(tmp_path / "r.yaml")
-    server = started("127.0.0.1", 0, "test")
+    server = start_server("127.0.0.1", 0, "test", TOKEN)
     try:
         panel = Panel(server, session, edit=False, joints=False)
         recorded = Recorded(str(bag), [GLOBAL])
@@ -134,7 +135,7 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
             "it outlives a reload"
         )
     finally:
-        stop(server)
+        stop_server(server)
 
 
 @pytest.mark.parametrize("at", ["10.5", "-1", "x", f"{START_S - 1}"])

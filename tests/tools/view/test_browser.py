@@ -9,7 +9,7 @@ import pytest
 import viser
 from playwright.sync_api import Locator, Page
 
-from tests.support.browser import page_of
+from tests.support.browser import address_of, page_of
 from tests.support.cli import tfcompose_in
 from tests.support.waiting import until
 from tests.tools.view.test_view import ROVER, session_of
@@ -46,7 +46,7 @@ def test_a_mount_that_is_moved_in_the_browser_is_saved_as_one_line(
 ) -> None:
     session = session_of(rover)
     panel = Panel(server, session, edit=True)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         select_front_link(page, panel)
         enter(page, "x (mm)", "512.5")
         until(lambda: bool(session.moved))
@@ -73,7 +73,7 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
 ) -> None:
     session = session_of(rover)
     panel = Panel(server, session, edit=True)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         select_front_link(page, panel)
         before = session.mount("front_link").given(session.mount("front_link").edge.pose)
 
@@ -129,7 +129,7 @@ def test_a_slider_in_the_browser_moves_its_wheel_only(
     panel = Panel(server, session_of(rover), edit=False)
     wheels = ("front_left_wheel_link", "front_right_wheel_link")
     left, right = (panel.scene.body_pose(wheel) for wheel in wheels)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         enter(page, "front_left_wheel_joint (deg)", "30")
         until(lambda: panel.positions["front_left_wheel_joint"] != 0)
     off = offset_of(
@@ -166,7 +166,7 @@ def test_a_click_selects_a_body_and_owners_can_be_hidden(
     rover: Path, server: viser.ViserServer
 ) -> None:
     panel = Panel(server, session_of(rover), edit=False)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         page.get_by_text("odom is a root").wait_for()
         assert until(lambda: clicked_body(page, panel) == "base_link")
         page.get_by_text("by ekf").wait_for()
@@ -181,7 +181,7 @@ def test_the_tree_selects_closes_and_hides_what_is_below_a_frame(
     rover: Path, server: viser.ViserServer
 ) -> None:
     panel = Panel(server, session_of(rover), edit=False)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         in_tree(page, "lidar_sensor", "select").click()
         page.get_by_text("lidar_sensor in base_link").wait_for()
         in_tree(page, "front_link", "open").click()
@@ -201,7 +201,7 @@ def test_the_tree_selects_closes_and_hides_what_is_below_a_frame(
 @pytest.mark.slow
 def test_arrow_keys_lead_through_the_tree(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         in_tree(page, "front_link", "select").click()
         page.locator("[data-frame=front_link][aria-selected=true]").wait_for()
         for key, frame in (
@@ -229,7 +229,7 @@ def test_a_search_keeps_what_is_above_and_selects_the_one_that_is_found(
     rover: Path, server: viser.ViserServer
 ) -> None:
     panel = Panel(server, session_of(rover), edit=False)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         page.get_by_text("odom is a root").wait_for()
         everything = rows(page)
         assert everything == list(panel.tree.tree.frames)
@@ -257,7 +257,7 @@ sensors: {{{json.dumps(name + "s")}: {{preset: generic/camera, parent: base_link
 """
     (tmp_path / "r.yaml").write_text(text, "utf-8")
     panel = Panel(server, session_of(tmp_path / "r.yaml"), edit=True)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         panel.tree.select(name)
         page.get_by_text(f"pose of {name} in base_link").wait_for()
         panel.move(Pose((2, 0, 0)))
@@ -278,7 +278,7 @@ def test_a_tree_of_hundreds_of_frames_stays_where_it_was_scrolled_to(
         f"tfcompose: 1\nrobot: r\nframes:\n  base: {{}}\n{frames}", "utf-8"
     )
     panel = Panel(server, session_of(tmp_path / "r.yaml"), edit=False)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         row = page.locator("[data-frame=f250]")
         row.scroll_into_view_if_needed()
         before = row.bounding_box()
@@ -311,7 +311,7 @@ def test_a_sweep_moves_every_joint_until_it_is_switched_off(
 ) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     joints = dict(panel.positions)
-    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+    with page_of(address_of(server)) as page:
         page.get_by_text("sweep", exact=True).wait_for()
         tick(page, "sweep")
         until(lambda: all(abs(panel.positions[name] - joints[name]) > 0.5 for name in joints))

@@ -14,7 +14,7 @@ from PIL import Image
 from playwright.sync_api import Page
 
 from tests.support.bags import write_bag
-from tests.support.browser import page_of
+from tests.support.browser import TOKEN, address_of, page_of
 from tests.support.fake_nodes import sending
 from tests.support.robots import EXTERNAL
 from tests.support.waiting import in_one_of_a_few, until
@@ -29,7 +29,7 @@ from tfcompose.tf.tf2 import Buffer, TransformListener
 from tfcompose.tools.view.bag import BagTree, Recorded
 from tfcompose.tools.view.live_panel import BagPanel
 from tfcompose.tools.view.panel import Panel
-from tfcompose.tools.view.server import started, stop
+from tfcompose.tools.view.server import start_server, stop_server
 
 pytestmark = [pytest.mark.ros, pytest.mark.xdist_group("browser")]
 
@@ -64,7 +64,7 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(tmp_path: Path, no
     with (
         sending("diff_drive", "odom", "base_link", rate=20),
         following(session_of(tmp_path / "r.yaml")) as view,
-        page_of(f"http://127.0.0.1:{view.server.get_port()}") as page,
+        page_of(address_of(view.server)) as page,
     ):
         page.get_by_text("all edges as expected").wait_for()
         page.locator("canvas").first.wait_for()
@@ -90,7 +90,7 @@ def test_a_slider_in_the_browser_moves_the_wheel_as_a_tf_listener_has_it(
     with (
         following(session, joints=True) as view,
         TransformListener(buffer := Buffer()),
-        page_of(f"http://127.0.0.1:{view.server.get_port()}") as page,
+        page_of(address_of(view.server)) as page,
     ):
         page.get_by_text("the sliders publish /joint_states").wait_for()
         enter(page, "w (deg)", "30")
@@ -110,7 +110,7 @@ def test_a_recording_is_scrubbed_forward_and_back_in_the_browser(tmp_path: Path)
     (tmp_path / "r.yaml").write_text(TEXT, "utf-8")
     session = session_of(tmp_path / "r.yaml")
     recorded = Recorded(str(write_bag(tmp_path / "bag", sent())), [GLOBAL])
-    server = started("127.0.0.1", 0, "test")
+    server = start_server("127.0.0.1", 0, "test", TOKEN)
     try:
         panel = Panel(server, session, edit=False, joints=False)
         BagPanel(
@@ -119,7 +119,7 @@ def test_a_recording_is_scrubbed_forward_and_back_in_the_browser(tmp_path: Path)
             BagTree(session.robot, plan_of(session.robot), recorded, TOLERANCE),
             recorded.length_s,
         )
-        with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+        with page_of(address_of(server)) as page:
             for at_s in (8.0, 3.0):
                 enter(page, "time (s)", str(at_s))
                 odom_x = pytest.approx(-at_s)
@@ -129,18 +129,18 @@ def test_a_recording_is_scrubbed_forward_and_back_in_the_browser(tmp_path: Path)
             enter(page, "time (s)", "1")
             page.get_by_text("nothing was recorded yet at 1.00 s").wait_for()
     finally:
-        stop(server)
+        stop_server(server)
 
 
 def test_the_page_of_another_address_opens_with_its_token(tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_text(TEXT, "utf-8")
-    server = started("127.0.0.2", 0, "test", "secret")
+    server = start_server("127.0.0.2", 0, "test", TOKEN)
     try:
         Panel(server, session_of(tmp_path / "r.yaml"), edit=False)
         address = f"http://127.0.0.2:{server.get_port()}"
         with page_of(address) as page:
             page.get_by_text("open the address with its token").wait_for()
-            page.goto(f"{address}/?token=secret", wait_until="load")
+            page.goto(address_of(server, "127.0.0.2"), wait_until="load")
             page.get_by_text("drive").first.wait_for()
     finally:
-        stop(server)
+        stop_server(server)

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import viser
 
+from tests.support.browser import TOKEN
 from tests.support.robots import EXTERNAL
 from tests.support.waiting import in_one_of_a_few, until
 from tests.tools.view.test_view import session_of
@@ -22,7 +23,7 @@ from tfcompose.model.plan.file import write_plan
 from tfcompose.tools.view.live_view import Following, observers_of
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.reload import Files, ReloadedPanel
-from tfcompose.tools.view.server import started, stop
+from tfcompose.tools.view.server import start_server, stop_server
 from tfcompose.tools.view.session import Session
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
@@ -60,7 +61,7 @@ def following(session: Session, *, joints: bool = False) -> Iterator[View]:
     files, changed = Files(lambda one: Path(one).read_text("utf-8")), threading.Event()
     for file in session.texts:
         files(file)
-    server, ending = started("127.0.0.1", 0, "test"), Stop()
+    server, ending = start_server("127.0.0.1", 0, "test", TOKEN), Stop()
     shown = ReloadedPanel(server, session, files, edit=False, joints=joints)
     follows = Following(server, shown, changed, Offset(1e-3, 1e-3), joints=joints)
     observers = observers_of(plan_of(session.robot))
@@ -71,7 +72,7 @@ def following(session: Session, *, joints: bool = False) -> Iterator[View]:
     finally:
         ending.request()
         thread.join()
-        stop(server)
+        stop_server(server)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 import viser
 from PIL import Image
 
-from tests.support.browser import page_of
+from tests.support.browser import address_of, page_of
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.reading import read_text
 from tfcompose.compiler.compile import Compiled, compile_robot
@@ -37,7 +37,7 @@ def test_each_robot_fills_its_picture(file: Path, server: viser.ViserServer, fol
 
     session = Session({str(file): file.read_text("utf-8")}, compiled, lambda *_: None)
     Panel(server, session, edit=False)
-    with page_of(f"http://127.0.0.1:{server.get_port()}", 1400, 900) as page:
+    with page_of(address_of(server), 1400, 900) as page:
         page.get_by_text("Frame", exact=True).wait_for()
         page.wait_for_timeout(4000)  # a picture tells nobody that it is drawn
         picture = page.screenshot(path=folder / f"{file.stem}.png")

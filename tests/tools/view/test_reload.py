@@ -6,13 +6,14 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from tests.support.browser import TOKEN
 from tests.support.tables import for_each
 from tests.support.waiting import until
 from tfcompose.cli.parser import parser_of
 from tfcompose.cli.reading import read_text
 from tfcompose.foundation.geometry import Pose
 from tfcompose.tools.view.reload import Files, ReloadedPanel, Watcher
-from tfcompose.tools.view.server import started, stop
+from tfcompose.tools.view.server import start_server, stop_server
 from tfcompose.tools.view.view_session import session_of
 
 TEXT = """tfcompose: 1
@@ -40,9 +41,9 @@ def shown(tmp_path: Path) -> Iterator[ReloadedPanel]:
     session = session_of(
         str(tmp_path / "r.yaml"), parser_of("view").parse_args([str(tmp_path / "r.yaml")]), files
     )
-    server = started("127.0.0.1", 0, "test")
+    server = start_server("127.0.0.1", 0, "test", TOKEN)
     yield ReloadedPanel(server, session, files, edit=True, joints=True)
-    stop(server)
+    stop_server(server)
 
 
 def replace(path: Path, text: str) -> None:
@@ -198,7 +199,7 @@ def test_a_robot_that_was_wrong_from_the_begin_is_shown_again_while_it_is_wrong(
     file.write_text(wrong, "utf-8")
     files = Files(read_text)
     session = session_of(str(file), parser_of("view").parse_args([str(file)]), files)
-    server = started("127.0.0.1", 0, "test")
+    server = start_server("127.0.0.1", 0, "test", TOKEN)
     try:
         other = ReloadedPanel(server, session, files, edit=False, joints=False)
         replace(file, wrong.replace("[0, 0, 1], axis", "[0, 0, 2], axis"))
@@ -206,4 +207,4 @@ def test_a_robot_that_was_wrong_from_the_begin_is_shown_again_while_it_is_wrong(
         assert other.panel.poses()["arm"].xyz == (0, 0, 2)
         assert "TF" in other.found
     finally:
-        stop(server)
+        stop_server(server)

@@ -115,7 +115,9 @@ def _check_output(path: Path) -> None:
             else f"{path} has no suffix"
         )
         fail(f"{what}; -o takes a file ending in {FORMAT_NAMES}", UNREADABLE)
-    if not path.parent.is_dir():
+    from tfcompose.foundation.reading import is_folder
+
+    if not is_folder(path.parent):
         fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
     if ending == ".png" and find_spec("pypdfium2") is None:
         advice = "pip install 'tfcompose[pictures]'; svg and pdf need nothing"

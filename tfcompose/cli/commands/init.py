@@ -62,7 +62,9 @@ def run(arguments: Namespace) -> int:
         output,
         with_schema=arguments.schema,
     )
-    there = [str(path) for path in files if path.exists() or path.is_symlink()]
+    from tfcompose.foundation.reading import exists
+
+    there = [str(path) for path in files if exists(path) or path.is_symlink()]
     if there:
         fail(f"nothing was written: {', '.join(there)} exists; -o FILE names another", UNREADABLE)
     for path, text in files.items():

@@ -12,7 +12,7 @@ import sys
 import time
 from argparse import ArgumentTypeError
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose import __version__
 from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from tfcompose.cli.fixing import Fixer
     from tfcompose.compiler.compile import Compiled
-    from tfcompose.compiler.resolve import Library
+    from tfcompose.compiler.resolve import Disk, Library
     from tfcompose.foundation.findings import Finding
     from tfcompose.spec.language import Given
     from tfcompose.spec.load import Source
@@ -47,11 +47,16 @@ _ROBOT = re.compile(
 )
 
 URDF_ENDINGS = (".urdf", ".xacro")
+_YAML = (".yaml", ".yml")
 #: How often --watch checks the files, in seconds.
 CHECK_EVERY_S = 0.3
 #: For how long a file is judged in combinations of its arguments, in seconds; the first is always
 #: judged.
 JUDGE_FOR_S = 60.0
+#: After this time a search for robot files says what it does, in seconds.
+SAY_AFTER_S = 5.0
+#: What the kernel shows as files: reading some waits, or does something.
+_OF_KERNEL = frozenset({"/proc", "/sys", "/dev"})
 #: Moves the cursor home and clears the screen (ECMA-48).
 CLEAR = "\033[H\033[2J"
 
@@ -106,6 +111,10 @@ def arguments(parser: ArgumentParser) -> None:
         help="skip named YAML files that are not robot files",
     )
     parser.add_argument(
+        "--untrusted", action="store_true",
+        help="for files of strangers, as in CI: read nothing but a robot's own tree, and no environment",
+    )  # fmt: skip
+    parser.add_argument(
         "-w",
         "--watch",
         action="store_true",
@@ -143,7 +152,15 @@ def run(arguments: Namespace) -> int:
         fail("standard input cannot be fixed or watched: name a file", UNREADABLE)
     if (arguments.diff or arguments.watch) and arguments.format != "text":
         fail("--diff and --watch are for people: leave out --format", UNREADABLE)
-    return _watch(arguments) if arguments.watch else _lint(arguments, read_text)
+    if arguments.untrusted:
+        for option in ("fix", "diff", "trust"):
+            if getattr(arguments, option):
+                fail(f"--untrusted reports, and trusts nothing: leave out --{option}", UNREADABLE)
+    from tfcompose.cli.untrusted import without_environment
+
+    with without_environment(applies=arguments.untrusted) as environment:
+        arguments.environment = environment
+        return _watch(arguments) if arguments.watch else _lint(arguments, read_text)
 
 
 def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
@@ -171,7 +188,7 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
         is_changed = bool(arguments.diff and fixer.texts)
     else:
         cases = {file: lint(file, read) for file in robots}
-    cases |= {file: _selected(_lint_urdf(file, arguments.given), arguments) for file in urdfs}
+    cases |= {file: _selected(_lint_urdf(file, arguments, read), arguments) for file in urdfs}
     found = [one for case in cases.values() for one in case]
     _print(cases, arguments, len(robots) + len(urdfs))
     if exit_code_of(found) == UNREADABLE:
@@ -215,7 +232,7 @@ def _stamp(file: str) -> _Stamp:
     """Return the file's time of change and size, or None if it is not there."""
     try:
         found = Path(file).stat()
-    except OSError:
+    except (OSError, ValueError):
         return None
     return found.st_mtime_ns, found.st_size
 
@@ -226,9 +243,7 @@ def _files(arguments: Namespace) -> list[str]:
     files = dict.fromkeys(file for name in names for file in robots_in(name))
     if not arguments.skip_foreign:
         return list(files)
-    return [
-        file for file in files if not file.endswith((".yaml", ".yml")) or _is_robot(Path(file))
-    ]
+    return [file for file in files if not file.endswith(_YAML) or is_robot(file)]
 
 
 def _selected(found: list[Finding], arguments: Namespace) -> list[Finding]:
@@ -249,13 +264,20 @@ def _failing(arguments: Namespace) -> frozenset[str]:
     return frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
 
 
-def _lint_urdf(file: str, given: Mapping[str, str]) -> list[Finding]:
-    """Return what is wrong with a URDF or xacro file, of which these arguments are given."""
+def _lint_urdf(file: str, arguments: Namespace, read: Callable[[str], str]) -> list[Finding]:
+    """Return what is wrong with a URDF or xacro file."""
     from tfcompose.cli.compiling import disk
     from tfcompose.compiler.urdf.lint import lint_urdf
     from tfcompose.compiler.urdf.packages import Packages
 
-    return lint_urdf(file, Packages(disk(), advice="source the workspace's setup file"), given)
+    if arguments.untrusted:
+        from tfcompose.cli.untrusted import UntrustedFiles
+
+        files = UntrustedFiles(file, read).disk()
+    else:
+        files = disk(trusts_files=arguments.trust)
+    packages = Packages(files, advice="source the workspace's setup file")
+    return lint_urdf(file, packages, arguments.given)
 
 
 def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
@@ -279,24 +301,69 @@ def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
 
 
 def robots_in(name: str) -> list[str]:
-    """Return the file itself, or the robot files below a folder: YAML files with a line that begins with tfcompose:."""
+    """Return the file itself, or the robot files below a folder.
+
+    Those are YAML files with a line that begins with tfcompose:. Folders that hold no files of
+    people, and those on other file systems, as ``find -xdev`` has them, are left out.
+    """
+    from tfcompose.foundation.reading import is_file
+
     robots: list[str] = []
+    progress = _Progress(name)
+    device = _device(name)
     for top, folders, files in os.walk(name):
-        folders[:] = sorted(inner for inner in folders if not inner.startswith("."))
-        paths = [Path(top, file) for file in sorted(files) if file.endswith((".yaml", ".yml"))]
-        robots += [str(path) for path in paths if path.is_file() and _is_robot(path)]
+        folders[:] = [
+            folder
+            for folder in sorted(folders)
+            if not folder.startswith(".") and _is_searched(f"{top}/{folder}", device)
+        ]
+        paths = [str(Path(top, file)) for file in sorted(files) if file.endswith(_YAML)]
+        robots += [path for path in paths if is_file(path) and is_robot(path)]
+        progress.count_files(len(paths))
     return robots or [name]
 
 
-def _is_robot(file: Path) -> bool:
+class _Progress:
+    """Says what a long search does, once."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._say_at = time.monotonic() + SAY_AFTER_S
+        self._files = 0
+
+    def count_files(self, count: int) -> None:
+        """Count YAML files that were looked at."""
+        self._files += count
+        if time.monotonic() >= self._say_at:
+            self._say_at = float("inf")
+            warn(
+                f"looking for robot files below {self._name}: {self._files} YAML files so far;"
+                " name a folder with fewer to be faster"
+            )
+
+
+def _device(folder: str) -> int:
+    """Return the file system of a folder, 0 if it cannot be looked at."""
+    try:
+        return os.stat(folder).st_dev  # noqa: PTH116 (as os.walk has it)
+    except (OSError, ValueError):
+        return 0
+
+
+def _is_searched(folder: str, device: int) -> bool:
+    """Return whether a folder is on this file system and holds files of people."""
+    return os.path.realpath(folder) not in _OF_KERNEL and _device(folder) == device
+
+
+def is_robot(file: str) -> bool:
     """Return whether it is one, or cannot be read: its own lint says why."""
-    from tfcompose.cli.reading import MOST_BYTES
+    from tfcompose.foundation.findings import RejectedError
+    from tfcompose.foundation.reading import read_bytes
 
     try:
-        with file.open("rb") as stream:
-            return bool(_ROBOT.search(stream.read(MOST_BYTES)))
-    except OSError:
-        return True
+        return bool(_ROBOT.search(read_bytes(file)))
+    except RejectedError as error:  # what is larger than a robot may be is none
+        return all(found.code == "TF001" for found in error.findings)
 
 
 def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) -> None:
@@ -327,6 +394,38 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
         sys.stdout.write(render_sarif(found, __version__))
 
 
+class _Files(NamedTuple):
+    """Files that a robot file may read, and the variables that its arguments may."""
+
+    read: Callable[[str], str]
+    presets: Library
+    #: Of the file, with what it includes.
+    disk_of: Callable[[Source], Disk]
+    environment_of: Callable[[Source], Mapping[str, str]]
+
+
+def _files_of(
+    file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]
+) -> _Files:
+    """Return all files of this machine; with --untrusted those of the robot's tree."""
+    if not arguments.untrusted:
+        from tfcompose.cli.compiling import disk
+
+        files = disk(trusts_files=arguments.trust, sources=[file])
+        return _Files(read, presets, lambda _: files, lambda _: os.environ)
+    from tfcompose.cli.untrusted import UntrustedFiles, declared_environment
+
+    untrusted = UntrustedFiles(file, read)
+    for overlay in arguments.overlays:
+        untrusted.reach.add_tree(overlay)
+    return _Files(
+        untrusted.read,
+        untrusted.library(),
+        untrusted.disk_for,
+        lambda source: declared_environment(source, arguments.environment),
+    )
+
+
 def lint_file(
     file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]
 ) -> list[Finding]:
@@ -336,26 +435,30 @@ def lint_file(
     """
     from dataclasses import replace
 
-    from tfcompose.cli.compiling import disk, given_by, overlays_of
+    from tfcompose.cli.compiling import given_by, overlays_of
     from tfcompose.compiler.check import unused_allows
     from tfcompose.compiler.compile import compile_source
     from tfcompose.foundation.findings import Note, RejectedError
     from tfcompose.spec.language import profiles_in, with_includes
     from tfcompose.spec.load import load
 
+    files = _files_of(file, presets, arguments, read)
     try:
-        source = with_includes(load(read(file), file), read)
-        overlays = overlays_of(arguments)
+        source = with_includes(load(files.read(file), file), files.read)
+        overlays = overlays_of(arguments, files.read)
     except RejectedError as error:
         return list(error.findings)
     profiles, given = arguments.profiles, given_by(arguments)
+    given = replace(given, environment=files.environment_of(source))
     if not arguments.is_one:  # an argument is one of any of the files
         declared = source.data.get("args")
         names = given.args.keys() & (declared if isinstance(declared, dict) else {}).keys()
         given = replace(given, args={name: given.args[name] for name in names})
 
+    disk = files.disk_of(source)
+
     def compiled(given: Given, names: Sequence[str]) -> Compiled:
-        return compile_source(source, presets, names, overlays, read, disk(), given)
+        return compile_source(source, files.presets, names, overlays, files.read, disk, given)
 
     found, judged = _judged(source, arguments, overlays, given, compiled)
     if profiles or overlays:

@@ -75,10 +75,11 @@ def run(arguments: Namespace) -> int:
 def _place(robot: str | None, command: str) -> RuntimeDir:
     """Return the robot that runs, or the one that has run last: of those that the name, or else this shell, means."""
     from tfcompose.cli.runs import chosen_run, in_scope, is_meant
+    from tfcompose.foundation.reading import is_folder
     from tfcompose.launcher.output import last_modified
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
-    there = [place for place in runtime_dirs(os.environ) if place.logs.is_dir()]
+    there = [place for place in runtime_dirs(os.environ) if is_folder(place.logs)]
     meant = [place for place in there if is_meant(place, robot)] if robot else in_scope(there)
     running = [place for place in meant if place.holder()]
     if meant and len(running) <= 1:

@@ -14,8 +14,8 @@ from tfcompose.compiler.resolve.foreign import foreign
 from tfcompose.compiler.resolve.part import PartEntry
 from tfcompose.compiler.resolve.resolved import Collected, Resolved
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.spec.language import Given, composed, validate, with_includes
-from tfcompose.spec.load import load, path_named
+from tfcompose.spec.language import Given, composed, load_named, validate, with_includes
+from tfcompose.spec.load import path_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -100,7 +100,7 @@ class Parts:
                 [finding("TF015", f"robots are parts of each other: {circle}", at)]
             )
         inside = replace(self, files=(*self.files, file), found=[], missing=[])
-        loaded = with_includes(load(read(file), file), read)
+        loaded = with_includes(load_named(read(file), file), read)
         self.collected.notes.setdefault(file, []).append(_note(part))
         given = Given(part.given_args(), self.environment)
         validated = validate(

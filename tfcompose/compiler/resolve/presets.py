@@ -14,7 +14,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
-from tfcompose.spec.language import validate_node_preset, validate_preset
+from tfcompose.spec.language import load_named, validate_node_preset, validate_preset
 from tfcompose.spec.language.overlay import extended_by, lay_over, without
 from tfcompose.spec.language.preset import PresetSpec
 from tfcompose.spec.load import load
@@ -278,7 +278,7 @@ class Library:
             file = self.file(name)
             if file is None:
                 raise KeyError(name)
-            own = load(self.storage.read(file), file)
+            own = load_named(self.storage.read(file), file)
             self._sources[name] = self._extended(own, name, deep)
         return self._sources[name]
 
@@ -308,7 +308,7 @@ class Library:
         if base == name:  # it stands before one of the same name, and changes it
             later = self._later(own.file)
             below = (
-                self._extended(load(self.storage.read(later), later), name, deep + 1)
+                self._extended(load_named(self.storage.read(later), later), name, deep + 1)
                 if later
                 else None
             )

@@ -1,35 +1,35 @@
-"""Xacro files, expanded by xacro itself; what xacro refuses is a finding at its place in the xacro file.
+"""Xacro files, expanded by xacro itself; what xacro refuses is a finding at its place in the file.
 
-xacro runs in a process of its own, with bounds of time and memory. It names the expression and the
-macros that it stopped at, and neither line nor column: they are looked for here.
+xacro runs confined in a process of its own, which asks here for each file. It names the expression
+and the macros that it stopped at, and neither line nor column: they are looked for here.
 """
 
 from __future__ import annotations
 
-import json
 import os
+import posixpath
 import re
 import signal
-import socket
-import subprocess
-import sys
 import tempfile
-import threading
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 from tfcompose.compiler.urdf.xacro import NAMESPACE, Expansion, macros_in
+from tfcompose.foundation import confined
+from tfcompose.foundation.confined import Outcome, fits, run_confined
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.foundation.reach import OutsideError, Reach, is_package
 
 if TYPE_CHECKING:
-    import io
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterator, Mapping
 
     from tfcompose.compiler.urdf.packages import Packages
     from tfcompose.compiler.urdf.xacro import Use
 
+#: The module that runs xacro, confined.
+PROCESS = "tfcompose.compiler.urdf.xacro_process"
 #: How a file declares an argument, and how it asks for one.
 _ARGUMENT = re.compile(r"""<xacro:arg\b[^>]*?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)""")
 #: What xacro's messages name, and how that begins in a file.
@@ -40,92 +40,167 @@ _NAMED = (
 _WORD = re.compile(r"""["']?(\w+)["']?""")
 #: At most so many of the macros around an error are named.
 _MOST_MACROS = 5
-#: Files may be on a disk that does not answer; the process bounds its processor time itself.
-_MOST_WALL_S = 600.0
+#: Of each file that is read.
+_MOST_BYTES = 16_000_000
 #: Bytes of an expression that the process keeps for when it ends.
 _NOTED = 4000
+_OUTSIDE = (
+    "a file reads its folder, its repository, and ROS packages, which have a package.xml; --trust"
+    " lifts that for files of your own"
+)
+_UNSAFE = "an expression computes values: leave these names out"
 _ALONE = (
     "simplify it; or expand it outside of tfcompose, xacro {file} > robot.urdf, and use that file"
 )
 
 
+_PLACE = ([int], None)
+#: What the process answers.
+_MADE = {"text": str, "files": [str], "places": [_PLACE], "comments": [[int]]}
+_MARK = ([(str, int)], None)
+_STOPPED = {
+    "kind": str, "reason": str, "files": [str], "macros": [[(str, None)]], "error": _MARK, "at": _MARK
+}  # fmt: skip
+_PAIR, _IN_PLACE = 2, 3
+#: Characters of a reason.
+_LONGEST = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class Sandbox:
+    """How xacro is run: what it may read; and who is told what it prints and what does not hold it."""
+
+    reach: Reach = field(default_factory=Reach)
+    print_output: Callable[[str, str], None] = lambda _file, _text: None
+    report_missing: Callable[[tuple[str, ...]], None] = lambda _: None
+    #: Whether xacro is refused where the kernel cannot confine it.
+    is_strict: bool = False
+
+
 def expand(
-    file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None = None
+    file: str,
+    packages: Packages,
+    arguments: Mapping[str, Any],
+    use: Use | None = None,
+    sandbox: Sandbox | None = None,
 ) -> Expansion:
-    """Return what xacro makes of a file, or of a call of one of its macros; ``packages`` answer $(find …).
+    """Return what xacro makes of a file, or of a call of one of its macros.
+
+    ``packages`` answer $(find …). What may be read are the trees of the file that names it, the
+    package that it is in and those that it finds, beside what the sandbox has.
 
     Raises:
         RejectedError: if xacro refuses the file, or needs too much for it; with the findings where
             a robot file names it, if one does.
     """
+    sandbox = sandbox or Sandbox()
     given = {name: str(value) for name, value in arguments.items()}
+    files = _Files(file, packages, sandbox.reach, use)
+    trusted = sandbox.reach.everything
+    wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
-        "file": file,
-        "arguments": given,
-        "call": _document(use) if use and use.macro else None,
-    }
+        "file": file, "arguments": given, "call": _document(use) if use and use.macro else None,
+        "is_trusted": trusted, "is_strict": sandbox.is_strict, "wall_s": wall_s,
+    }  # fmt: skip
     with tempfile.TemporaryFile() as noted:
         noted.truncate(_NOTED)
-        answer, code = _answered(request, file, packages, noted)
-        if answer is None:
-            raise RejectedError([_where_used(_ended(code, _text_in(noted), file), use)])
+        outcome = run_confined(
+            PROCESS, request, files.answers,
+            wall_s=wall_s, shared=[noted.fileno()],
+        )  # fmt: skip
+        sandbox.print_output(file, outcome.printed)
+        sandbox.report_missing(outcome.missing)
+        answer = outcome.answer
+        if sandbox.is_strict and "seccomp" in outcome.missing:
+            message = "xacro was not run: this kernel has no seccomp, which confines it"
+            unconfined = finding("TF923", message, Span(file), severity="error")
+            raise RejectedError([_where_used(unconfined, use)])
+        if not (_is_made(answer) or fits(answer, _STOPPED)):
+            raise RejectedError([_where_used(_ended(outcome, _text_in(noted), files), use)])
     if "text" not in answer:
-        raise RejectedError([_refused(_Stop(**answer), file, packages, use)])
-    _refuse_unknown(given, answer["read"], file, use)
+        raise RejectedError([_refused(_Stop.of(answer, files), files, packages, use)])
+    if files.refused:  # the file kept quiet about it
+        outside = finding(
+            "TF021", f"{files.refused[0]} may not be read", Span(file), help=_OUTSIDE
+        )
+        raise RejectedError([_where_used(outside, use)])
+    if not all(map(files.has_served, answer["files"])):
+        raise RejectedError([_where_used(_ended(outcome, "", files), use)])
+    _refuse_unknown(given, files.served, file, use)
     names = tuple(_shown(name, file) for name in answer["files"])
     places = tuple(tuple(place) if place else None for place in answer["places"])
     return Expansion(answer["text"], names, places, tuple(map(tuple, answer["comments"])))
 
 
-def _answered(
-    request: Mapping[str, Any], file: str, packages: Packages, noted: IO[bytes]
-) -> tuple[dict[str, Any] | None, int]:
-    """Return the process's answer to a request, None where it was ended, and its exit code."""
-    ours, theirs = socket.socketpair()
-    inherited = [theirs.fileno(), noted.fileno()]
-    program = (
-        f"import sys; sys.path[:] = {sys.path!r}; from tfcompose.compiler.urdf.xacro_process"
-        " import main; main"
-    )
-    command = [sys.executable, "-c", f"{program}(*{inherited})"]
-    answer: dict[str, Any] | None = None
-    with (
-        ours,
-        ours.makefile("rwb") as channel,
-        subprocess.Popen(
-            command, stdout=2, pass_fds=inherited
-        ) as process,  # what xacro prints is for people
-    ):
-        theirs.close()
-        watchdog = threading.Timer(_MOST_WALL_S, process.kill)
-        watchdog.daemon = True
-        watchdog.start()
+def _is_made(answer: Any) -> bool:
+    """Return whether an answer is what xacro made of a file, whoever sent it."""
+    if not fits(answer, _MADE):
+        return False
+    count = len(answer["files"])
+    places = [*filter(None, answer["places"]), *answer["comments"]]
+    if not all(len(place) == _IN_PLACE and 0 <= place[0] < count for place in places):
+        return False
+    try:
+        answer["text"].encode()
+    except UnicodeEncodeError:  # half a character
+        return False
+    return min((number for place in places for number in place), default=0) >= 0
+
+
+class _Files:
+    """Answers what the process asks: only files that it may read, and remembers which."""
+
+    def __init__(self, file: str, packages: Packages, reach: Reach, use: Use | None) -> None:
+        self.file, self._packages, self._reach = file, packages, reach
+        #: Absolute paths of files that were read, and paths of those that were not.
+        self.served: dict[str, None] = {}
+        self.refused: list[str] = []
+        is_of_user = use is None or use.at.file.startswith("--")  # named on the command line
+        reach.add_tree(file if use is None or is_of_user else use.at.file)
+        for name in (file, *(use.files if use else ())):
+            if not reach.allows(name):
+                reach.add_package_around(name)
+        self.answers: dict[str, Callable[[str], tuple[Any, bytes]]] = {
+            "find": self._find, "read": self._read, "list": self._list
+        }  # fmt: skip
+
+    def has_served(self, name: str) -> bool:
+        """Return whether the process has read a file: it may not have any other one shown."""
+        return posixpath.abspath(name) in self.served
+
+    def _find(self, name: str) -> tuple[Any, bytes]:
+        folder = self._packages.folder(name, self.file)
+        if folder is None:
+            return {"folder": None}, b""
+        named = self._packages.named.get(name)
+        is_named = named is not None and posixpath.abspath(folder) == posixpath.abspath(
+            self._packages.candidates(name)[0]
+        )
+        if not is_named or is_package(folder):
+            self._reach.add_folder(folder)
+        return {"folder": posixpath.abspath(folder)}, b""  # it takes files from other folders
+
+    def _read(self, path: str) -> tuple[Any, bytes]:
         try:
-            message = _exchanged(channel, request)
-            while "find" in message:
-                folder = packages.folder(message["find"], file)
-                absolute = folder and str(
-                    Path(folder).absolute()
-                )  # the process takes files from other folders
-                message = _exchanged(channel, absolute)
-            answer = message
-        except (OSError, json.JSONDecodeError):
-            pass  # the process's end says why
-        except BaseException:
-            process.kill()
-            raise
-        finally:
-            process.wait()
-            watchdog.cancel()
-    return answer, process.returncode
+            data = self._reach.read(path, _MOST_BYTES)
+        except OutsideError:
+            return self._refuse(path)
+        except OSError as error:
+            return {"error": [error.errno, error.strerror]}, b""
+        self.served[posixpath.abspath(path)] = None
+        return {"bytes": len(data)}, data
 
+    def _list(self, folder: str) -> tuple[Any, bytes]:
+        try:
+            return {"names": self._reach.names_in(folder)}, b""
+        except OutsideError:
+            return self._refuse(folder)
+        except OSError as error:
+            return {"error": [error.errno, error.strerror]}, b""
 
-def _exchanged(channel: io.BufferedRWPair, message: Any) -> dict[str, Any]:
-    """Send a message, and return the next one."""
-    channel.write(json.dumps(message).encode() + b"\n")
-    channel.flush()
-    answer: dict[str, Any] = json.loads(channel.readline())
-    return answer
+    def _refuse(self, path: str) -> tuple[Any, bytes]:
+        self.refused.append(path)
+        return {"outside": True}, b""
 
 
 def _document(use: Use) -> str:
@@ -207,9 +282,29 @@ class _Stop:
     error: tuple[str, int, int] | None
     at: tuple[str, int, int] | None
 
+    @classmethod
+    def of(cls, answer: Mapping[str, Any], files: _Files) -> _Stop:
+        """Return what the process says, as far as it is about files that it has read."""
 
-def _refused(stop: _Stop, file: str, packages: Packages, use: Use | None) -> Finding:
-    """Return what xacro, or something that it called, did not like, and where, or in which other file."""
+        def mark(value: Any) -> tuple[str, int, int] | None:
+            if not fits(value, [(str, int)]) or list(map(type, value)) != [str, int, int]:
+                return None
+            return tuple(value) if files.has_served(value[0]) else None
+
+        macros = [pair for pair in answer["macros"] if len(pair) == _PAIR and None not in pair]
+        return cls(
+            answer["kind"],
+            answer["reason"][:_LONGEST],
+            list(filter(files.has_served, answer["files"])),
+            [(name, file) for name, file in macros if files.has_served(file)],
+            mark(answer["error"]),
+            mark(answer["at"]),
+        )
+
+
+def _refused(stop: _Stop, files: _Files, packages: Packages, use: Use | None) -> Finding:
+    """Return what xacro did not like, or something that it called, and where."""
+    file = files.file
     begins = [(stop.at[0], stop.at[1])] if stop.at else []
     if stop.kind == "package":
         missing = replace(packages.not_found(stop.reason, None), severity="error", span=Span(file))
@@ -223,17 +318,18 @@ def _refused(stop: _Stop, file: str, packages: Packages, use: Use | None) -> Fin
         found = _placed(
             finding("TF008", stop.reason, Span(file), help=_ALONE.format(file=file)), stop, begins
         )
+    elif stop.kind == "outside":
+        found = _placed(finding("TF021", stop.reason, Span(file), help=_OUTSIDE), stop, begins)
+    elif stop.kind == "unsafe":
+        found = _placed(finding("TF022", stop.reason, Span(file), help=_UNSAFE), stop, begins)
     else:
         found = _placed(finding("TF018", f"xacro: {stop.reason}", Span(file)), stop, begins)
     found = _relative_to(file, found)
     others = [name for name in stop.files[-1:] if Path(name).absolute() != Path(file).absolute()]
     if others and found.span == Span(file) and stop.kind not in {"package", "argument"}:
         found = replace(found, message=f"{found.message} (in {os.path.relpath(others[0])})")
-    return (
-        _in_call(found, file, use)
-        if use and use.macro and stop.kind == "refused"
-        else _where_used(found, use)
-    )
+    is_of_call = use and use.macro and stop.kind == "refused" and files.has_served(file)
+    return _in_call(found, file, use) if use and is_of_call else _where_used(found, use)
 
 
 def _at_words(found: Finding, pattern: str, begins: list[tuple[str, int]]) -> Finding:
@@ -270,26 +366,31 @@ def _mark(file: str, line: int, column: int) -> Span:
     return Span(file, line, column + 1, line, column + 2)
 
 
-def _ended(code: int, noted: str, file: str) -> Finding:
+def _ended(outcome: Outcome, noted: str, files: _Files) -> Finding:
     """Return the finding that the process was ended, and what it was evaluating then."""
-    if code == -signal.SIGVTALRM:
+    code, file = outcome.code, files.file
+    if outcome.timed_out:
+        message = f"xacro was ended: it took more than {confined.MOST_WALL_S:g} s"
+    elif outcome.refused:
+        message = f"xacro was ended: {outcome.refused}"
+    elif outcome.answer is not None:
+        message = "xacro was ended: its answer is none"
+    elif code == -signal.SIGVTALRM:
         message = "xacro was ended: an expression takes too long"
     elif code == -signal.SIGKILL:
         message = "xacro was ended: it took too long, or too much memory"
     else:
-        message = (
-            f"xacro was ended by {signal.Signals(-code).name}"
-            if code < 0
-            else f"xacro gave up with code {code}"
-        )
-    found = finding(
-        "TF008",
-        f"{message}: {noted}" if noted else message,
-        Span(file),
-        help=_ALONE.format(file=file),
-    )
+        by_signal = f"xacro was ended by {_signal_name(-code)}"
+        message = by_signal if code < 0 else f"xacro gave up with code {code}"
+    full = f"{message}: {noted}" if noted else message
+    found = finding("TF008", full, Span(file), help=_ALONE.format(file=file))
     words = r"\s+".join(map(re.escape, noted.split()))
-    return _at_words(found, words, [(file, 0)]) if words else found
+    return _at_words(found, words, [(file, 0)]) if words and files.has_served(file) else found
+
+
+def _signal_name(number: int) -> str:
+    is_known = number in set(signal.Signals)
+    return signal.Signals(number).name if is_known else f"signal {number}"
 
 
 def _text_in(noted: IO[bytes]) -> str:

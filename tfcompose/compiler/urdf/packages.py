@@ -34,6 +34,10 @@ _IN_PACKAGE = re.compile(
     r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)"
 )
 _NEAR = 0.8  # many packages end in _description
+OUTSIDE = (
+    "with --untrusted a robot reads its folder, its repository, packages and presets; leave"
+    " --untrusted out for files of your own"
+)
 FETCH = "run git lfs pull to fetch the file"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 
@@ -59,6 +63,8 @@ class Disk:
     moments: Callable[[str, Vector], Moments] | None = None
     expand: Callable[[str, Packages, Mapping[str, Any], Use | None], Expansion] = _not_expanded
     is_pointer: Callable[[str], bool] = lambda _: False
+    #: Whether a file may be read at all.
+    allows: Callable[[str], bool] = lambda _: True
 
 
 @dataclass(slots=True)
@@ -153,6 +159,8 @@ class Packages:
         path = (
             posixpath.normpath(path) if path.startswith("/") else path_named(path, Span(document))
         )
+        if refusal := self._refusal(path, uri, at):
+            return Asset(uri, at), refusal
         package, inside = self._package_above(path)
         return Asset(uri, at, path, package, inside), self._missing(
             path, f"file {uri} not found", at
@@ -177,9 +185,17 @@ class Packages:
         if folder not in self.candidates(name):
             self.local[name] = folder
         path = posixpath.join(folder, inside)
+        if refusal := self._refusal(path, uri, at):
+            return Asset(uri, at), refusal
         return Asset(uri, at, path, name, inside), self._missing(
             path, f"file {inside} not found in {name}", at
         )
+
+    def _refusal(self, path: str, uri: str, at: Span) -> Finding | None:
+        if self.disk is None or self.disk.allows(path):
+            return None
+        message = f"{uri} may not be read: it is outside of the robot's tree"
+        return finding("TF021", message, at, help=OUTSIDE)
 
     def _missing(self, path: str, message: str, at: Span) -> Finding | None:
         if self.disk is None:

@@ -100,6 +100,13 @@ class _Origin:
     source: _Text
     begin: int
 
+    @classmethod
+    def at(cls, source: _Text, line: int, column: int) -> _Origin:
+        """Return the place in a line, from 1, and column, from 0, or the nearest that there is."""
+        starts = source.starts
+        begin = starts[min(max(line, 1), len(starts)) - 1] + column
+        return cls(source, min(begin, len(source.text)))
+
 
 class Element:
     """A tag with its attributes and child elements; ``text`` is its own text, if it was asked for.
@@ -204,13 +211,9 @@ def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) 
     reader = _Reader(expansion.text, file)
     texts = [_Text(read(name), name) for name in expansion.files]
     nowhere = _Origin(_Text("", file), 0)
-    reader.origins = []
-    for place in expansion.places:
-        origin = nowhere
-        if place:
-            number, line, column = place
-            origin = _Origin(texts[number], texts[number].starts[line - 1] + column)
-        reader.origins.append(origin)
+    reader.origins = [
+        _Origin.at(texts[place[0]], *place[1:]) if place else nowhere for place in expansion.places
+    ]
     return reader.read()
 
 
@@ -260,7 +263,8 @@ class _Reader:
         )
 
     def _open(self, tag: str, attributes: dict[str, str]) -> None:
-        origin = self.origins[self.elements] if self.origins else None
+        is_known = self.elements < len(self.origins)
+        origin = self.origins[self.elements] if is_known else None
         self.elements += 1
         element = Element(tag, attributes, self.source, self.parser.CurrentByteIndex, origin)
         if self.elements > MOST_VALUES or len(self.stack) >= DEEPEST:

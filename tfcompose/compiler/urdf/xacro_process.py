@@ -1,35 +1,46 @@
-"""xacro in a process of its own, which can be ended: it evaluates expressions, and a file may ask for anything.
+"""xacro in a confined process of its own: it evaluates expressions, which may ask for anything.
 
-It reads one request and writes lines of JSON: questions for packages, each of which is answered by
-a line, then what xacro made, or why it stopped. It imports xacro and nothing of tfcompose, because
-each expansion starts one.
+It can open no file. It asks who started it for packages, texts and lists of folders, then answers
+with what xacro made, or why it stopped. It imports xacro and of tfcompose the sandbox alone,
+because each expansion starts one.
 """
 
 from __future__ import annotations
 
+import encodings.utf_8_sig  # noqa: F401 (once confined, no module can be loaded)
+import fnmatch
 import io
-import json
 import mmap
 import os
-import resource
+import posixpath
 import signal
+import sys
 from contextlib import contextmanager
 from pathlib import Path
+from types import CodeType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 from xml.dom import Node, expatbuilder
 
 import xacro
 from xacro import substitution_args
 
+from tfcompose.foundation.sandbox import (
+    MOST_MEMORY_BYTES,
+    Channel,
+    confine,
+    limit,
+    take_spare_memory,
+)
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType, TracebackType
 
-#: Processor time for an expansion, and for one expression of it, in seconds.
-MOST_CPU_S = 120
+#: Processor time for one expression, in seconds.
 MOST_EXPRESSION_S = 5.0
-MOST_MEMORY_BYTES = 2 << 30
-#: Of each file that is read, and of the text that is made.
+#: So long before the process is ended it ends by itself, and says what it was busy with.
+_SPARE_S = 1.0
+#: Of the text that is made.
 MOST_BYTES = 16_000_000
 #: Elements that are made on the way; most of what a macro holds can be left out again.
 MOST_ELEMENTS = 1_000_000
@@ -46,6 +57,69 @@ class LimitError(Exception):
 
 class MissingError(LookupError):
     """A package is not found."""
+
+
+class OutsideError(Exception):
+    """A file lies outside of what the document may read."""
+
+
+class UnsafeError(Exception):
+    """An expression uses names that lead out of it."""
+
+
+class Files:
+    """What xacro reads, by asking who started this process."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+
+    def find(self, name: str) -> str | None:
+        """Return the folder of a package, or None."""
+        folder: str | None = self._ask("find", name)["folder"]
+        return folder
+
+    def open(self, path: str) -> io.StringIO:
+        """Return the text of a file, open for reading.
+
+        Raises:
+            OSError: if it cannot be read.
+            OutsideError: if it may not be read.
+            UnicodeDecodeError: if it is not UTF-8.
+        """
+        count = self._ask("read", path)["bytes"]
+        return io.StringIO(self._channel.receive_bytes(count).decode("utf-8-sig"))
+
+    def glob(self, pattern: str) -> list[str]:
+        """Return the paths that match a pattern, as ``glob.glob`` does.
+
+        Raises:
+            OutsideError: if a folder may not be listed.
+        """
+        if not any(character in pattern for character in "*?["):
+            return [pattern]
+        head, tail = posixpath.split(pattern)
+        return [
+            posixpath.join(folder, name)
+            for folder in (self.glob(head) if head else [""])
+            for name in self._names_in(folder or ".")
+            if fnmatch.fnmatch(name, tail) and name.startswith(".") == tail.startswith(".")
+        ]
+
+    def _names_in(self, folder: str) -> list[str]:
+        try:
+            names: list[str] = self._ask("list", folder)["names"]
+        except OSError:  # not there, or no folder
+            return []
+        return names
+
+    def _ask(self, kind: str, value: str) -> dict[str, Any]:
+        self._channel.send({kind: value})
+        reply: dict[str, Any] = self._channel.receive()
+        if "outside" in reply:
+            raise OutsideError(posixpath.normpath(value))
+        if "error" in reply:
+            raise OSError(*reply["error"], value)
+        return reply
 
 
 class _Cloned:
@@ -91,10 +165,10 @@ class _Builder(expatbuilder.ExpatBuilderNS):
 
 
 class Expansion:
-    """Runs xacro on a request; ``find`` answers where a package is, ``note`` keeps what is being evaluated."""
+    """Runs xacro on a request; ``note`` keeps what is being evaluated."""
 
-    def __init__(self, find: Callable[[str], str | None], note: Callable[[str], None]) -> None:
-        self._find = find
+    def __init__(self, files: Files, note: Callable[[str], None]) -> None:
+        self._reader = files
         self._note = note
         self._files: dict[str, int] = {}
         self._cloned = _Cloned()
@@ -115,13 +189,11 @@ class Expansion:
         if len(text) > MOST_BYTES:
             return self._failure(LimitError(f"xacro makes a text of {len(text):,} characters"))
         places, comments = self._places(document)
-        read = [request["file"], *xacro.all_includes]
         return {
             "text": text,
             "files": list(self._files),
             "places": places,
             "comments": comments,
-            "read": read,
         }
 
     def _document(self, request: dict[str, Any]) -> Any:
@@ -137,8 +209,10 @@ class Expansion:
     def _hooked(self) -> Iterator[None]:
         """Put this between xacro and what it opens, parses, evaluates and looks for; it offers no other way."""
         hooks = {
-            (xacro, "open"): _open,
+            (xacro, "open"): self._reader.open,
+            (xacro, "glob"): SimpleNamespace(glob=self._reader.glob),
             (xacro, "parse"): self._parse,
+            (xacro, "safe_eval"): _with_safe_names(xacro.safe_eval),
             (xacro, "eval_text"): self._evaluate(xacro.eval_text),
             (substitution_args, "_eval_find"): self._folder,
         }
@@ -158,16 +232,19 @@ class Expansion:
         if len(xacro.filestack) > MOST_FILES_OPEN:
             names = [Path(name).name for name in xacro.filestack if name]
             raise LimitError(f"files that include each other: … → {' → '.join(names[-3:])}")
-        number = self._files.setdefault(file, len(self._files))
         try:
-            text = _open(os.path.join(xacro.root_dir, file)).read()  # noqa: PTH118 (as xacro does)
+            text = self._reader.open(posixpath.join(xacro.root_dir, file)).read()
         except OSError as error:
             xacro.filestack.pop()
             raise xacro.XacroException(f"{error.strerror}: {error.filename}", exc=error) from error
+        except OutsideError:
+            xacro.filestack.pop()
+            raise
+        number = self._files.setdefault(file, len(self._files))
         return _Builder(number, self._cloned).parseString(text)
 
     def _folder(self, name: str) -> str:
-        folder = self._find(name)
+        folder = self._reader.find(name)
         if folder is None:
             raise MissingError(name)
         return folder
@@ -217,10 +294,15 @@ class Expansion:
             kind, reason = "package", str(root.args[0])
         elif isinstance(root, substitution_args.ArgException):
             kind, reason = "argument", str(root)
+        elif isinstance(root, OutsideError):
+            kind, reason = "outside", " ".join([f"{root} may not be read", *_suffixes(chain)])
+        elif isinstance(root, UnsafeError):
+            words = [f"an expression may not use {root}", *_suffixes(chain)]
+            kind, reason = "unsafe", " ".join(words)
         elif isinstance(root, LimitError):
             kind, reason = "limit", str(root)
         elif isinstance(root, MemoryError):
-            _allow_all(resource.RLIMIT_AS)  # to say so
+            take_spare_memory()  # to say so
             words = [
                 f"xacro needs more than {MOST_MEMORY_BYTES >> 30} GB of memory",
                 *_suffixes(chain),
@@ -290,62 +372,56 @@ def _suffixes(chain: list[Any]) -> list[str]:
     ]
 
 
-def _open(path: str) -> io.StringIO:
-    """Return the text of a plain file of bounded size, open for reading.
-
-    Raises:
-        OSError: if it is none.
-        UnicodeDecodeError: if it is not UTF-8.
-    """
-    if Path(path).exists() and not Path(path).is_file():  # a pipe would be waited for
-        raise OSError(0, "not a plain file", path)
-    with Path(path).open("rb") as file:
-        data = file.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise OSError(0, f"larger than {MOST_BYTES:,} bytes", path)
-    return io.StringIO(data.decode("utf-8-sig"))
+#: Attributes by which generators and tracebacks lead to the functions that evaluate them.
+_FRAMES = frozenset({
+    "ag_code", "ag_frame", "cr_code", "cr_frame", "f_back", "f_builtins", "f_code", "f_globals",
+    "f_locals", "gi_code", "gi_frame", "gi_yieldfrom", "tb_frame", "tb_next",
+})  # fmt: skip
 
 
-def _limit() -> None:
-    """Bound this process by the system."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for who asked
-    signal.signal(signal.SIGXCPU, _refuse_more_time)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    for kind, most in ((resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_AS, MOST_MEMORY_BYTES)):
-        hard = resource.getrlimit(kind)[1]
-        resource.setrlimit(
-            kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
-        )
+def _with_safe_names(evaluate: Callable[..., Any]) -> Callable[..., Any]:
+    """Return xacro's evaluation of an expression, for names in lambdas and generators, too."""
+
+    def evaluated(expression: str, *symbols: Any) -> Any:
+        code = compile(expression.strip(), "<expression>", "eval")
+        unsafe = sorted({name for name in _names_in(code) if name[:2] == "__" or name in _FRAMES})
+        if unsafe:
+            raise UnsafeError(", ".join(unsafe))
+        return evaluate(expression, *symbols)
+
+    return evaluated
 
 
-def _allow_all(kind: int) -> None:
-    hard = resource.getrlimit(kind)[1]
-    resource.setrlimit(kind, (hard, hard))
+def _names_in(code: CodeType) -> Iterator[str]:
+    """Yield the names that code uses, and those of the code in it."""
+    yield from (*code.co_names, *code.co_varnames, *code.co_freevars)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names_in(constant)
 
 
-def _refuse_more_time(_number: int, _frame: FrameType | None) -> None:
-    raise LimitError(f"xacro takes more than {MOST_CPU_S} s")
+def main(reads: int, writes: int, noted: int) -> None:
+    """Serve one request; ``noted`` is a file that keeps what is being evaluated."""
+    channel = Channel(reads, writes)
+    request = channel.receive()
+    limit(request["wall_s"])
 
+    def refuse_more_time(_number: int, _frame: FrameType | None) -> None:
+        raise LimitError(f"xacro takes more than {request['wall_s'] - _SPARE_S:g} s")
 
-def main(channel: int, noted: int) -> None:
-    """Serve one request on a channel; ``noted`` is a file that keeps what is being evaluated. Both are descriptors."""
-    _limit()
-    with os.fdopen(channel, "r+b", buffering=0) as raw, mmap.mmap(noted, 0) as kept:
-        lines = io.BufferedReader(raw)
-
-        def write(message: Any) -> None:
-            data = memoryview(json.dumps(message).encode() + b"\n")
-            while data:
-                data = data[raw.write(data) :]
-
-        def find(name: str) -> str | None:
-            write({"find": name})
-            folder: str | None = json.loads(lines.readline())
-            return folder
+    signal.signal(signal.SIGALRM, refuse_more_time)
+    signal.setitimer(signal.ITIMER_REAL, request["wall_s"] - _SPARE_S)
+    with mmap.mmap(noted, 0) as kept:
+        missing = [] if request["is_trusted"] else confine(None)
+        channel.send({"missing": missing})
+        if request["is_strict"] and "seccomp" in missing:  # which alone keeps it from files
+            os._exit(0)
 
         def note(text: str) -> None:
             data = text.encode("utf-8", "replace")[: len(kept) - 1] + b"\0"
             kept[: len(data)] = data
 
-        write(Expansion(find, note).made(json.loads(lines.readline())))
+        answer = Expansion(Files(channel), note).made(request)
+        sys.stdout.flush()
+        channel.send({"answer": answer})
     os._exit(0)  # nothing is left to be done, and a large document takes long to be freed

@@ -14,6 +14,7 @@ from tfcompose.spec.language.overlay import (
     with_includes,
 )
 from tfcompose.spec.language.pose import DIRECTIONS
+from tfcompose.spec.language.recognition import is_recognized, load_named
 from tfcompose.spec.language.validate import (
     Validated,
     levels_of,
@@ -33,8 +34,10 @@ __all__ = [
     "alternatives_of",
     "as_part",
     "composed",
+    "is_recognized",
     "lay_over",
     "levels_of",
+    "load_named",
     "profiles_in",
     "set_value",
     "validate",

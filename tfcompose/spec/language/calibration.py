@@ -40,7 +40,7 @@ from tfcompose.spec.language.values import InARow, Text
 from tfcompose.spec.load.calibration import load_calibration
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from tfcompose.spec.load import Path, Source
     from tfcompose.spec.load.calibration import Form
@@ -293,9 +293,10 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
     try:
         kind, documents = load_calibration(text, file)
     except RejectedError as error:
-        return unreadable(file, form, at, error.findings)
+        return unreadable(file, form, at, _without_text(error.findings, text))
     wrong = [one for document in documents for one in document.found]
     if wrong:
+        wrong = _without_text(wrong, text)
         return CalibrationFile(
             file, form, (), tuple(_inside("TF610", one, file, at) for one in wrong)
         )
@@ -321,6 +322,20 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
     if not reader.entries and not reader.found:
         reader.found.append(_of_no_format(file, f"holds no pose, read as {chosen}", at))
     return CalibrationFile(file, chosen, tuple(reader.entries), tuple(reader.found))
+
+
+#: What calibration files say, and passwords do not.
+_TYPICAL = re.compile(
+    r"\b(?:T_cam_imu|T_cn_cnm1|transforms?|translation|rotation|quaternion|roll|matrix"
+    r"|robot_base_frame)\b"
+)
+
+
+def _without_text(findings: Sequence[Finding], text: str) -> list[Finding]:
+    """Return the findings about a text; of one that may be anything, they repeat nothing."""
+    if _TYPICAL.search(text) or any(found.code in {"TF001", "TF008"} for found in findings):
+        return list(findings)
+    return [replace(findings[0], message="it cannot be read as a calibration", help="")]
 
 
 def _of_no_format(file: str, what: str, at: Span, advice: str = "") -> Finding:

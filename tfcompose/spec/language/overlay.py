@@ -16,6 +16,7 @@ from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, di
 from tfcompose.spec.language.args import Given
 from tfcompose.spec.language.conditions import holds
 from tfcompose.spec.language.expressions import ExpressionError
+from tfcompose.spec.language.recognition import load_named
 from tfcompose.spec.language.spec import Spec, mappings_at
 from tfcompose.spec.language.tool_keys import robot_model
 from tfcompose.spec.language.variables import NothingNewError, Variables
@@ -452,7 +453,7 @@ class _Includer:
 
     def _load(self, file: str, at: Span, source: Source) -> Source:
         try:
-            return load(self.read(file), file)
+            return load_named(self.read(file), file)
         except RejectedError as error:
             raise RejectedError(
                 [*source.found, *(_included(one, at) for one in error.findings)]

@@ -35,7 +35,7 @@ def run_on_all_hosts(
         fail("--all-hosts needs the package asyncssh: pip install 'tfcompose[deploy]'", UNREADABLE)
     if arguments.robot is not None:
         fail("--all-hosts takes the robot of --file: leave out --robot", UNREADABLE)
-    plan = _plan(arguments.file or DEFAULT_FILE)
+    plan = _plan(arguments)
     printer = _Printer(command, is_json=getattr(arguments, "format", "text") == "json")
     shares = {
         name: _of_host(plan, name, processes) for name in plan.hosts if name in hosts_of(plan)
@@ -54,13 +54,19 @@ def _of_host(plan: Plan, host: str, processes: Sequence[str]) -> list[str]:
     return [name for name in processes if name not in elsewhere]
 
 
-def _plan(file: str) -> Plan:
+def _plan(arguments: Namespace) -> Plan:
     from tfcompose.cli.plans import expected_plan
     from tfcompose.cli.terminal import reject
     from tfcompose.foundation.findings import RejectedError
     from tfcompose.tools.deploy.rollout import target_of
 
-    plan, _ = expected_plan(file, Namespace(profiles=[], overlays=[], settings=[], given={}))
+    file = arguments.file or DEFAULT_FILE
+    plan, _ = expected_plan(
+        file,
+        Namespace(
+            file=file, profiles=[], overlays=[], settings=[], given={}, trust=arguments.trust
+        ),
+    )
     try:
         target_of(plan, [], {})
     except RejectedError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.options import add_trust
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="FILE|PLAN",
         help="with --all-hosts: the robot that has the hosts; default: robot.yaml",
     )
+    add_trust(parser)
 
 
 def run(command: str, arguments: Namespace) -> int | None:

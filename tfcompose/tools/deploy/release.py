@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from tfcompose.compiler.emit import emit
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.foundation.findings import RejectedError, finding
+from tfcompose.foundation.reading import is_file, is_folder
 from tfcompose.model.files import Target, assets
 from tfcompose.model.plan.file import write_plan
 from tfcompose.tools.deploy.agent import digest_of
@@ -167,10 +168,10 @@ def _with_named(named: Mapping[str, str]) -> list[str]:
         path = Path(waiting.pop())
         if path.as_posix() in found:
             continue
-        if path.is_dir():
-            inside = (one for one in sorted(path.rglob("*")) if one.is_file())
+        if is_folder(path):
+            inside = (one for one in sorted(path.rglob("*")) if is_file(one))
             waiting += [one.as_posix() for one in inside if not _is_hidden(one.relative_to(path))]
-        elif path.is_file():
+        elif is_file(path):
             found[path.as_posix()] = None
             size += path.stat().st_size
             waiting += _named_in(path)
@@ -195,14 +196,14 @@ def _named_in(path: Path) -> list[str]:
         return []
     words = {word.decode().strip() for word in _WORD.findall(path.read_bytes())}
     files = (path.parent / word for word in words if not word.startswith("/") and len(word) < 200)  # noqa: PLR2004
-    return [os.path.normpath(file) for file in files if file.is_file()]
+    return [os.path.normpath(file) for file in files if is_file(file)]
 
 
 def _places(files: list[str], named: Mapping[str, str]) -> dict[str, str]:
     """Return where files and named folders are in the release: as they are below the folder that has all of them."""
     everything = [*files, *named]
     folders = [posixpath.dirname(file) for file in files] + [
-        folder for folder in named if Path(folder).is_dir()
+        folder for folder in named if is_folder(folder)
     ]
     top = posixpath.commonpath(folders) if folders else "/"
     return {

@@ -15,7 +15,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.combinations import MOST
-from tfcompose.cli.compiling import disk, given_by, library, overlays_of
+from tfcompose.cli.compiling import disk_of, given_by, library, overlays_of
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import destination
 from tfcompose.compiler.compile import Compiled, compile_robot
@@ -332,7 +332,8 @@ class _Combinations:
         }
         compiled: Compiled = compile_robot(
             read_text(arguments.file), arguments.file, library(), arguments.profiles,
-            overlays=overlays_of(arguments), read=read_text, disk=disk(), given=Given(args, os.environ),
+            overlays=overlays_of(arguments), read=read_text, disk=disk_of(arguments.file, arguments),
+            given=Given(args, os.environ),
         )  # fmt: skip
         if compiled.robot is None or compiled.errors:
             return None

@@ -9,9 +9,10 @@ from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_
 from tfcompose.foundation.text import listed
 from tfcompose.model.plan.fleet import SHARE_COMMAND
 from tfcompose.model.robot import Process
-from tfcompose.spec.load import load, path_named
+from tfcompose.spec.language.recognition import load_named
+from tfcompose.spec.load import path_named
 from tfcompose.tools.fleet.check import check_fleet
-from tfcompose.tools.fleet.spec import validate_fleet
+from tfcompose.tools.fleet.spec import FleetSpec, validate_fleet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Robot
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Source
-    from tfcompose.tools.fleet.spec import FleetSpec
 
 #: The process that shares a robot's edges with its fleet.
 SHARE = "fleet_share"
@@ -64,7 +64,7 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
     if section.read is None:
         return [finding("TF001", f"{path}: files cannot be read here", at)]
     try:
-        fleet_source = load(section.read(path), path)
+        fleet_source = load_named(section.read(path), path, FleetSpec)
         fleet = validate_fleet(fleet_source)
         wrong = [one for one in check_fleet(fleet, fleet_source) if one.severity == "error"]
     except RejectedError as error:

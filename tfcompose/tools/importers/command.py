@@ -14,15 +14,23 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_bag, add_for, namespace, pairs, settle_duration
+from tfcompose.cli.options import (
+    add_bag,
+    add_for,
+    add_trust,
+    namespace,
+    pairs,
+    settle_duration,
+)
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Iterable
 
     from tfcompose.compiler.compile import Compiled
     from tfcompose.compiler.urdf.lint import Document
-    from tfcompose.compiler.urdf.packages import Packages
+    from tfcompose.compiler.urdf.packages import Disk, Packages
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.files import Target
     from tfcompose.spec.load import Source
@@ -79,6 +87,7 @@ def arguments(parser: ArgumentParser) -> None:
         action="store_true",
         help="write as much as possible of a source with errors",
     )
+    add_trust(parser)
 
 
 def run(arguments: Namespace) -> int:
@@ -103,7 +112,7 @@ def _import_urdf(arguments: Namespace) -> int:
 
     _refuse_more(arguments)
     packages = pairs(arguments.packages, "=")
-    known = _known_packages(packages)
+    known = _known_packages(packages, arguments)
     document = read_urdf(arguments.file, known, arguments.given)
     errors = [one for one in document.findings() if one.severity == "error"]
     print_findings(errors, sys.stderr)
@@ -124,26 +133,27 @@ def _import_urdf(arguments: Namespace) -> int:
 
 def _import_bringup(arguments: Namespace) -> int:
     """Import what starts processes: everything that is understood is written, and the rest is named."""
-    from tempfile import NamedTemporaryFile
+    from tempfile import TemporaryDirectory
 
     from tfcompose.cli.reading import STDIN, read_text
+    from tfcompose.foundation.reading import is_folder
     from tfcompose.tools.importers.draft import Draft, robot_name
     from tfcompose.tools.importers.shell import add_script
 
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
     draft = Draft(wanted, [f"imported from {name} by tfcompose"])
-    if Path(arguments.file).is_dir():
+    if is_folder(arguments.file):
         _add_vehicles(draft, arguments)
     elif kit := _kit(arguments.file):
         _add_kits(draft, kit, arguments)
     elif arguments.file.endswith(_LAUNCH):
         _add_launch(draft, arguments, arguments.file)
     elif arguments.file == STDIN and (ending := _ending_of(text := _with_root(read_text(STDIN)))):
-        with NamedTemporaryFile("w", suffix=ending, encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            _add_launch(draft, arguments, file.name, "<stdin>")
+        with TemporaryDirectory() as folder:  # nothing else is there to be read
+            file = Path(folder, f"stdin{ending}")
+            file.write_text(text, encoding="utf-8")
+            _add_launch(draft, arguments, str(file), "<stdin>")
     else:
         _refuse_more(arguments)
         _refuse_given(arguments)
@@ -264,7 +274,7 @@ def _ending_of(text: str) -> str:
 
 
 def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") -> None:
-    from tfcompose.cli.compiling import library
+    from tfcompose.cli.compiling import library, print_output, report_missing_confinement
     from tfcompose.cli.reading import read_text
     from tfcompose.tools.importers.descriptions import Workshop, add_descriptions
     from tfcompose.tools.importers.launch import Launch, add_launch
@@ -272,7 +282,7 @@ def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") 
     _refuse_more(arguments)
     read_text(file)  # refuses what is no text
     packages = pairs(arguments.packages, "=")
-    known, target = _known_packages(packages), _target(arguments)
+    known, target = _known_packages(packages, arguments), _target(arguments)
     prefixes = known.disk.prefixes if known.disk else ()
     launch = Launch(
         file,
@@ -281,6 +291,9 @@ def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") 
         prefixes=prefixes,
         every_branch=arguments.all_branches,
         shown=shown,
+        is_trusted=arguments.trust,
+        print_output=print_output,
+        report_missing=report_missing_confinement,
     )
     folders = {name: str(Path(folder).absolute()) for name, folder in packages.items()}
     descriptions = add_launch(draft, launch, target)
@@ -309,17 +322,23 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
     return FAILED if compiled.errors else 0
 
 
-def _known_packages(packages: dict[str, str]) -> Packages:
+def _disk(packages: Iterable[str], arguments: Namespace) -> Disk:
+    """Return the files of this machine, of which xacro may read the source's, and these packages."""
     from tfcompose.cli.compiling import disk
+
+    sources = [arguments.file] if arguments.file else []
+    return disk(trusts_files=arguments.trust, sources=sources, folders=list(packages))
+
+
+def _known_packages(packages: dict[str, str], arguments: Namespace) -> Packages:
     from tfcompose.compiler.urdf.packages import Packages
     from tfcompose.foundation.findings import Span
 
     named = {
         name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()
     }
-    return Packages(
-        disk(), named, advice="--package {name}=FOLDER, or source the workspace's setup file"
-    )
+    advice = "--package {name}=FOLDER, or source the workspace's setup file"
+    return Packages(_disk(packages.values(), arguments), named, advice=advice)
 
 
 def _check_use(arguments: Namespace) -> None:
@@ -345,7 +364,9 @@ def _check_use(arguments: Namespace) -> None:
             " letter",
             UNREADABLE,
         )
-    if arguments.output and Path(arguments.output).exists() and not arguments.force:
+    from tfcompose.foundation.reading import exists
+
+    if arguments.output and exists(arguments.output) and not arguments.force:
         fail(f"{arguments.output} exists already; --force overwrites it", UNREADABLE)
 
 
@@ -358,12 +379,13 @@ def _target(arguments: Namespace) -> Target:
 
 
 def _lint(text: str, arguments: Namespace) -> Compiled:
-    from tfcompose.cli.compiling import disk, library
+    from tfcompose.cli.compiling import library
     from tfcompose.cli.reading import read_text
     from tfcompose.compiler.compile import compile_robot
 
+    files = _disk(pairs(arguments.packages, "=").values(), arguments)
     return compile_robot(
-        text, arguments.output or "robot.yaml", library(), read=read_text, disk=disk()
+        text, arguments.output or "robot.yaml", library(), read=read_text, disk=files
     )
 
 

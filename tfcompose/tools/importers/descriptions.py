@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.draft import Draft
     from tfcompose.tools.importers.programs import Description
 
+_OUTSIDE = "--package NAME=FOLDER names its package; --trust is for files of your own"
 #: As what the text of a description is read.
 _TEXT = "robot_description.urdf"
 
@@ -92,6 +93,9 @@ def _add_links(draft: Draft, described: Description, workshop: Workshop) -> None
         packages, file = Packages(own, packages.named, packages.advice), _TEXT
     elif file.startswith(PACKAGE):
         draft.todo(f"the description {file}: its package is not found here", described.at)
+        return
+    elif not draft.reach.allows(file):
+        draft.todo(f"the description {file}: it may not be read", described.at, advice=_OUTSIDE)
         return
     try:
         document = read_urdf(file, packages)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Span, finding
 from tfcompose.foundation.geometry import norm, normalised
+from tfcompose.foundation.reach import Reach
 from tfcompose.model.robot import BUILT_IN
 from tfcompose.tools.importers.values import angle, rotation
 from tfcompose.tools.importers.yaml_text import comment, entry, flow, section, without_expressions
@@ -57,6 +58,8 @@ class Draft:
     found: list[Finding] = field(default_factory=list)
     brought: set[str] = field(default_factory=set)
     has_unknown_frames: bool = False
+    #: The files that the source may have read: all those that a user names.
+    reach: Reach = field(default_factory=lambda: Reach(everything=True))
 
     def note(self, at: Entry, *texts: str) -> None:
         """Put comments above an entry, each once."""

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.foundation.reading import is_file, is_folder, names_in
 from tfcompose.tools.importers.draft import pose_keys
 from tfcompose.tools.importers.programs import where
 from tfcompose.tools.importers.yaml_text import Expression, argument
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Iterator, Mapping
     from pathlib import Path
 
     from tfcompose.foundation.geometry import Vector
@@ -128,9 +129,9 @@ def add_vehicles(
         RejectedError: if the folder holds no calibrations, or it is not said of which kit they are
             to be.
     """
-    config = folder / "config" if (folder / "config").is_dir() else folder
+    config = folder / "config" if is_folder(folder / "config") else folder
     own = sorted(
-        config.glob("*_calibration.yaml"),
+        (config / name for name in names_in(config) if name.endswith("_calibration.yaml")),
         key=lambda file: (file.name != _CALIBRATIONS[0], file.name),
     )
     if own:  # the description of one kit, whose calibrations are those of no vehicle
@@ -138,8 +139,8 @@ def add_vehicles(
             add_kit(draft, read(str(file)))
         return
     kits: dict[str, list[str]] = {}
-    for inner in sorted(config.glob("*/*")):
-        if any((inner / name).is_file() for name in _CALIBRATIONS):
+    for inner in _folders_of_kits(config):
+        if any(is_file(inner / name) for name in _CALIBRATIONS):
             kits.setdefault(inner.name, []).append(inner.parent.name)
     kit = _one_of(kits, given, "sensor_model", str(folder), "kit")
     vehicles = kits[kit]
@@ -161,7 +162,7 @@ def add_vehicles(
     draft.note(("", ""), f"the calibrations of {kit}, which stay in their files")
     for name in _CALIBRATIONS:
         files = {one: config / one / kit / name for one in vehicles}
-        sources = {one: read(str(file)) for one, file in files.items() if file.is_file()}
+        sources = {one: read(str(file)) for one, file in files.items() if is_file(file)}
         path = f"{target.from_folder(str(config))}/{word}/{kit}/{name}"
         for (parent, child), several in _calibrated(draft, sources).items():
             keys: dict[str, Any] = {"calibration": path}
@@ -170,6 +171,12 @@ def add_vehicles(
                     " or ".join(f"args.vehicle_id == {_quoted(one)}" for one in several)
                 )
             draft.frame(parent, child, keys, sources[several[0]].at_key((parent, child)))
+
+
+def _folders_of_kits(config: Path) -> Iterator[Path]:
+    """Yield the folders of kits in those of vehicles."""
+    for vehicle in filter(is_folder, (config / name for name in names_in(config))):
+        yield from (vehicle / name for name in names_in(vehicle))
 
 
 def _quoted(word: str) -> str:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import posixpath
 import re
 import signal
-import subprocess
-import sys
+import tempfile
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.foundation import confined
+from tfcompose.foundation.confined import Outcome, fits, run_confined
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.numbers import number
+from tfcompose.foundation.reach import Reach
 from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, Folder, Seconds
-from tfcompose.tools.importers.confinement import MOST_CPU_S
 from tfcompose.tools.importers.launch_substitutions import marks, scalar_of, shown, without_marks
 from tfcompose.tools.importers.programs import (
     CONTAINERS,
@@ -44,7 +44,12 @@ if TYPE_CHECKING:
     from tfcompose.model.files import Target
     from tfcompose.tools.importers.draft import Draft
 
-_MOST_WALL_S = 60.0
+#: The module that reads launch files, confined.
+PROCESS = "tfcompose.tools.importers.launch_process"
+#: Characters of why a launch file stopped.
+_LONGEST = 4000
+#: The largest number of seconds or tries.
+_LARGEST = 1e9
 #: Programs whose arguments are read: they have their values.
 _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
@@ -61,7 +66,8 @@ class Launch:
 
     ``arguments`` are its launch arguments, ``packages`` folders of packages that are not
     installed, ``prefixes`` those of AMENT_PREFIX_PATH. With ``every_branch`` conditions do not
-    count. ``shown`` is how findings call the file, unless by its name.
+    count. ``shown`` is how findings call the file, unless by its name. A file that ``is_trusted``
+    runs without the sandbox.
     """
 
     file: str
@@ -70,6 +76,9 @@ class Launch:
     prefixes: tuple[str, ...] = ()
     every_branch: bool = False
     shown: str = ""
+    is_trusted: bool = False
+    print_output: Callable[[str, str], None] = lambda _file, _text: None
+    report_missing: Callable[[tuple[str, ...]], None] = lambda _: None
 
     def span(self, line: int = 1) -> Span:
         """Return the place of one of its lines."""
@@ -82,6 +91,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     Raises:
         RejectedError: if it is no launch file, or takes too long or too much memory.
     """
+    draft.reach = _reach_of(launch)
     answer = _read(draft, launch)
     draft.head[-1] += ", a launch file of ROS 1" if _is_of_ros1(answer) else ""
     work = _Work(draft, launch, target, answer["records"])
@@ -105,16 +115,16 @@ def _read(draft: Draft, launch: Launch) -> dict[str, Any]:
         RejectedError: if neither can read it.
     """
     if not has_launch():
-        return _answered(launch, with_launch=False)
+        return _answered(launch, draft.reach, with_launch=False)
     try:
-        answer = _answered(launch, with_launch=True)
+        answer = _answered(launch, draft.reach, with_launch=True)
         reason, line = answer["stopped"], answer["line"]
     except RejectedError as error:
         reason, line = error.findings[0].message, 0
     if not reason:
         draft.head[-1] += ", read by ROS's launch"
         return answer
-    answer = _answered(launch, with_launch=False)
+    answer = _answered(launch, draft.reach, with_launch=False)
     if not answer["stopped"] and not _is_of_ros1(answer):
         draft.todo(
             f"ROS's launch does not read it, tfcompose's own reader does: {reason}",
@@ -133,39 +143,112 @@ def has_launch() -> bool:
     return all(spec is not None and spec.origin is not None for spec in several)
 
 
-def _answered(launch: Launch, *, with_launch: bool) -> dict[str, Any]:
+def _reach_of(launch: Launch) -> Reach:
+    """Return the files that a launch file may read."""
+    reach = Reach(everything=launch.is_trusted)
+    reach.add_tree(launch.file)
+    reach.add_neighbours(launch.file)
+    for folder in launch.packages.values():
+        reach.add_folder(folder)
+    for prefix in launch.prefixes:
+        reach.add_prefix(prefix)
+    reach.add_libraries()
+    return reach
+
+
+def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, Any]:
+    trusted = launch.is_trusted
+    wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
         "file": str(Path(launch.file).absolute()), "arguments": dict(launch.arguments),
         "packages": {name: str(Path(folder).absolute()) for name, folder in launch.packages.items()},
         "prefixes": list(launch.prefixes), "every_branch": launch.every_branch, "with_launch": with_launch,
+        "readable": None if trusted else reach.grants(), "temporary": tempfile.gettempdir(),
+        "wall_s": wall_s,
     }  # fmt: skip
-    program = (
-        "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "  # a Ctrl-C is for who asked
-        f"sys.path[:] = {sys.path!r}; from tfcompose.tools.importers.launch_process import main;"
-        " main()"
+    outcome = run_confined(
+        PROCESS, request, {}, wall_s=wall_s,
+        environment={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"},  # sets keep an order
+    )  # fmt: skip
+    launch.print_output(launch.shown or launch.file, outcome.printed)
+    launch.report_missing(outcome.missing)
+    answer = outcome.answer
+    if fits(answer, _ANSWER) and all(map(_is_record, answer["records"])):
+        return {**answer, "stopped": answer["stopped"][:_LONGEST]}
+    raise RejectedError([finding("TF008", f"the launch file {_ended(outcome)}", launch.span())])
+
+
+_NUMBER, _OPTIONAL = (int, float), (str, None)
+_SCALAR = (str, bool, int, float, None)
+_AT: dict[str, Any] = {"at": [(str, int)], "when?": [str], "only_when?": str}
+_COMMON = _AT | {
+    "id": (str, int), "env": {"*": str}, "period": _NUMBER, "after": {"*": str}, "cwd?": str,
+    "prefix?": str, "sigterm_timeout?": str, "sigkill_timeout?": str, "output?": (str, [str], None),
+    "shell?": bool, "respawn?": bool, "emulate_tty?": bool, "respawn_delay?": _NUMBER,
+    "respawn_max_retries?": _NUMBER, "only_env?": bool, "required?": bool,
+}  # fmt: skip
+_OF_NODE = {
+    "package": _OPTIONAL, "name": _OPTIONAL, "namespace": _OPTIONAL,
+    "params": [(str, {"*": (*_SCALAR, [_SCALAR])})], "remap": [[str]],
+}  # fmt: skip
+_NODE = _COMMON | _OF_NODE | {
+    "executable": str, "label": _OPTIONAL, "argv": [str], "lifecycle?": _OPTIONAL, "ros1?": bool,
+}  # fmt: skip
+#: What the process that reads a launch file answers, by the kind of a record.
+_RECORDS: dict[str, Any] = {
+    "node": _NODE,
+    "container": _NODE,
+    "process": _COMMON | {"argv": [str], "label": _OPTIONAL},
+    "component": _AT | _OF_NODE | {
+        "id": (str, int), "container": _OPTIONAL, "plugin": str, "extra": [Any], "period": _NUMBER,
+        "after": {"*": str},
+    },
+    "include": _AT | {
+        "file": str, "args": {"*": str}, "namespace": _OPTIONAL, "env": {"*": str},
+        "period": _NUMBER, "after": {"*": str},
+    },
+    "argument": _AT | {
+        "name": str, "default": Any, "value": str, "choices": [str], "description": str, "env": str,
+    },
+    "lifecycle": _AT | {"node": (str, int), "state": str},
+    "required": _AT | {"node": (str, int)},
+    "package": _AT | {"name": str},
+    "skipped": _AT | {"text": str},
+    "todo": _AT | {"text": str},
+}  # fmt: skip
+_ANSWER = {"records": [{"kind": str}], "stopped": str, "line": int, "decided": [str]}
+_PAIR = 2
+
+
+def _is_record(record: dict[str, Any]) -> bool:
+    """Return whether a record has what its kind has, whoever sent it."""
+    numbers = [record.get(key, 0) for key in ("period", "respawn_delay", "respawn_max_retries")]
+    at = record.get("at")
+    return (
+        fits(record, _RECORDS.get(record["kind"]))
+        and (at == [] or [type(part) for part in at or ()] == [str, int])
+        and all(len(rule) == _PAIR for rule in record.get("remap", ()))
+        and all(abs(value) <= _LARGEST for value in numbers)
     )
-    command = [sys.executable, "-c", program]
-    try:
-        done = subprocess.run(
-            command, input=json.dumps(request).encode(), stdout=subprocess.PIPE, timeout=_MOST_WALL_S, check=False,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"},  # sets keep an order
-        )  # fmt: skip
-        answer: dict[str, Any] = json.loads(done.stdout)
-    except subprocess.TimeoutExpired:
-        message = f"the launch file takes more than {_MOST_WALL_S:g} s"
-    except json.JSONDecodeError:
-        message = f"the launch file ends the process that reads it, with code {done.returncode}"
-        if done.returncode < 0:
-            message = f"the launch file {_ended_by(-done.returncode)}"
-    else:
-        return answer
-    raise RejectedError([finding("TF008", message, launch.span())])
+
+
+def _ended(outcome: Outcome) -> str:
+    """Return how the process ended that read a launch file, without an answer."""
+    if outcome.timed_out:
+        return f"takes more than {confined.MOST_WALL_S:g} s"
+    if outcome.refused:
+        return f"was ended: {outcome.refused}"
+    if outcome.answer is not None:
+        return "was ended: its answer is none"
+    if outcome.code >= 0:
+        return f"ends the process that reads it, with code {outcome.code}"
+    return _ended_by(-outcome.code)
 
 
 def _ended_by(number: int) -> str:
     """Return what a signal says of the launch file whose process it ended."""
     if number == signal.SIGXCPU:
-        return f"takes more than {MOST_CPU_S} s of processor time"
+        return "takes too long"
     if number == signal.SIGKILL:
         return "was killed by the system, or by somebody: it may have needed too much memory"
     name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
@@ -242,6 +325,8 @@ class _Work:
     def _span(self, at: Any) -> Span:
         file, line = (at[0], at[1]) if at else ("", 1)
         absolute = str(Path(self.launch.file).absolute())
+        if file not in {absolute, ""} and not self.draft.reach.allows(file):
+            return self.launch.span()  # findings show the lines of their places
         return (
             self.launch.span(line)
             if file in {absolute, ""}

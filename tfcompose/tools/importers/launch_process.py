@@ -1,20 +1,19 @@
-"""Reads launch files in a process of its own, which is confined: a launch file is a program, and may do anything.
+"""Reads launch files in a confined process of its own: a launch file is a program.
 
-It gets one request on standard input and answers on standard output, both JSON. It has bounded
-time and memory. It has no network, and cannot start programs, write files or signal others: the
-kernel refuses that (``confinement``), and a hook of Python's names what a launch file tries of it.
-Modules that are not installed give values that do nothing, and are named too.
+It has no network, and cannot start programs, write files or signal others, and reads only what it
+is told: the kernel refuses all else (``sandbox``), and a hook of Python's names what a launch file
+tries of it. Modules that are not installed give values that do nothing, and are named too.
 """
 
 from __future__ import annotations
 
 import builtins
+import errno
 import functools
 import importlib
 import importlib.abc
 import importlib.machinery
 import io
-import json
 import os
 import re
 import subprocess
@@ -27,11 +26,11 @@ from typing import Any
 
 import yaml
 
+from tfcompose.foundation.sandbox import Channel, Readable, confine, limit, take_spare_memory
 from tfcompose.tools.importers import launch_actions as actions
 from tfcompose.tools.importers import launch_conditions as conditions
 from tfcompose.tools.importers import launch_substitutions as substitutions
 from tfcompose.tools.importers import launch_texts as texts
-from tfcompose.tools.importers.confinement import confine, limit
 from tfcompose.tools.importers.launch_moveit import MoveItConfigsBuilder
 from tfcompose.tools.importers.launch_substitutions import (
     PACKAGE,
@@ -56,6 +55,8 @@ _REFUSED = frozenset({
     "shutil.copyfile", "shutil.copytree", "socket.__new__", "ctypes.dlopen", "ctypes.dlsym", "ctypes.dlsym/handle",
     "ctypes.call_function", "ctypes.cdata", "ctypes.cdata/buffer", "ctypes.string_at", "ctypes.addressof",
 })  # fmt: skip
+#: What reads a path.
+_READS = frozenset({"open", "os.listdir", "os.scandir"})
 #: Packages of ROS's that the stand-in is in the place of, and what xacro and the ament index are.
 _LAUNCH = frozenset({"launch", "launch_ros", "launch_xml", "launch_yaml", "nav2_common", "ament_index_python", "xacro",
                      "lifecycle_msgs", "launch_param_builder", "moveit_configs_utils", "launch_testing"})  # fmt: skip
@@ -362,8 +363,13 @@ def _fill_index(module: types.ModuleType, reader: Reader) -> None:
 # Confinement
 
 
-def _watch(context: Context, null: int) -> None:  # noqa: C901 (one hook after another)
-    """Refuse and name what a launch file may not do; what is often done and often needless is passed over."""
+def _watch(  # noqa: C901 (one hook after another)
+    context: Context, null: int, readable: Readable | None
+) -> None:
+    """Refuse and name what a launch file may not do; pass over what is often done and needless.
+
+    With ``readable`` paths it may do nothing else but read these.
+    """
     noted: set[str] = set()
 
     def note(what: str) -> None:
@@ -389,6 +395,18 @@ def _watch(context: Context, null: int) -> None:  # noqa: C901 (one hook after a
             )
             note(f"{'open for writing' if event == 'open' else event} {what}".strip())
             raise PermissionError(f"{event} is not done while launch files are read")
+        if event in _READS and not may_read(args[0]):
+            note(f"{event} {os.fsdecode(args[0])}, which it may not read")
+            raise PermissionError(errno.EACCES, "It may not be read", os.fsdecode(args[0]))
+
+    def may_read(path: Any) -> bool:
+        if isinstance(path, int) or path is None or readable is None:
+            return True
+        real = os.path.realpath(os.fsdecode(path))
+        return any(
+            real == root or real.startswith(f"{root.rstrip('/')}/")
+            for root in (*readable.paths, *readable.listed)
+        )
 
     def run(words: Any, *_args: Any, **more: Any) -> Any:
         several = [os.fspath(one) if isinstance(one, os.PathLike) else str(one) for one in words] if not isinstance(
@@ -450,10 +468,11 @@ def _watch(context: Context, null: int) -> None:  # noqa: C901 (one hook after a
     ]  # fmt: skip
     for owner, name, hook in hooks:
         setattr(owner, name, hook)
-    sys.addaudithook(audit)
+    if readable is not None:
+        sys.addaudithook(audit)
 
 
-def answer(request: dict[str, Any]) -> dict[str, Any]:
+def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dict[str, Any]:
     """Return what came of reading a launch file: records, in order, and why and at which line it stopped if it did."""
     try:
         reader = Reader(request)
@@ -466,10 +485,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
     for name in [name for name in sys.modules if name.partition(".")[0] in reader.replaced]:
         del sys.modules[name]
     sys.dont_write_bytecode = True
-    tempfile.gettempdir()  # finds out now, by writing there, what is asked for later
-    null = os.open(os.devnull, os.O_RDWR)  # no file can be opened for writing after this
-    confine()
-    _watch(context, null)
+    _watch(context, null, readable)
     stopped, line = "", 0
     context.file = request["file"]
     try:
@@ -477,6 +493,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
     except FailedError as error:
         stopped, line = error.reason, error.line
     except MemoryError:
+        take_spare_memory()
         stopped = "it needs too much memory"
     except RecursionError:
         stopped = "it goes too deep"
@@ -492,17 +509,16 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def main() -> None:
+def main(reads: int, writes: int) -> None:
     """Serve one request."""
-    request = json.load(sys.stdin)
-    channel = os.dup(1)
-    os.dup2(2, 1)  # what a launch file prints is for people
-    with os.fdopen(channel, "w") as out:  # before files may no more be opened for writing
-        limit()
-        out.write(json.dumps(answer(request), default=str))
-        out.flush()
-        os._exit(0)
-
-
-if __name__ == "__main__":
-    main()
+    channel = Channel(reads, writes)
+    request = channel.receive()
+    limit(request["wall_s"])
+    tempfile.tempdir = request["temporary"]  # else Python would look for one by writing
+    null = os.open(os.devnull, os.O_RDWR)  # no file can be opened for writing after this
+    readable = Readable(*request["readable"]) if request["readable"] else None
+    channel.send({"missing": confine(readable) if readable else []})
+    answered = answer(request, null, readable)
+    sys.stdout.flush()
+    channel.send({"answer": answered})
+    os._exit(0)

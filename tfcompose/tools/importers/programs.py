@@ -9,13 +9,13 @@ from __future__ import annotations
 import posixpath
 import re
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
 from tfcompose.foundation.numbers import number
+from tfcompose.foundation.reach import OutsideError, Reach
 from tfcompose.tools.importers.static_transforms import (
     PROGRAM,
     RefusedError,
@@ -52,6 +52,8 @@ _PLUGIN = re.compile(r"[A-Za-z]\w*/[A-Za-z_]\w*(::\w+)*", re.ASCII)
 _NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 #: Between the words of a class's name.
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+#: Of a parameter file.
+_MOST_BYTES = 16_000_000
 #: How often joint_state_publisher sends, unless it is told.
 _JOINTS_HZ = 10.0
 #: As what a path begins whose package is not found.
@@ -340,7 +342,11 @@ def _hertz(value: float) -> Any:
 
 def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
-    if not program.name and program.package and (name := _named_in_files(program.params)):
+    if (
+        not program.name
+        and program.package
+        and (name := _named_in_files(program.params, draft.reach))
+    ):
         program = replace(program, name=name)
     usual = (
         _usual_name(program.package)
@@ -365,7 +371,7 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
         notes.append(f"the source does not name the node: it is called {name} here")
     if program.namespace and program.namespace.strip("/"):
         keys["namespace"] = program.namespace.strip("/")
-    params, left = _params(program.params, target, program.name or name)
+    params, left = _params(program.params, target, program.name or name, draft.reach)
     keys |= {"params": params} if params else {}
     keys |= {"remap": remappings(program.remap)} if program.remap else {}
     keys |= {"env": dict(program.env)} if program.env else {}
@@ -423,9 +429,10 @@ def _container_keys(program: Program) -> dict[str, Any]:
     return keys | ({"args": words} if words else {})
 
 
-def _named_in_files(params: Sequence[Mapping[str, Any] | str]) -> str | None:
+def _named_in_files(params: Sequence[Mapping[str, Any] | str], reach: Reach) -> str | None:
     """Return the node that parameter files are written for, where that is one alone; None where none is named."""
-    keys = [key for file in params if isinstance(file, str) for key in _nodes_in(file) or ()]
+    files = [file for file in params if isinstance(file, str)]
+    keys = [key for file in files for key in _nodes_in(file, reach) or ()]
     names = {key.rpartition("/")[2] for key in keys if "*" not in key}
     name = names.pop() if len(names) == 1 else ""
     return name if _NODE.fullmatch(name) else None
@@ -474,7 +481,7 @@ def _plain(program: Program) -> str:
             return _CAMEL.sub("_", program.plugin.rpartition("::")[2]).lower()
         case _:
             word = program.executable or (
-                program.argv[0].split()[0] if program.argv and program.argv[0] else ""
+                next(iter(program.argv[0].split()), "") if program.argv else ""
             )
     plain = posixpath.basename(word).partition(".")[0]
     script = next((one for one in program.argv[1:] if one.endswith(".py")), "")
@@ -486,7 +493,7 @@ def _plain(program: Program) -> str:
 
 
 def _params(
-    given: Sequence[Mapping[str, Any] | str], target: Target, node: str
+    given: Sequence[Mapping[str, Any] | str], target: Target, node: str, reach: Reach
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the parameters as a robot file has them, files first, and what cannot be said of them.
 
@@ -502,7 +509,7 @@ def _params(
             left.append(f"the parameters of {one}: the package is not found here")
         else:
             files.append(path_from(target, one))
-            known = _parameters_in(one, node) if own else set()
+            known = _parameters_in(one, node, reach) if own else set()
             if known is None:
                 left.append(
                     f"{one} is laid over the parameters before it: here they are laid over the"
@@ -513,9 +520,9 @@ def _params(
     return named | {key: parameter(value) for key, value in own.items()}, left
 
 
-def _parameters_in(file: str, node: str) -> set[str] | None:
+def _parameters_in(file: str, node: str, reach: Reach) -> set[str] | None:
     """Return the full names of a node's parameters in a file, or None where it cannot be read."""
-    data = _nodes_in(file)
+    data = _nodes_in(file, reach)
     if data is None:
         return None
     several = (
@@ -534,12 +541,15 @@ def _full_names(params: Any, above: str) -> Iterator[str]:
             yield f"{above}{key}"
 
 
-def _nodes_in(file: str) -> dict[str, Any] | None:
-    """Return what a parameter file has by its nodes' full names, or None where it is not there, or has none."""
+def _nodes_in(file: str, reach: Reach) -> dict[str, Any] | None:
+    """Return what a parameter file has by its nodes' full names, or None where it has none.
+
+    None, too, if it is not there, or may not be read.
+    """
     try:
-        data = yaml.load(Path(file).read_text("utf-8"), Loader=yaml.CSafeLoader)
+        data = yaml.load(reach.read(file, _MOST_BYTES).decode(), Loader=yaml.CSafeLoader)
         return dict(_nodes_below(data, "")) or None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError):
+    except (OSError, OutsideError, UnicodeDecodeError, yaml.YAMLError, RecursionError):
         return None
 
 

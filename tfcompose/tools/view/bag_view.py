@@ -12,8 +12,6 @@ from tfcompose.tools.view.live_panel import BagPanel
 from tfcompose.tools.view.view_session import plan_of_session
 
 if TYPE_CHECKING:
-    import viser
-
     from tfcompose.foundation.geometry import Offset
     from tfcompose.tools.view.reload import ReloadedPanel
     from tfcompose.tools.view.session import Session
@@ -41,14 +39,14 @@ class BagView:
                 UNREADABLE,
             )
 
-    def show(self, server: viser.ViserServer, shown: ReloadedPanel) -> BagPanel:
-        """Show the recording with the robot as it is now."""
-        session = shown.session
+    def show(self, shown: ReloadedPanel) -> None:
+        """Show the recording in a window with the robot as it is now."""
+        session, choices = shown.session, shown.panel.choices
         tree = BagTree(session.robot, plan_of_session(session), self._recorded, self._tolerance)
-        tree.at_s = self._at_s
-        panel = BagPanel(server, shown.panel, tree, self._recorded.length_s)
-        panel.slider.on_update(lambda _: self._keep(panel))
-        return panel
+        tree.at_s = self._at_s if choices.at_s is None else choices.at_s
+        panel = BagPanel(shown.server, shown.panel, tree, self._recorded.length_s)
 
-    def _keep(self, panel: BagPanel) -> None:
-        self._at_s = panel.tree.at_s
+        def keep(_event: object) -> None:
+            choices.at_s = tree.at_s
+
+        panel.slider.on_update(keep)

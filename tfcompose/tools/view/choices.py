@@ -23,6 +23,7 @@ class Choices:
         has_blocked: whether blocked rays are shown.
         snaps: whether mounts snap to mm and degrees.
         positions: where joints are, in rad or m.
+        at_s: the time of a recording that is shown, in seconds after its begin; None: as given.
     """
 
     selected: str = ""
@@ -38,3 +39,4 @@ class Choices:
     has_blocked: bool = False
     snaps: bool = True
     positions: dict[str, float] = field(default_factory=dict)
+    at_s: float | None = None

@@ -9,8 +9,10 @@ are where they were recorded, at the time of a slider.
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import ArgumentTypeError
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +29,7 @@ from tfcompose.foundation.signals import take_interrupt
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from tfcompose.foundation.geometry import Offset
     from tfcompose.tools.view.bag_view import BagView
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
     from tfcompose.tools.view.session import Session
 
 _HOST, _PORT = "127.0.0.1", 8080
-_LOOPBACK = frozenset({_HOST, "localhost", "::1"})
 _EVERYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 (what a user may give)
 _LATEST_S = 1e11
 _LAST_PORT = 65_535
@@ -73,7 +74,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--host", default=_HOST, metavar="ADDRESS",
-        help=f"listen there; elsewhere than on this machine only who has the token is let in (default: {_HOST})",
+        help=f"listen there; the printed address has the token that lets in (default: {_HOST})",
     )  # fmt: skip
     parser.add_argument("--port", type=int, default=_PORT, help=f"the port (default: {_PORT})")
     parser.add_argument("--open", action="store_true", help="open the browser")
@@ -118,10 +119,9 @@ def run(arguments: Namespace) -> int:
 
 def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     """Show the session in the browser until Ctrl-C; return the exit code."""
-    import secrets
-
     from tfcompose.tools.view.reload import ReloadedPanel, Watcher
-    from tfcompose.tools.view.server import started, stop
+    from tfcompose.tools.view.server import new_token, start_server, stop_server
+    from tfcompose.tools.view.windows import Windows
 
     bag = _bag_view(session, arguments) if arguments.bag else None
     if arguments.live:
@@ -129,33 +129,33 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
         from tfcompose.tools.view.view_session import plan_of_session
 
         set_up_ros(plan_of_session(session).ros)
-    token = "" if arguments.host in _LOOPBACK else secrets.token_urlsafe(16)
-    server = started(
-        arguments.host, _free(arguments.host, arguments.port), session.robot.name, token
-    )
-    shown = None
+    token = new_token()
+    port = _free(arguments.host, arguments.port)
+    server = start_server(arguments.host, port, session.robot.name, token)
+    shown: ReloadedPanel | Windows | None = None
     try:
-        joints = arguments.joints or not (arguments.live or arguments.bag)
-        shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=joints)
-        if bag is not None:
-            bag.show(server, shown)
-        _announce(_address(arguments.host, server.get_port(), token), arguments)
-        with Watcher(files) as watcher:
-            if arguments.live:
-                from tfcompose.tools.view.live_view import follow
+        address = _address(arguments.host, server.get_port(), token)
+        if arguments.live:
+            from tfcompose.tools.view.live_view import follow
 
+            shown = ReloadedPanel(server, session, files, edit=False, joints=arguments.joints)
+            with _announced(address, arguments), Watcher(files) as watcher:
                 return follow(
                     server, shown, watcher.changed, _tolerance(arguments), joints=arguments.joints
                 )
+        extend = bag.show if bag is not None else None
+        shown = Windows(
+            server, session, files, edit=arguments.edit, joints=bag is None, extend=extend
+        )
+        with _announced(address, arguments), Watcher(files) as watcher:
             while True:
                 watcher.changed.wait()
                 watcher.changed.clear()
-                if shown.reload() and bag is not None:
-                    bag.show(server, shown)
+                shown.reload()
     finally:
         if shown is not None:
             shown.end()
-        stop(server)
+        stop_server(server)
 
 
 def _tolerance(arguments: Namespace) -> Offset:
@@ -174,10 +174,10 @@ def _write(session: Session, path: Path) -> None:
     from tfcompose.tools.view.kinematics import poses_in_roots
     from tfcompose.tools.view.page import page_of
     from tfcompose.tools.view.scene import RobotScene
-    from tfcompose.tools.view.server import started, stop
+    from tfcompose.tools.view.server import new_token, start_server, stop_server
 
     robot, poses = session.robot, poses_in_roots(session.robot, {})
-    server = started(_HOST, 0, robot.name)
+    server = start_server(_HOST, 0, robot.name, new_token())
     try:
         scene = RobotScene(server.scene, robot)
         scene.add_meshes()
@@ -188,7 +188,7 @@ def _write(session: Session, path: Path) -> None:
     except OSError as error:
         fail(f"{path} cannot be written: {error.strerror}", UNREADABLE)
     finally:
-        stop(server)
+        stop_server(server)
 
 
 def _running_plan(arguments: Namespace) -> str | None:
@@ -212,9 +212,11 @@ def _running_plan(arguments: Namespace) -> str | None:
 
 def _check_output(path: Path, files: Sequence[str]) -> None:
     """Refuse a page that cannot be written, or that would replace one of the robot's files; ends then."""
-    if not path.parent.is_dir():
+    from tfcompose.foundation.reading import is_folder
+
+    if not is_folder(path.parent):
         fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
-    if path.resolve() in {Path(file).resolve() for file in files}:
+    if os.path.realpath(path) in {os.path.realpath(file) for file in files}:
         fail(f"--html {path} would replace a file of the robot", UNREADABLE)
 
 
@@ -257,7 +259,7 @@ def _address(host: str, port: int, token: str) -> str:
     import socket
 
     name = socket.gethostname() if host in _EVERYWHERE else f"[{host}]" if ":" in host else host
-    return f"http://{name}:{port}" + (f"/?token={token}" if token else "")
+    return f"http://{name}:{port}/?token={token}"
 
 
 def _seconds(text: str) -> float:
@@ -271,13 +273,26 @@ def _seconds(text: str) -> float:
     return value
 
 
-def _announce(address: str, arguments: Namespace) -> None:
-    """Say where the view is, and open the browser where that is wanted."""
+@contextmanager
+def _announced(address: str, arguments: Namespace) -> Iterator[None]:
+    """Say where the view is, and open the browser where that is wanted.
+
+    What starts a browser is among the arguments of a process, which every user of the machine can
+    read. So the browser gets a file that only this user can read, and that leads to the address.
+    """
     sys.stdout.write(f"{address}; Ctrl-C ends it\n")
     sys.stdout.flush()
-    if arguments.open:
-        import webbrowser
+    with ExitStack() as stack:
+        if arguments.open:
+            import tempfile
+            import webbrowser
 
-        webbrowser.open(address)
-    if take_interrupt():
-        raise KeyboardInterrupt  # trimesh's optional imports had swallowed it
+            page = stack.enter_context(
+                tempfile.NamedTemporaryFile("w", encoding="utf-8", suffix=".html")
+            )
+            page.write(f'<meta http-equiv="refresh" content="0; url={address}">\n')
+            page.flush()
+            webbrowser.open(Path(page.name).as_uri())
+        if take_interrupt():
+            raise KeyboardInterrupt  # trimesh's optional imports had swallowed it
+        yield

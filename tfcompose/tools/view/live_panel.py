@@ -31,7 +31,11 @@ class LivePanel:
     """Shows a tree that runs, or was recorded, beside the panel of its robot."""
 
     def __init__(
-        self, server: viser.ViserServer, panel: Panel, tree: ShownTree, title: str = "Live"
+        self,
+        server: viser.ViserServer | viser.ClientHandle,
+        panel: Panel,
+        tree: ShownTree,
+        title: str = "Live",
     ) -> None:
         self.tree = tree
         self._panel = panel
@@ -100,7 +104,11 @@ class BagPanel:
     """Shows a recording at the time of a slider, in seconds after its first transform."""
 
     def __init__(
-        self, server: viser.ViserServer, panel: Panel, tree: BagTree, length_s: float
+        self,
+        server: viser.ViserServer | viser.ClientHandle,
+        panel: Panel,
+        tree: BagTree,
+        length_s: float,
     ) -> None:
         self.tree = tree
         self._lock = threading.Lock()

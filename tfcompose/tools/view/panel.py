@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import threading
 import time
+from dataclasses import dataclass, field
 from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
 from tfcompose.foundation.numbers import clean_rpy
+from tfcompose.foundation.text import listed
 from tfcompose.tools.view.choices import Choices
 from tfcompose.tools.view.edit import ImmovableError
 from tfcompose.tools.view.facts import facts_of, numbers
@@ -20,7 +22,7 @@ from tfcompose.tools.view.scene import RobotScene, wxyz
 from tfcompose.tools.view.tree_panel import TreePanel
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import viser
 
@@ -46,6 +48,23 @@ _WIDTH_PX = 350
 _SWEEP_S, _SWEEP_STEP_S = 6.0, 0.05
 
 
+@dataclass(slots=True)
+class Window:
+    """A window among others on the same files, which save in turn.
+
+    Attributes:
+        server: where it is, which says where its camera begins; None: a server has one for all.
+        lock: held while one saves.
+        share: shows in the others what one has saved.
+        conflicts: frames that are moved here, and that another window has saved at another pose.
+    """
+
+    server: viser.ViserServer | None = None
+    lock: threading.RLock = field(default_factory=threading.RLock)
+    share: Callable[[], None] = lambda: None
+    conflicts: set[str] = field(default_factory=set)
+
+
 def _snapped(pose: Pose, before: Pose) -> Pose:
     """Return a pose in whole mm and degrees; a number that is less than half of one off keeps the value before."""
 
@@ -67,19 +86,22 @@ def _phase(slider: Any) -> float:
 class Panel:
     """Shows a session on a server; with ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
 
-    ``choices`` are what somebody chose to see, which the panel changes. ``published`` are the
-    poses of frames in their roots where something else than the session says where they are.
+    ``server`` may be one client of it, whose ``window`` it then is. ``choices`` are what somebody
+    chose to see, which the panel changes. ``published`` are the poses of frames in their roots where something else
+    than the session says where they are.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (where, what and how it is shown)
         self,
-        server: viser.ViserServer,
+        server: viser.ViserServer | viser.ClientHandle,
         session: Session,
         *,
         edit: bool,
         joints: bool = True,
         choices: Choices | None = None,
+        window: Window | None = None,
     ) -> None:
+        self.window = window or Window()
         self.session = session
         self.choices = choices or Choices()
         self._gui = server.gui
@@ -121,7 +143,9 @@ class Panel:
         if joints:
             self._add_joints(session.robot)
         self._begin()
-        self.scene.frame_camera(server, poses_in_roots(session.robot, self.positions))
+        self.scene.frame_camera(
+            self.window.server or server, poses_in_roots(session.robot, self.positions)
+        )
         threading.Thread(target=self.scene.add_meshes, name="meshes", daemon=True).start()
 
     def _begin(self) -> None:
@@ -383,12 +407,30 @@ class Panel:
             self.gizmo.wxyz, self.gizmo.position = wxyz(at), at.xyz
 
     def save(self) -> None:
-        """Save what was moved, and report it."""
-        try:
-            saved = self.session.save()
-        except OSError as error:
-            self.report.content = paragraphs([escape(f"not saved: {error}")])
-            return
-        self.report.content = saved_html(saved)
-        self.tree.mark_moved(frozenset(self.session.moved))
-        self._show_selected()
+        """Save what was moved, and report it.
+
+        What another window has saved at another pose meanwhile is said first; the next save
+        replaces it.
+        """
+        with self.window.lock:
+            conflicts = sorted(self.window.conflicts & self.session.moved.keys())
+            self.window.conflicts.clear()
+            if conflicts:
+                word = f"not saved: another window saved {listed(conflicts)} at another pose"
+                self.say(paragraphs([escape(word), "save again to replace that"]))
+                return
+            try:
+                saved = self.session.save()
+            except OSError as error:
+                self.say(paragraphs([escape(f"not saved: {error}")]))
+                return
+            self.say(saved_html(saved))
+            self.tree.mark_moved(frozenset(self.session.moved))
+            self._show_selected()
+            if saved.diff:
+                self.window.share()
+
+    def say(self, html: str) -> None:
+        """Show a report where mounts are edited."""
+        if self._numbers:
+            self.report.content = html

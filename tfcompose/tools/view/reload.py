@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,15 +10,17 @@ from typing import TYPE_CHECKING, Any
 import watchfiles
 
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.reading import is_folder
 from tfcompose.tools.view.findings import findings_html
 from tfcompose.tools.view.panel import Panel
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     import viser
     from typing_extensions import Self
 
+    from tfcompose.compiler.compile import Compiled
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.robot import Robot
     from tfcompose.tools.view.session import Session
@@ -52,7 +55,9 @@ class Files:
     def folders(self) -> set[Path]:
         """The folders of all files that were read: editors replace files by others."""
         several = (*self._texts, *self._meshes)
-        return {folder for file in several if (folder := Path(file).resolve().parent).is_dir()}
+        return {
+            folder for file in several if is_folder(folder := Path(os.path.realpath(file)).parent)
+        }
 
     def differ(self) -> bool:
         """Return whether a file has another text than when it was read, or a mesh was changed."""
@@ -110,7 +115,8 @@ class Watcher:
                     break
 
 
-def _meshes(robot: Robot) -> set[str]:
+def meshes_of(robot: Robot) -> set[str]:
+    """Return the mesh files that a robot's bodies name."""
     bodies = (
         shape for link in robot.links.values() for shape in (*link.visuals, *link.collisions)
     )
@@ -121,29 +127,26 @@ class ReloadedPanel:
     """The panel of a session, made anew with each good version of its files.
 
     Args:
-        server: where it is shown.
+        server: where it is shown, or the window of it.
         session: what is shown.
         files: what the session was read with.
-        edit: as for ``Panel``.
-        joints: as for ``Panel``.
+        options: as for ``Panel``.
     """
 
     def __init__(
         self,
-        server: viser.ViserServer,
+        server: viser.ViserServer | viser.ClientHandle,
         session: Session,
         files: Files,
-        *,
-        edit: bool,
-        joints: bool,
+        **options: Any,
     ) -> None:
         self.session = session
         self.files = files
-        self._server = server
-        self._edit, self._joints = edit, joints
+        self.server = server
+        self._options = options
         self._broken: Any = None
-        self.panel = Panel(server, session, edit=edit, joints=joints)
-        files.look_at(_meshes(session.robot))
+        self.panel = Panel(server, session, **options)
+        files.look_at(meshes_of(session.robot))
 
     def end(self) -> None:
         """Let the panel move nothing any more."""
@@ -151,35 +154,27 @@ class ReloadedPanel:
 
     def reload(self) -> bool:
         """Read the files again; return whether there is another panel now, that of the robot which they describe."""
-        if not self.files.differ():
-            return False  # as after a save
-        try:
-            texts = {file: self.files(file) for file in self.session.texts}
-            state = self.session.compiled(texts)
-        except RejectedError as error:
-            self._show(error.findings)
-            return False
-        got_worse = state.errors and not self.session.state.errors
-        if state.robot is None or not state.robot.frames or got_worse:
-            self._show(state.found)
+        return self.files.differ() and self.accept(  # they do not after a save
+            *self.session.read_again(self.files)
+        )
+
+    def accept(self, texts: Mapping[str, str], state: Compiled) -> bool:
+        """Show the files as they are now, or what is wrong with them; return whether there is another panel."""
+        if not self.session.accepts(state):
+            self.show(state.found)
             return False
         self.session.replace(texts, state)
-        self.files.look_at(_meshes(state.robot))
+        self.files.look_at(meshes_of(self.session.robot))
         before = self.panel
         before.end()
-        with self._server.atomic():
-            self._server.gui.reset()
-            self._server.scene.reset()
+        with self.server.atomic():
+            self.server.gui.reset()
+            self.server.scene.reset()
             self._broken = None
-            self.panel = Panel(
-                self._server,
-                self.session,
-                edit=self._edit,
-                joints=self._joints,
-                choices=before.choices,
-            )
+            options = self._options | {"choices": before.choices, "window": before.window}
+            self.panel = Panel(self.server, self.session, **options)
         if state.errors:
-            self._show(state.found)
+            self.show(state.found)
         return True
 
     @property
@@ -187,9 +182,9 @@ class ReloadedPanel:
         """What is said to be wrong with the files as they are now, as HTML; empty where nothing is."""
         return self._broken.content if self._broken else ""
 
-    def _show(self, found: tuple[Finding, ...]) -> None:
+    def show(self, found: tuple[Finding, ...]) -> None:
         """Say what is wrong with the files as they are now."""
         if self._broken is None:
-            with self._server.gui.add_folder("File", order=-2):
-                self._broken = self._server.gui.add_html("")
+            with self.server.gui.add_folder("File", order=-2):
+                self._broken = self.server.gui.add_html("")
         self._broken.content = findings_html(found)

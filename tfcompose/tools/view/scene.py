@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import colorsys
+import contextlib
 import itertools
 import math
 import threading
@@ -104,7 +105,8 @@ class RobotScene:
         #: What is called with the frame of a body that is clicked.
         self.clicked: Callable[[str], None] = lambda _: None
         scene.set_up_direction("+z")
-        scene.world_axes.visible = False
+        with contextlib.suppress(AttributeError):  # those of a window are its server's
+            scene.world_axes.visible = False
         for index, (frame, link) in enumerate(robot.links.items()):
             shapes = link.visuals or link.collisions
             if not shapes or frame not in robot.frames:
@@ -203,7 +205,9 @@ class RobotScene:
                     f"/edges/{index}", points, colour, thickness=3, thickness_units="screen"
                 )
 
-    def frame_camera(self, server: viser.ViserServer, poses: Mapping[str, Pose]) -> None:
+    def frame_camera(
+        self, server: viser.ViserServer | viser.ClientHandle, poses: Mapping[str, Pose]
+    ) -> None:
         """Let the camera of a new client begin where the robot fills the picture, with a grid below all of it."""
         bodies = [
             (poses[frame] @ Pose(xyz)).xyz

@@ -1,4 +1,4 @@
-"""Starts viser's server so that it talks to its own page, and elsewhere than on this machine to who has its token."""
+"""Server of the browser view: it admits only windows that know its token, and only messages of viser's."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import contextlib
 import hmac
 import http
 import io
-import re
+import logging
+import secrets
 from functools import partial
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
@@ -14,34 +15,44 @@ from urllib.parse import parse_qs, urlsplit
 
 import viser
 import websockets.asyncio.server
+from viser._messages import Message
+from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
+from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-#: Pages that may talk to the server: its own, which this machine has. Programs that are no browser
-#: name no origin.
-_OWN_PAGES = (re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?"), None)
-_COOKIE = "tfcompose_view"
+#: With 256 bits nobody guesses a token.
+_TOKEN_BYTES = 32
+#: Of websockets, without the traceback of each stranger that connects and sends no request.
+_LOGGER = logging.getLogger(__name__)
+_LOGGER.addFilter(lambda record: record.msg != "opening handshake failed")
 
 
-def started(host: str, port: int, name: str, token: str = "") -> viser.ViserServer:
-    """Return a server at a port that is free; 0 takes any.
+def new_token() -> str:
+    """Return a token that nobody can guess, as it stands in an address."""
+    return secrets.token_urlsafe(_TOKEN_BYTES)
 
-    It refuses pages of other sites, which could otherwise move and save mounts while they are open
-    in a browser here, and with a ``token`` whoever did not open the page by an address with that.
-    viser has no setting for either, so it starts with what websockets has.
+
+def start_server(host: str, port: int, name: str, token: str) -> viser.ViserServer:
+    """Return a server at a free port; 0 takes any.
+
+    Page and websocket are for those that know the ``token``: other users of the machine, pages of
+    other sites and programs that scan ports get 403 and nothing about the robot. The token is in
+    the address of the page, ``?token=``, and then in a cookie, since viser's page opens its
+    websocket without a query. viser has no setting for that, so it starts with what websockets
+    has.
     """
     serve = websockets.asyncio.server.serve
 
-    def guarded(*arguments: Any, process_request: Any, **options: Any) -> Any:
-        admit = partial(_admitted, token, process_request) if token else process_request
-        return serve(
-            *arguments, process_request=admit, origins=None if token else _OWN_PAGES, **options
-        )
+    def serve_guarded(*arguments: Any, process_request: Any, **options: Any) -> Any:
+        admit = partial(_admit, token, process_request)
+        options |= {"create_connection": _Connection, "logger": _LOGGER}
+        return serve(*arguments, process_request=admit, **options)
 
-    websockets.asyncio.server.serve = guarded  # type: ignore[assignment,misc]
+    websockets.asyncio.server.serve = serve_guarded  # type: ignore[assignment,misc]
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # its banner
             return viser.ViserServer(host, port, label=name, verbose=False)
@@ -49,40 +60,67 @@ def started(host: str, port: int, name: str, token: str = "") -> viser.ViserServ
         websockets.asyncio.server.serve = serve  # type: ignore[misc]
 
 
-def stop(server: viser.ViserServer) -> None:
+def stop_server(server: viser.ViserServer) -> None:
     """End a server."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
-def _admitted(
+class _Connection(ServerConnection):
+    """A websocket that ends where it receives anything but a message of viser's."""
+
+    async def recv(self, decode: bool | None = None) -> Any:  # noqa: FBT001 (as the base has it)
+        """Return the next message; raises ConnectionClosed after one that is none."""
+        data = await super().recv(decode)
+        try:
+            if isinstance(data, bytes):
+                Message.deserialize(data)
+                return data
+        except Exception:  # noqa: BLE001, S110 (viser's reader of bytes from a stranger raises anything)
+            pass
+        await self.close(CloseCode.INVALID_DATA)
+        return await super().recv(decode)
+
+
+def _admit(
     token: str,
     answer: Callable[[Any, Request], Response | None],
     connection: Any,
     request: Request,
 ) -> Response | None:
-    """Answer who has the token, in the address or then in a cookie; others, and pages of other sites, are refused."""
+    """Answer a request with the token, in its address or in the cookie; refuse others, and pages of other sites."""
     headers = request.headers
+    port = urlsplit(f"//{headers.get('Host', '')}").netloc.rpartition(":")[2]
+    cookie = f"tfcompose_view_{port}"  # browsers send cookies of a host to all of its ports
     in_address = parse_qs(urlsplit(request.path).query).get("token", [""])[-1]
     origin = headers.get("Origin")
     is_own_page = origin is None or urlsplit(origin).netloc == headers.get("Host")
     has_token = any(
-        hmac.compare_digest(one.encode(), token.encode()) for one in (in_address, _cookie(headers))
+        hmac.compare_digest(candidate.encode(), token.encode())
+        for candidate in (in_address, _cookie(headers, cookie))
     )
     if not has_token or not is_own_page:
-        return Response(
-            http.HTTPStatus.FORBIDDEN, "FORBIDDEN", Headers(), b"open the address with its token\n"
-        )
-    response = answer(connection, request)
+        return _refuse(http.HTTPStatus.FORBIDDEN, "open the address with its token")
+    try:
+        response = answer(connection, request)
+    except OSError:  # the path is no name of a file
+        return _refuse(http.HTTPStatus.NOT_FOUND, "there is no such file")
     if response is not None:
-        response.headers["Set-Cookie"] = f"{_COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
+        response.headers["Set-Cookie"] = f"{cookie}={token}; HttpOnly; SameSite=Strict; Path=/"
         response.headers["Referrer-Policy"] = "no-referrer"
+        response.headers["Cache-Control"] = "no-store"
     return response
 
 
-def _cookie(headers: Headers) -> str:
+def _refuse(status: http.HTTPStatus, text: str) -> Response:
+    body = f"{text}\n".encode()
+    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body))})
+    return Response(status, status.phrase, headers, body)
+
+
+def _cookie(headers: Headers, name: str) -> str:
     cookies: SimpleCookie = SimpleCookie()
     for text in headers.get_all("Cookie"):
         with contextlib.suppress(CookieError):
             cookies.load(text)
-    return cookies[_COOKIE].value if _COOKIE in cookies else ""
+    return cookies[name].value if name in cookies else ""

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from difflib import unified_diff
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.findings import edited
+from tfcompose.compiler.compile import Compiled
+from tfcompose.foundation.findings import RejectedError, edited
 from tfcompose.tools.view.edit import Change, Elsewhere, change_of, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from collections.abc import Set as AbstractSet
 
-    from tfcompose.compiler.compile import Compiled
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.geometry import Pose
     from tfcompose.model.robot import Robot
@@ -39,19 +39,20 @@ class Session:
     """A robot with moved mounts. ``texts`` are the files that may be edited, the robot's own one first.
 
     ``compiled`` compiles texts that are not written yet, ``write`` replaces a file's old text by
-    the new one.
+    the new one. ``known`` is what the texts compile to, if that is known.
     """
 
     texts: Mapping[str, str]
     compiled: Callable[[Mapping[str, str]], Compiled]
     write: Callable[[str, str, str], None]
+    known: InitVar[Compiled | None] = None
     state: Compiled = field(init=False)
     moved: dict[str, Pose] = field(default_factory=dict)
     _undo: list[dict[str, Pose]] = field(default_factory=list)
     _redo: list[dict[str, Pose]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self.state = self.compiled(self.texts)
+    def __post_init__(self, known: Compiled | None) -> None:
+        self.state = self.compiled(self.texts) if known is None else known
 
     @property
     def robot(self) -> Robot:
@@ -67,6 +68,23 @@ class Session:
             replace(edge, pose=moved.get(edge.child, edge.pose)) for edge in self.state.robot.edges
         )
         return replace(self.state.robot, edges=tuple(edges))
+
+    def fork(self) -> Session:
+        """Return a session on the same files, in which nothing is moved."""
+        return Session(self.texts, self.compiled, self.write, self.state)
+
+    def read_again(self, read: Callable[[str], str]) -> tuple[dict[str, str], Compiled]:
+        """Return the files as they are now, and what they compile to; no files where one cannot be read."""
+        try:
+            texts = {file: read(file) for file in self.texts}
+            return texts, self.compiled(texts)
+        except RejectedError as error:
+            return {}, Compiled(None, error.findings)
+
+    def accepts(self, state: Compiled) -> bool:
+        """Return whether files that changed can be shown: they give a robot, and did not get wrong."""
+        got_worse = bool(state.errors and not self.state.errors)
+        return state.robot is not None and bool(state.robot.frames) and not got_worse
 
     def replace(self, texts: Mapping[str, str], state: Compiled) -> None:
         """Go on with files that changed on disk, and what they compile to; moves of frames that are gone are lost."""

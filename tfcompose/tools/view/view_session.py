@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import disk, given_by, library, overlays_of
+from tfcompose.cli.compiling import disk_of, given_by, library, overlays_of
 from tfcompose.cli.fixing import rewrite
 from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
 from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, reject
@@ -15,6 +15,7 @@ from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.reading import is_file
 from tfcompose.model.plan.file import read_plan
 from tfcompose.tools.view.plan_robot import robot_of_plan
 from tfcompose.tools.view.session import Session
@@ -46,7 +47,7 @@ def session_of(file: str, arguments: Namespace, files: Files) -> Session:
 
 def _robot_session(file: str, arguments: Namespace, files: Files) -> Session:
     texts = {one: files(one) for one in (file, *arguments.overlays)}
-    presets, packages = library(files), replace(disk(), read=files)
+    presets, packages = library(files), replace(disk_of(file, arguments), read=files)
 
     def compiled(now: Mapping[str, str]) -> Compiled:
         def read(one: str) -> str:
@@ -75,13 +76,13 @@ def _plan_session(file: str, arguments: Namespace, files: Files) -> Session:
     refuse_variant(arguments)
     if arguments.edit:
         fail("a built plan cannot be edited: give the robot's file", UNREADABLE)
-    packages = Packages(disk())
+    packages = Packages(disk_of(file, arguments))
 
     def compiled(now: Mapping[str, str]) -> Compiled:
         try:
             plan = read_plan(now[file], file)
             description = Path(file).with_name(plan.description)
-            text = files(str(description)) if description.is_file() else None
+            text = files(str(description)) if is_file(description) else None
             return Compiled(robot_of_plan(plan, text, str(description), packages.asset), ())
         except RejectedError as error:
             return Compiled(None, error.findings)

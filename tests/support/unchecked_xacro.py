@@ -1,0 +1,7 @@
+"""Runs xacro confined, with nothing but xacro's own check of names: what an expression then does, the kernel holds."""
+
+from tfcompose.compiler.urdf import xacro_process
+from tfcompose.compiler.urdf.xacro_process import main
+
+__all__ = ["main"]
+xacro_process._with_safe_names = lambda evaluate: evaluate

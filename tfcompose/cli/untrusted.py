@@ -1,0 +1,136 @@
+"""``lint --untrusted``: robot files of strangers read their own tree, installed packages and presets, and no more.
+
+So a pull request shows nothing of the computer that checks it: neither other files nor the
+environment, which in CI holds secrets.
+"""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import re
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli.compiling import PRESETS, PresetFolders, disk
+from tfcompose.cli.reading import STDIN, withhold
+from tfcompose.compiler.resolve import Library
+from tfcompose.compiler.urdf.packages import OUTSIDE
+from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.foundation.reach import Reach, is_package
+from tfcompose.foundation.reading import is_file, is_folder
+from tfcompose.spec.load import path_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from tfcompose.compiler.resolve import Disk
+    from tfcompose.spec.load import Source
+
+#: Variables that programs need to run and to write to a terminal, and where packages are.
+_NEEDED = frozenset({
+    "AMENT_PREFIX_PATH", "COLUMNS", "FORCE_COLOR", "HOME", "LANG", "LC_ALL", "LC_CTYPE",
+    "LD_LIBRARY_PATH", "LINES", "NO_COLOR", "PATH", "PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING",
+    "PYTHONPATH", "PYTHONUTF8", "TERM", "TMPDIR",
+})  # fmt: skip
+#: A value that is no secret: a switch or a number.
+_PLAIN = re.compile(r"true|false|yes|no|on|off|[-+]?[0-9]{0,9}(?:\.[0-9]{0,9})?", re.IGNORECASE)
+
+
+@contextmanager
+def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
+    """Take all variables but those that programs need from this process, so that none is read; yield all that there were."""
+    before = dict(os.environ)
+    if applies:
+        for name in before.keys() - _NEEDED:
+            del os.environ[name]
+    try:
+        yield before
+    finally:
+        os.environ.update(before)
+
+
+def declared_environment(source: Source, environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the variables that a file's args read, where their value is no secret.
+
+    It is one of the declared choices, a switch or a number: a stranger may declare that an
+    argument reads any variable, and findings name values.
+    """
+    args = source.data.get("args")
+    declared: dict[str, str] = {}
+    for spec in args.values() if isinstance(args, dict) else ():
+        name = spec.get("env") if isinstance(spec, dict) else None
+        value = environment.get(name) if isinstance(name, str) else None
+        if value is not None and (value in _choices(spec) or _PLAIN.fullmatch(value)):
+            declared[str(name)] = value
+    return declared
+
+
+def _choices(spec: Mapping[str, Any]) -> Sequence[str]:
+    choices = spec.get("choices")
+    return [str(choice) for choice in choices] if isinstance(choices, list) else []
+
+
+class UntrustedFiles:
+    """Files that a stranger's file may read; whatever else it names is refused, or not there.
+
+    Args:
+        file: the robot file or URDF.
+        read: reads a file that may be read.
+    """
+
+    def __init__(self, file: str, read: Callable[[str], str]) -> None:
+        self._read = read
+        self._disk = disk(sources=[file], is_strict=True)
+        self.reach = Reach()
+        self.reach.add_tree(file)
+        for prefix in self._disk.prefixes:
+            self.reach.add_prefix(prefix)
+        for folder in (str(PRESETS), *PresetFolders().packages()):
+            self.reach.add_folder(folder)
+
+    def read(self, path: str) -> str:
+        """Return the text of a file.
+
+        Raises:
+            RejectedError: if it may not or cannot be read.
+        """
+        if path != STDIN and not self.reach.allows(path):
+            withhold(path)
+            message = "may not be read: it is outside of the robot's tree"
+            raise RejectedError([finding("TF021", message, Span(path), help=OUTSIDE)])
+        return self._read(path)
+
+    def is_file(self, path: str) -> bool:
+        """Return whether a file that may be read is there."""
+        return self.reach.allows(path) and is_file(path)
+
+    def is_folder(self, path: str) -> bool:
+        """Return whether a folder that may be read is there."""
+        return self.reach.allows(path) and is_folder(path)
+
+    def disk(self) -> Disk:
+        """Return what a compiler may ask about files; meshes are not measured."""
+        return replace(
+            self._disk,
+            read=self.read,
+            is_file=self.is_file,
+            is_folder=self.is_folder,
+            moments=None,
+            allows=self.reach.allows,
+        )
+
+    def disk_for(self, source: Source) -> Disk:
+        """Return the same for a robot file, which may read the folders under ``packages`` that are packages."""
+        packages = source.data.get("packages")
+        for name, folder in packages.items() if isinstance(packages, dict) else ():
+            if isinstance(folder, str):
+                path = path_named(folder, source.at(("packages", name)))
+                if is_package(posixpath.realpath(path)):
+                    self.reach.add_folder(path)
+        return self.disk()
+
+    def library(self) -> Library:
+        """Return the presets that may be read."""
+        return Library((str(PRESETS),), PresetFolders(self.read, self.reach.allows), str(PRESETS))

@@ -1,0 +1,187 @@
+"""Starts a confined process and talks to it: what it asks, what it answers, what it prints.
+
+Whatever comes from it is a stranger's: messages are bounded in size, and what it prints is cut. It
+has a session of its own, no terminal, and ends with its time or with this process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+MOST_WALL_S: Final = 30.0
+#: With --trust: files may be on a disk that does not answer.
+MOST_TRUSTED_WALL_S: Final = 600.0
+MOST_ANSWER_BYTES: Final = 64 << 20
+MOST_PRINTED_BYTES: Final = 1 << 20
+#: Lists and mappings of an answer: each takes memory that its text does not.
+_MOST_CONTAINERS: Final = 4_000_000
+
+
+#: A question's answer: a message, and bytes that follow it.
+Reply = tuple[Any, bytes]
+
+
+@dataclass(slots=True)
+class Outcome:
+    """How a confined process ended: with an answer, or without.
+
+    ``code`` is its exit code, ``refused`` why it was ended because of what it sent, ``missing``
+    what the kernel does not have to confine it.
+    """
+
+    answer: Any = None
+    code: int = 0
+    timed_out: bool = False
+    refused: str = ""
+    missing: tuple[str, ...] = ()
+    printed: str = ""
+
+
+class _RefusedError(Exception):
+    """A message is none, or is too large."""
+
+
+def run_confined(  # noqa: PLR0913 (what a process needs)
+    module: str,
+    request: Mapping[str, Any],
+    answers: Mapping[str, Callable[[Any], Reply]],
+    *,
+    wall_s: float = MOST_WALL_S,
+    shared: Sequence[int] = (),
+    environment: Mapping[str, str] | None = None,
+) -> Outcome:
+    """Run a module's ``main`` in a process of its own, and return how that ended.
+
+    ``main`` is given the descriptors of its two pipes, then those that are ``shared``. It reads
+    the request, and sends mappings with one key: ``missing``, with what the kernel is missing,
+    then questions, whose keys ``answers`` has, then ``answer``.
+    """
+    reads, to_child = os.pipe()
+    from_child, writes = os.pipe()
+    inherited = [reads, writes, *shared]
+    path = f"import sys; sys.path[:] = {sys.path!r}"
+    program = f"{path}; from {module} import main; main(*{inherited})"
+    outcome, printed = Outcome(), bytearray()
+    with (
+        os.fdopen(to_child, "wb", buffering=0) as sink,
+        os.fdopen(from_child, "rb") as source,
+        subprocess.Popen(
+            [sys.executable, "-c", program], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, pass_fds=inherited, start_new_session=True, env=environment,
+        ) as process,
+    ):  # fmt: skip
+        os.close(reads)
+        os.close(writes)
+        reader = threading.Thread(target=_collect, args=(process.stdout, printed), daemon=True)
+        reader.start()
+        watchdog = threading.Timer(wall_s, _end, (process, outcome))
+        watchdog.daemon = True
+        watchdog.start()
+        try:
+            outcome.answer = _converse(source, sink, request, answers, outcome)
+            if outcome.answer is None:
+                process.wait()  # its exit code says why
+        except _RefusedError as error:
+            outcome.refused = str(error)
+        finally:
+            watchdog.cancel()
+            process.kill()
+            reader.join()
+    outcome.code = process.returncode
+    outcome.printed = printed.decode("utf-8", "replace")
+    return outcome
+
+
+def _end(process: subprocess.Popen[bytes], outcome: Outcome) -> None:
+    outcome.timed_out = True
+    process.kill()
+
+
+def _collect(stream: IO[bytes], printed: bytearray) -> None:
+    """Read a stream to its end, and keep the beginning."""
+    while chunk := os.read(stream.fileno(), 1 << 16):
+        printed += chunk[: MOST_PRINTED_BYTES - len(printed)]
+
+
+def _converse(
+    source: IO[bytes],
+    sink: IO[bytes],
+    request: Mapping[str, Any],
+    answers: Mapping[str, Callable[[Any], Reply]],
+    outcome: Outcome,
+) -> Any:
+    """Return the answer to a request, None if the process ends before."""
+    _send(sink, request, b"")
+    while message := _receive(source):
+        (key, value), *others = message.items()
+        if key == "answer" and not others:
+            return value
+        if key == "missing" and fits(value, [str]):
+            outcome.missing = outcome.missing or tuple(value)
+        elif key in answers and isinstance(value, str):
+            _send(sink, *answers[key](value))
+        else:
+            raise _RefusedError("it asks what nothing answers")
+    return None
+
+
+def _send(sink: IO[bytes], message: Any, data: bytes) -> None:
+    rest = memoryview(json.dumps(message).encode() + b"\n" + data)
+    with contextlib.suppress(BrokenPipeError):  # it has ended, and nothing more comes from it
+        while rest:
+            rest = rest[sink.write(rest) :]
+
+
+def _receive(source: IO[bytes]) -> dict[str, Any] | None:
+    """Return the next message, None at the end."""
+    line = source.readline(MOST_ANSWER_BYTES + 1)
+    if len(line) > MOST_ANSWER_BYTES:
+        raise _RefusedError(f"it answers with more than {MOST_ANSWER_BYTES >> 20} MB")
+    if not line.endswith(b"\n"):
+        return None
+    if line.count(b"[") + line.count(b"{") > _MOST_CONTAINERS:
+        raise _RefusedError(f"it answers with more than {_MOST_CONTAINERS:,} values")
+    try:
+        message = json.loads(line)
+    except (ValueError, RecursionError):
+        message = None
+    if not isinstance(message, dict) or not message:
+        raise _RefusedError("its answer is none")
+    return message
+
+
+def fits(value: Any, shape: Any) -> bool:
+    """Return whether a value that was JSON has a shape.
+
+    A shape is a type, a list with the shape of all its items, a tuple of shapes of which one has
+    to fit, a mapping of keys to shapes, None or Any. A key that ends with ``?`` may be missing,
+    the key ``*`` is every key.
+    """
+    if shape is Any:
+        return True
+    if isinstance(shape, tuple):
+        return any(fits(value, alternative) for alternative in shape)
+    if isinstance(shape, list):
+        return isinstance(value, list) and all(fits(item, shape[0]) for item in value)
+    if isinstance(shape, dict):
+        if not isinstance(value, dict):
+            return False
+        if "*" in shape:
+            return all(fits(inner, shape["*"]) for inner in value.values())
+        return all(
+            fits(value[key], inner) if (key := name.rstrip("?")) in value else key != name
+            for name, inner in shape.items()
+        )
+    if shape is None or value is None:
+        return value is shape
+    return isinstance(value, shape) and (shape is bool or not isinstance(value, bool))

@@ -1,0 +1,160 @@
+"""Windows of browsers on one robot: each has a panel, a selection, joints and unsaved moves of its own.
+
+All of them show the same files. What one saves the others show, and a pose that one has moved and
+another one saved is said before it is saved again.
+"""
+
+from __future__ import annotations
+
+import threading
+from html import escape
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.text import listed
+from tfcompose.tools.view.findings import paragraphs
+from tfcompose.tools.view.panel import Window
+from tfcompose.tools.view.reload import ReloadedPanel, meshes_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import viser
+
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.tools.view.choices import Choices
+    from tfcompose.tools.view.reload import Files
+    from tfcompose.tools.view.session import Session
+
+#: What windows left that were closed is kept of so many.
+_MOST_LEFT = 8
+
+
+class Windows:
+    """Makes a panel for each window that connects to a server, and reloads all of them.
+
+    A window that is opened goes on where one ended that was closed: browsers close and open the
+    connection when a page is reloaded, or a computer sleeps.
+
+    Args:
+        server: where windows connect.
+        session: what is shown; nothing is moved in it.
+        files: what the session was read with.
+        edit: as for ``Panel``.
+        joints: as for ``Panel``.
+        extend: adds to a panel that was made, as ``view --bag`` does.
+    """
+
+    def __init__(  # noqa: PLR0913 (options of the view)
+        self,
+        server: viser.ViserServer,
+        session: Session,
+        files: Files,
+        *,
+        edit: bool,
+        joints: bool,
+        extend: Callable[[ReloadedPanel], None] | None = None,
+    ) -> None:
+        self.session = session
+        self.files = files
+        self._server = server
+        self._edit, self._joints = edit, joints
+        self._extend = extend or (lambda _: None)
+        self._lock = threading.RLock()
+        self._open: dict[int, ReloadedPanel] = {}
+        self._left: list[tuple[Session, Choices]] = []
+        self._found: tuple[Finding, ...] = ()
+        files.look_at(meshes_of(session.robot))
+        server.scene.world_axes.visible = False
+        server.on_client_connect(self._add)
+        server.on_client_disconnect(self._remove)
+
+    @property
+    def panels(self) -> tuple[ReloadedPanel, ...]:
+        """Those of the windows that are open, in the order in which they were opened."""
+        with self._lock:
+            return tuple(self._open.values())
+
+    def end(self) -> None:
+        """Let no panel move anything any more."""
+        for shown in self.panels:
+            shown.end()
+
+    def reload(self) -> None:
+        """Read the files again if they have changed, and show them in all windows."""
+        with self._lock:
+            if not self.files.differ():
+                return
+            texts, state = self.session.read_again(self.files)
+            for shown in self._open.values():
+                if shown.accept(texts, state):
+                    self._extend(shown)
+            self._found = state.found
+            if self.session.accepts(state):
+                self._found = state.found if state.errors else ()
+                self._replace(texts, state)
+
+    def _replace(self, texts: dict[str, str], state: Compiled) -> None:
+        for session in (self.session, *(session for session, _ in self._left)):
+            session.replace(texts, state)
+
+    def _add(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            session, choices = self._left.pop() if self._left else (self.session.fork(), None)
+            number = client.client_id
+            shown = ReloadedPanel(
+                client,
+                session,
+                self.files,
+                edit=self._edit,
+                joints=self._joints,
+                choices=choices,
+                window=Window(self._server, self._lock, lambda: self._share(number)),
+            )
+            self._open[number] = shown
+            if self._found:
+                shown.show(self._found)
+            self._extend(shown)
+
+    def _remove(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            shown = self._open.pop(client.client_id, None)
+            if shown is not None:
+                shown.end()
+                self._left = [*self._left, (shown.session, shown.panel.choices)][-_MOST_LEFT:]
+
+    def _share(self, number: int) -> None:
+        """Show in all other windows what one has saved, and say so."""
+        saved = self._open[number].session
+        texts, state = dict(saved.texts), saved.state
+        for other, shown in self._open.items():
+            if other == number:
+                continue
+            conflicts = _conflicts(shown.session, state)
+            if shown.accept(texts, state):
+                self._extend(shown)
+            shown.panel.window.conflicts |= conflicts
+            shown.panel.say(_word(list(shown.session.moved), conflicts))
+        self._replace(texts, state)
+
+
+def _conflicts(session: Session, state: Compiled) -> set[str]:
+    """Return the frames that were moved in a session and have another pose in the files now."""
+    before = session.state.robot.edges if session.state.robot else ()
+    poses = {edge.child: edge.pose for edge in before}
+    after = state.robot.edges if state.robot else ()
+    return {
+        edge.child
+        for edge in after
+        if edge.child in session.moved and edge.pose != poses.get(edge.child)
+    }
+
+
+def _word(moved: list[str], conflicts: set[str]) -> str:
+    """Return what to say of a save in another window."""
+    lines = ["another window saved its moves, which are shown here now"]
+    if moved:
+        lines.append(f"not saved yet here: {listed(moved)}")
+    if conflicts:
+        lines.append(f"moved in both: {listed(sorted(conflicts))}")
+    return paragraphs([escape(line) for line in lines])

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
+from tests.support.cli import tfcompose_in
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.dry_run import _lines as plan_lines
 from tfcompose.cli.reading import read_text
@@ -43,6 +44,10 @@ MOST_S = 10.0
 LONGEST = 20_000
 
 LIBRARY = library()
+_STARTS_NOTHING = frozenset(
+    "lint build tree graph diff explain pose presets export schema help import".split()  # noqa: SIM905
+)
+_ROBOT = "tfcompose: 1\nrobot: r\nargs: {side: {choices: [left, right], default: left}}\nlinks: {base_link: {}, arm: {parent: base_link}}\nprofiles: {demo: {frames: {eye: {parent: arm}}}}\n"
 WORDS = """
 { } [ ] ,  - &a *a <<: ${ null ~ 1e999 -0.0 !x " ' \ufeff é < > /> <!-- &amp; &#xD800; "\\ud800" nan .inf true | #
 base_link ${1/0} $(find x)
@@ -162,6 +167,37 @@ def xacro(data: bytes, folder: Path) -> None:
     _shown(lint_urdf(str(file), Packages(disk())))
 
 
+def _run(argv: list[str], folder: Path) -> None:
+    """Run a command in a folder; it ends with an exit code of its own, and obeys no text."""
+    done = tfcompose_in(folder, *argv)
+    assert done.returncode in {0, 1, 2}, done.stderr
+    output = done.stdout + done.stderr
+    assert "Traceback" not in output
+    assert not {"\x1b", "\x00", "\x9b"} & set(output), ascii(output)
+
+
+def script(data: bytes, folder: Path) -> None:
+    """A shell script that starts a robot."""
+    (folder / "bringup.sh").write_bytes(data)
+    _run(["import", "bringup.sh"], folder)
+
+
+def launch_file(data: bytes, folder: Path) -> None:
+    """A launch file in XML."""
+    (folder / "robot.launch.xml").write_bytes(data)
+    _run(["import", "robot.launch.xml"], folder)
+
+
+def arguments(data: bytes, folder: Path) -> None:
+    """Arguments of a command that starts nothing, each ended by NUL."""
+    (folder / "robot.yaml").write_text(_ROBOT, "utf-8")
+    (folder / "r.urdf").write_text("<robot name='r'><link name='a'/></robot>", "utf-8")
+    argv = [word.decode("utf-8", "surrogateescape") for word in data.split(b"\0")]
+    endless = {"-w", "--watch", "-"}
+    if argv[0] in _STARTS_NOTHING and not endless & set(argv):
+        _run([word for word in argv if not word.startswith(("/", ".", "~"))], folder)
+
+
 def plan(data: bytes, folder: Path) -> None:
     """A built plan: reviewed and exported, if it is one."""
     try:
@@ -227,6 +263,9 @@ KINDS = (
     Kind(params),
     Kind(urdf),
     Kind(xacro, 0.05),
+    Kind(script, 0.2),
+    Kind(launch_file, 0.02),
+    Kind(arguments, 0.3),
     Kind(plan),
     Kind(message),
     Kind(transforms),

@@ -83,3 +83,8 @@ def test_lines_of_a_robots_own_files_are_shown(name: str, tmp_path: Path) -> Non
     done = tfcompose_in(tmp_path, "lint", "robot.yaml")
     assert f"{name}:" in done.stdout
     assert f" | {faults[name].strip()}" in done.stdout
+
+
+def test_lines_of_a_script_that_is_imported_are_shown(tmp_path: Path) -> None:
+    (tmp_path / "up.sh").write_text('exec x "$(pwd)/hunter2"\n', "utf-8")
+    assert ' | exec x "$(pwd)/hunter2"' in tfcompose_in(tmp_path, "import", "up.sh").stderr

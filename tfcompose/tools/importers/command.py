@@ -92,9 +92,11 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Import; exit code 0, 1 with errors in the source, 2 after wrong use or where something cannot be read."""
+    from tfcompose.cli.reading import quote
     from tfcompose.foundation.findings import RejectedError
 
     _check_use(arguments)
+    quote(arguments.file)
     try:
         if arguments.live or arguments.bag:
             return _import_observed(arguments)

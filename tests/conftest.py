@@ -71,7 +71,10 @@ def pytest_report_header() -> str:
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Two workers a core, since tests wait more than they work; none where single files or tests are named."""
+    """Two workers a core, since tests wait more than they work.
+
+    None where single files or tests are named.
+    """
     if any(".py" in argument for argument in config.args):
         return 0
     return min(2 * len(os.sched_getaffinity(0)), 16)
@@ -95,7 +98,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True)
 def _processes() -> Iterator[None]:
-    """Heed every signal, and end the processes that a test started; those of a module or the session go on."""
+    """Heed every signal, and end the processes that a test started.
+
+    Those of a module or the session go on.
+    """
     with processes.default_signal_actions(), processes.ended_at_exit():
         yield
 
@@ -108,7 +114,7 @@ def _all_processes() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _fastdds_profile(request: pytest.FixtureRequest) -> None:
-    """Have nodes of this process announce themselves as tfcompose's own do, whichever test makes the first of them.
+    """Let nodes of this process announce themselves as tfcompose's own processes do.
 
     Fast DDS reads its profiles once in a process, with the first node. Stock nodes are found at
     their next announcement only, up to 3 s later.
@@ -167,7 +173,10 @@ def nodes(domain: Domain) -> Iterator[Any]:
 
 @pytest.fixture
 def start(domain: Domain) -> Iterator[Callable[..., Started]]:
-    """Start ``tfcompose WORD…`` in the test's domain; what still runs at the test's end is killed."""
+    """Start ``tfcompose WORD…`` in the test's domain.
+
+    What still runs at the test's end is killed.
+    """
     running: list[Started] = []
 
     def run(*words: object, **environment: str) -> Started:
@@ -184,7 +193,10 @@ def start(domain: Domain) -> Iterator[Callable[..., Started]]:
 
 @pytest.fixture
 def python() -> Callable[[str], str]:
-    """Run Python code in a process of its own, in this process's environment; return its output."""
+    """Run Python code in a process of its own, in this process's environment.
+
+    Return its output.
+    """
 
     def run(code: str) -> str:
         command = [sys.executable, "-c", code]
@@ -211,7 +223,7 @@ def edge() -> Callable[..., PlanEdge]:
 
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[..., Path]:
-    """Write a plan of these edges and processes, and its description, and return the plan's file."""
+    """Write a plan with these edges and processes, and its description; return its file."""
 
     def make(edges: list[PlanEdge], *processes: PlanProcess, clock: Clock = "wall") -> Path:
         named = tuple(p if p.nodes else _with_node(p) for p in processes)

@@ -1,4 +1,7 @@
-"""The core without the folder ``tools``: it does all of its work, and says what installs what is absent."""
+"""The core without the folder ``tools``.
+
+It does all of its work, and says what installs what is absent.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who may import whom: the table of the architecture, read from the syntax trees, and what commands really load."""
+"""Who may import whom, read from syntax trees, and what commands really load."""
 
 import ast
 import graphlib
@@ -105,7 +105,7 @@ def test_the_arrows_between_wings_lead_downwards() -> None:
 
 @for_each(sorted(MAY_IMPORT.keys() - {"tools"}))
 def test_a_wing_says_what_it_must_not_import(wing: str) -> None:
-    """The sentence that begins with "Must not import" names wings and packages that the tables do not allow."""
+    """Each wing's "Must not import" sentence agrees with the tables."""
     docstring = ast.get_docstring(ast.parse((PACKAGE / wing / "__init__.py").read_text("utf-8")))
     _, says, rest = " ".join((docstring or "").split()).partition("Must not import")
     assert says
@@ -246,7 +246,10 @@ LOADER = "foundation.tool"
 
 
 def test_nothing_is_imported_inside_a_function() -> None:
-    """A circle would be broken that way; these parts alone load what is rarely needed where it is."""
+    """A circle would be broken that way.
+
+    These parts alone load what is rarely needed where it is.
+    """
     inside = [
         f"{file.relative_to(ROOT)}:{node.lineno}"
         for file in FILES
@@ -268,7 +271,7 @@ def loaded_by(code: str) -> set[str]:
 
 
 def foreign(modules: set[str], before: set[str]) -> set[str]:
-    """Return the first names of modules that are neither the standard library's nor there without any import."""
+    """Return the top-level names of third-party modules that an import loaded."""
     first = {name.partition(".")[0] for name in modules - before}
     return {
         name
@@ -380,7 +383,10 @@ def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_requested(bare:
 
 
 def test_the_buffer_stands_on_its_own() -> None:
-    """It needs the geometry and nothing else of the package; what needs ROS are listeners and nodes."""
+    """It needs the geometry and nothing else of the package.
+
+    What needs ROS are listeners and nodes.
+    """
     loaded = {
         name.removeprefix("tfcompose.")
         for name in loaded_by("import tfcompose.tf.tf2")

@@ -1,4 +1,7 @@
-"""SECURITY.md claims nothing that no test shows: each line of its tables names one that is there."""
+"""SECURITY.md claims nothing that no test shows.
+
+Each line of its tables names one that is there.
+"""
 
 import ast
 import re

@@ -1,4 +1,4 @@
-"""The words of the project: the field's word for each idea, and words that no name in the code may contain."""
+"""The project's words: the field's word for each idea, and words no name may contain."""
 
 import ast
 import re

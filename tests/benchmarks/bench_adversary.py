@@ -1,4 +1,6 @@
-"""What liars can do to a robot: ``python tests/benchmarks/bench_adversary.py [accusations [TRIES] | flood]``.
+"""What liars can do to a robot.
+
+``python tests/benchmarks/bench_adversary.py [accusations [TRIES] | flood]``.
 
 ``accusations`` starts strange publishers, of all kinds in turn, beside a robot that each way of
 guarding watches, and counts who was named: with its process, without, somebody else, nobody in
@@ -97,7 +99,10 @@ OWNER = Path(__file__).with_name("owner.py")
 
 
 def floods(guard: str, *, flooded: bool) -> tuple[list[float], float, float, float]:
-    """Return delays in milliseconds, the longest gap in seconds, and the guard's memory in MB and part of a core."""
+    """Return delays in milliseconds, the longest gap, and the guard's memory and CPU share.
+
+    The gap is in seconds, the memory in MB, the share a part of one core.
+    """
     frames = [f"frame_{n}" for n in range(EDGES)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

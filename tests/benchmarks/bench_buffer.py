@@ -32,7 +32,7 @@ STAMPS = 10_000
 
 
 def chain(moving: int, fixed: int) -> tuple[Buffer, str]:
-    """Return a buffer full of 10 s at 50 Hz, and the last frame of a chain of so many edges below f0."""
+    """Return a buffer with 10 s at 50 Hz, and the last frame of a chain of ``edges`` below f0."""
     buffer = Buffer()
     for index in range(moving + fixed):
         parent, child = f"f{index}", f"f{index + 1}"
@@ -75,7 +75,10 @@ def single() -> dict[str, float]:
 
 
 def many() -> dict[str, float]:
-    """Return the milliseconds of 10,000 lookups through 3 moving and 7 fixed edges: at once, and one by one."""
+    """Return the milliseconds of 10,000 lookups through 3 moving and 7 fixed edges.
+
+    At once, and one by one.
+    """
     buffer, end = chain(3, 7)
     stamps = np.linspace(START, START + HISTORY_S * S, STAMPS).astype(np.int64)
     times = stamps.tolist()
@@ -102,7 +105,10 @@ def points() -> dict[str, float]:
 
 
 def intake() -> float:
-    """Return the share of a core that decoding and inserting 1,000 edges at 50 Hz takes, in messages of 100."""
+    """Return the share of a core that decoding and inserting 1,000 edges at 50 Hz takes.
+
+    The edges come in messages of 100.
+    """
     seconds, warm_s = 2, 10
     messages = [
         encode(

@@ -1,4 +1,6 @@
-"""What building costs, beside xacro: ``python -m tests.benchmarks.bench_compile``, or name the file to pytest.
+"""What building costs, beside xacro.
+
+``python -m tests.benchmarks.bench_compile``, or name the file to pytest.
 
 The same robot is written for both, for xacro as calls of a macro: bodies on moving joints with
 inertia that is computed; or plain ones, boxes with a collision and a mass on fixed joints. Whole
@@ -140,7 +142,10 @@ def cost(words: list[str], folder: Path) -> tuple[float, float]:
 
 
 def measure(runs: int = RUNS) -> dict[str, tuple[float, float]]:
-    """Return the least seconds and the most megabytes of each command; those that are compared take turns."""
+    """Return the least seconds and the most megabytes of each command.
+
+    Those that are compared take turns.
+    """
     compileall.compile_dir(ROOT / "tfcompose", quiet=2)
     found = importlib.util.find_spec("xacro")
     if found is None or found.origin is None:

@@ -1,4 +1,6 @@
-"""How long a deployment to three hosts takes: from nothing, with nothing to change, and with one process changed.
+"""How long a deployment to three hosts takes.
+
+From nothing, with nothing to change, and with one process changed.
 
 ``python -m tests.benchmarks.bench_deploy``: three computers made of namespaces, each with an sshd
 of its own, and a stand-in for systemd. It needs the right to make them. The three share the

@@ -1,4 +1,6 @@
-"""Twenty robots of a fleet on loopback: ``python -m tests.benchmarks.bench_fleet [--record]``, or name it to pytest.
+"""Twenty robots of a fleet on loopback.
+
+``python -m tests.benchmarks.bench_fleet [--record]``, or name it to pytest.
 
 Each robot is a process with the code of ``fleet share``, fed with 50 transforms a second of odom →
 base_link instead of by ROS, and has a Zenoh router, in a process for all of them. How old a pose
@@ -31,7 +33,7 @@ LIMIT_S, LIMIT_CORE = 0.1, 0.05
 def measure(
     rate: str, robots: int = ROBOTS, seconds: float = SECONDS
 ) -> tuple[list[float], float]:
-    """Return the ages of poses between neighbours, in seconds, and what a robot costs, as a part of a core."""
+    """Return the ages of poses between neighbours in seconds, and a robot's share of a core."""
     with RobotProcesses(robots, rate) as running, ExitStack() as stack:
         fleet = running.fleet
         processes = [psutil.Process(one.pid) for one in running.processes.values()]

@@ -1,4 +1,6 @@
-"""What ``joints`` costs and how late it is: ``python -m tests.benchmarks.bench_joints``, or name the file to pytest.
+"""What ``joints`` costs and how late it is.
+
+``python -m tests.benchmarks.bench_joints``, or name the file to pytest.
 
 A node of the benchmark sends joint states at 500 Hz and hears /tf. Figures are the process's CPU
 time (user and system) per second, and the time from a joint state's publishing to the transforms'
@@ -91,7 +93,7 @@ def plan_file(folder: Path, joints: int) -> Path:
 def measure(
     joints: int, seconds: float = SECONDS, *, plain: bool = False
 ) -> tuple[float, float, float, float]:
-    """Return the part of a core, the median and the 99th percentile of the delay in seconds, and MB."""
+    """Return the share of a core, median and 99th percentile of the delay in seconds, and MB."""
     from tfcompose.tf.ros.node import open_node  # noqa: PLC0415 (after ROS's variables are set)
 
     with tempfile.TemporaryDirectory() as folder, open_node("bench", "/rover") as node:
@@ -106,7 +108,10 @@ def measure(
 
 
 def _sender(node: Any, joints: int) -> Callable[[], float | None]:
-    """Return what sends a joint state, waits for the rest of its period, and returns after how long it was answered."""
+    """Return a function that sends a joint state and returns how long its answer took.
+
+    It waits for the rest of its period.
+    """
     # After ROS's variables are set.
     from rclpy.serialization import serialize_message  # noqa: PLC0415
     from sensor_msgs.msg import JointState  # noqa: PLC0415 (the same)

@@ -1,4 +1,7 @@
-"""What it costs to publish 500 edges: ``python tests/benchmarks/bench_publish.py``, or name the file to pytest."""
+"""What it costs to publish 500 edges.
+
+``python tests/benchmarks/bench_publish.py``, or name the file to pytest.
+"""
 
 from __future__ import annotations
 

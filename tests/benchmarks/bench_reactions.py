@@ -1,4 +1,6 @@
-"""How soon a running robot reacts: ``python tests/benchmarks/bench_reactions.py``, or name the file to pytest.
+"""How soon a running robot reacts.
+
+``python tests/benchmarks/bench_reactions.py``, or name the file to pytest.
 
 A robot with an owner at 50 Hz runs under ``up``. Measured are the seconds from a stranger's first
 message until the guard's line names it; from an owner's standstill until its line says so; and
@@ -76,7 +78,10 @@ def seconds_until(condition: Callable[[], bool]) -> float:
 
 
 def named_s(output: Path, name: str) -> float:
-    """Return how long it takes until a stranger on the owner's edge is named, from its first message that is heard."""
+    """Return how long it takes to name a stranger on the owner's edge.
+
+    The time runs from its first message that is received.
+    """
     with open_node(name, "/bench") as node:
         publisher = TFPublisher(node, static=False)
         seconds_until(lambda: publisher.publisher.get_subscription_count() > 0)

@@ -1,4 +1,6 @@
-"""What starting costs, as ratios in one run: ``python tests/benchmarks/bench_start.py``, or name the file to pytest.
+"""What starting costs, as ratios in one run.
+
+``python tests/benchmarks/bench_start.py``, or name the file to pytest.
 
 Whole processes and the processor's time for them, which a busy machine changes little; the
 commands that are compared take turns, so that a busy moment meets all of them; medians; compiled

@@ -1,4 +1,6 @@
-"""What a strict guard costs in time: ``python -m tests.benchmarks.bench_strict``, or name the file to pytest.
+"""What a strict guard costs in time.
+
+``python -m tests.benchmarks.bench_strict``, or name the file to pytest.
 
 A process of the plan sends 50 edges at 200 Hz, and a listener takes how long they were under way:
 without a guard's fence, and through it, by partition and by remapping, in turns. The difference of
@@ -79,7 +81,10 @@ def delays_ms(mode: str, folder: Path) -> list[float]:
 
 
 def measure() -> dict[str, tuple[float, float]]:
-    """Return the median and the 99th percentile for each mode, in milliseconds: the best of some rounds."""
+    """Return the median and the 99th percentile for each mode, in milliseconds.
+
+    The best of some rounds.
+    """
     rounds: dict[str, list[tuple[float, float]]] = {way: [] for way in WAYS}
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(ROUNDS):

@@ -1,4 +1,6 @@
-"""How soon ``up`` has a tree, and what it takes: ``python -m tests.benchmarks.bench_up``, or name the file to pytest.
+"""How soon ``up`` has a tree, and what it takes.
+
+``python -m tests.benchmarks.bench_up``, or name the file to pytest.
 
 A robot with 100 fixed edges. Beside it a plain rclpy process that sends the same edges, started in
 turn with it, so that a busy moment meets both; both are measured from the start of their program
@@ -118,14 +120,17 @@ def listening(**environment: str) -> Iterator[subprocess.Popen[str]]:
 
 
 def heard(popen: subprocess.Popen[str]) -> tuple[float, float]:
-    """Return (seconds since rclpy.init, moment on the machine's clock) when the listener had all edges."""
+    """Return when the listener had all edges.
+
+    In seconds since rclpy.init, and as a moment on the machine's clock.
+    """
     assert popen.stdout
     since_init, at = popen.stdout.readline().split()
     return float(since_init), float(at)
 
 
 def until_live(folder: Path, *words: str) -> float:
-    """Return the seconds from the program's start until a listener that was there before has all edges."""
+    """Return the seconds from the program's start until an earlier listener has all edges."""
     with listening(**{PROFILE_VARIABLES[0]: str(FASTDDS_PROFILE)}) as listener:
         began = time.monotonic()
         with running(folder, *words):

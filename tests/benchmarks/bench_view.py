@@ -107,7 +107,7 @@ class Browser:
 
 
 def measure() -> tuple[float, float, float]:
-    """Return the part of a core and the bytes that the view uses, and how many updates a browser got in a second.
+    """Return the view's share of a core, its bytes, and a browser's updates per second.
 
     Raises:
         RuntimeError: if the view does not come.

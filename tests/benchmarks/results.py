@@ -45,7 +45,7 @@ def machine() -> dict[str, Any]:
 
 
 def record(name: str, rows: Rows, load: float) -> None:
-    """Print the rows, and write them to the file of that name if the command line says ``--record``.
+    """Print the rows, and write them to the file of that name with ``--record``.
 
     ``load`` is the system's load of the last minute before the benchmark began:
     ``os.getloadavg()[0]``.

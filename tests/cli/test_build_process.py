@@ -1,4 +1,7 @@
-"""``up`` builds a robot file in a process of its own: it ends with it, and the launcher holds no compiler."""
+"""``up`` builds a robot file in a process of its own.
+
+It ends with it, and the launcher holds no compiler.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The schema as users run it: ``check-jsonschema --schemafile schemas/robot.schema.json robot.yaml``."""
+"""The schema as users run it.
+
+``check-jsonschema --schemafile schemas/robot.schema.json robot.yaml``.
+"""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Which combinations of arguments ``lint`` judges, and how it says in which of them something is."""
+"""Combinations of arguments that ``lint`` judges, and how it names them."""
 
 from __future__ import annotations
 

@@ -125,7 +125,10 @@ SETUP = {
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder with two robot files, and a robot that runs in domain 67, as far as others see it."""
+    """A folder with two robot files, and a robot that runs in domain 67.
+
+    The robot is as others see it.
+    """
     (tmp_path / "runtime").mkdir(mode=0o700)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
     monkeypatch.setenv("ROS_DOMAIN_ID", "67")

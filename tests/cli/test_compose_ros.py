@@ -115,7 +115,7 @@ def test_what_is_missing_when_the_time_is_over_is_reported_with_1_and_the_robot_
 def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobody(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
-    """The edge may be silent for 4 s, so that a machine that stands still for a moment blames nobody either.
+    """The edge may be silent for 4 s, so that a machine that stalls blames nobody.
 
     That a longer silence would be told is seen by an edge of the same rate, whose owner hangs.
     """

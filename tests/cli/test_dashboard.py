@@ -1,4 +1,7 @@
-"""The live view of ``up``: what its pages show at any size, and what keys do; without a terminal."""
+"""The live view of ``up``: what its pages show at any size, and what keys do.
+
+Without a terminal.
+"""
 
 from __future__ import annotations
 
@@ -80,7 +83,7 @@ def edge_of(number: int) -> PlanEdge:
 
 
 def dashboard(count: int = 3, edges: int = 2, **changes: object) -> Dashboard:
-    """Return the view of a robot with so many processes, all of which run, and so many edges, all of which are live."""
+    """Return the view of a robot whose processes all run and whose edges are all live."""
     names = ["drive", *(f"process_{number}" for number in range(1, count))]
     states = [replace(RUNNING, name=name, pid=100 + number) for number, name in enumerate(names)]
     states[0] = replace(states[0], edges=edges, live=edges)

@@ -1,4 +1,7 @@
-"""The table of live edges in windows of all widths: nothing that is shown is cut within a number."""
+"""The table of live edges in windows of all widths.
+
+Nothing that is shown is cut within a number.
+"""
 
 import pytest
 

@@ -1,4 +1,7 @@
-"""What the commands that look at a running robot expect of it: the names that frames have there."""
+"""What the commands that look at a running robot expect of it.
+
+The names that frames have there.
+"""
 
 from argparse import Namespace
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""``lint --fix`` writes the one safe answer, where there is one, and leaves every other byte as it is."""
+"""``lint --fix`` applies fixes with one safe answer and leaves every other byte."""
 
 import errno
 import json

@@ -1,4 +1,7 @@
-"""Two rovers from one file, isolated from each other, as they run: each on its own topics, one guard for both."""
+"""Two rovers from one file, isolated from each other, as they run.
+
+Each on its own topics, one guard for both.
+"""
 
 import os
 from collections.abc import Callable

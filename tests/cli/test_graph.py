@@ -1,4 +1,4 @@
-"""``tfcompose graph``: each ending gives its format, and what cannot be drawn is said in one sentence."""
+"""``tfcompose graph``: endings choose the format; what cannot be drawn is reported."""
 
 import re
 import subprocess

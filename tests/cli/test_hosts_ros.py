@@ -118,7 +118,7 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
 def test_a_share_that_is_live_on_another_machine_is_refused(
     start: Callable[..., Started], tmp_path: Path
 ) -> None:
-    """Started by another supervisor, as nothing of another machine's launcher is seen here but its nodes."""
+    """Started by another supervisor; of another machine's launcher only nodes are visible."""
     file = tmp_path / "rover.yaml"
     file.write_text(
         ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8"

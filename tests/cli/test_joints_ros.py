@@ -1,4 +1,7 @@
-"""A robot with moving joints and no hardware: up moves it, and up again gives it another description while it runs."""
+"""A robot with moving joints and no hardware.
+
+Up moves it, and up again gives it another description while it runs.
+"""
 
 import sys
 from collections.abc import Callable, Iterator

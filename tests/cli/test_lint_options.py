@@ -1,4 +1,7 @@
-"""What ``lint`` takes besides files: codes, standard input, a diff, and files that others write meanwhile."""
+"""What ``lint`` takes besides files.
+
+Codes, standard input, a diff, and files that others write meanwhile.
+"""
 
 import json
 import os

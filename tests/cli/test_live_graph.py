@@ -1,4 +1,7 @@
-"""The published tree as a picture: each edge with its publisher, second parents too, and what has no pose."""
+"""The published tree as a picture.
+
+Each edge with its publisher, second parents too, and what has no pose.
+"""
 
 from typing import Any
 

@@ -29,7 +29,10 @@ class Terminal:
         )
 
     def shown(self) -> str:
-        """Return what was written since the last time; it may come in pieces, so an end is written after it."""
+        """Return what was written since the last time.
+
+        It may come in pieces, so an end is written after it.
+        """
         self.stream.write(END)
         self.stream.flush()
         came = b""

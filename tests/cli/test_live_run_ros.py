@@ -1,4 +1,7 @@
-"""``tfcompose up`` at a shell on a real terminal, which an emulator reads: it is drawn, left, and put back."""
+"""``tfcompose up`` at a shell on a real terminal, which an emulator reads.
+
+It is drawn, left, and put back.
+"""
 
 from __future__ import annotations
 

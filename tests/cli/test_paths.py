@@ -1,4 +1,7 @@
-"""Paths that cannot be looked at: each command says so in one finding or sentence, and shows no traceback."""
+"""Paths that cannot be looked at.
+
+Each command says so in one finding or sentence, and shows no traceback.
+"""
 
 import ast
 import ctypes

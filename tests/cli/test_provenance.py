@@ -1,4 +1,7 @@
-"""Where each value is from, and what it was laid over: in findings, and in ``tfcompose explain FILE A B``."""
+"""Where each value is from, and what it was laid over.
+
+In findings, and in ``tfcompose explain FILE A B``.
+"""
 
 import json
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Which robot a command means that names none: the one of this ROS domain, else of the file here, else nobody's."""
+"""Which robot a command means that names none.
+
+The one of this ROS domain, else of the file here, else nobody's.
+"""
 
 import os
 from collections.abc import Callable, Iterator

@@ -1,4 +1,7 @@
-"""Findings repeat nothing of a file that is not about robots, whoever names it: their output may be public."""
+"""Findings repeat nothing of a file that is not about robots, whoever names it.
+
+Their output may be public.
+"""
 
 import itertools
 from pathlib import Path
@@ -61,7 +64,10 @@ def test_a_finding_shows_nothing_of_a_file_that_is_no_robots(
 
 @for_each(SECRETS)
 def test_no_line_of_a_file_in_the_robot_files_place_is_shown(kind: str, tmp_path: Path) -> None:
-    """As where a link of that name is in a pull request; what it holds may be named in a message."""
+    """As where a link of that name is in a pull request.
+
+    What it holds may be named in a message.
+    """
     (tmp_path / "secret").write_bytes(SECRETS[kind].encode("latin-1"))
     (tmp_path / "robot.yaml").unlink(missing_ok=True)
     (tmp_path / "robot.yaml").symlink_to("secret")

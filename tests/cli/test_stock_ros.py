@@ -1,4 +1,4 @@
-"""A plan with a stock robot_state_publisher, which a node stands in for that does what that one is known to do."""
+"""A plan with a stock robot_state_publisher, played by a node that does the same."""
 
 import os
 import stat

@@ -1,4 +1,7 @@
-"""``lint --untrusted``: a stranger's robot reads its own tree, installed packages and presets, and no environment."""
+"""``lint --untrusted``: a stranger's robot reads only its own tree.
+
+Besides that only installed packages and presets, and no environment.
+"""
 
 import itertools
 import subprocess

@@ -17,7 +17,7 @@ from tfcompose.launcher.supervisor import Signals
 
 
 class Loaded:
-    """Something that Python forgets, and calls back then, as it does with the locks of its imports."""
+    """An object that Python calls back when it forgets it, as it does with import locks."""
 
 
 def send_an_interrupt(*_: object) -> None:

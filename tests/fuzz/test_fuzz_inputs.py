@@ -1,4 +1,7 @@
-"""Whatever bytes come in, they are read or refused: no traceback, no endless reading, no raw control characters."""
+"""Whatever bytes come in, they are read or refused.
+
+No traceback, no endless reading, no raw control characters.
+"""
 
 import os
 from pathlib import Path

@@ -1,4 +1,6 @@
-"""What ``build`` emits, read by somebody else, is the robot that was written: frames, edges, poses, bodies, owners.
+"""What ``build`` emits, read by somebody else, is the robot that was written.
+
+Frames, edges, poses, bodies, owners.
 
 The specs are generated. What they mean is computed here with scipy from the numbers that are
 written; yourdfpy reads the URDF, the plan is read as plain JSON.

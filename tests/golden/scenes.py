@@ -1,4 +1,4 @@
-"""Histories and inputs in which each code of the guard, the doctor, verify and the launcher is found, for its wording.
+"""Histories and inputs that provoke each code of the live tree, for its wording.
 
 No process runs: what judges is given what it would have seen.
 """
@@ -257,7 +257,10 @@ def _setups() -> Iterator[TreeState]:
 
 
 def with_a_plan() -> Iterator[Finding]:
-    """Judge trees at the end by a plan, as verify and the doctor do, of live trees and of recordings."""
+    """Judge trees at the end by a plan, as verify and the doctor do.
+
+    Both live trees and recordings.
+    """
     two = (
         *sound_plan().edges,
         PlanEdge(

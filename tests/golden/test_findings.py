@@ -1,4 +1,4 @@
-"""Golden findings: which codes stand at which places, for sound robots, marked specs, bad input and mutated files.
+"""Golden findings: codes and places for sound robots, specs, bad input and mutations.
 
 A golden holds one row per finding: ``case: code line:col-line:col``, with the file where it is not
 the case's own, ``warning`` where it is none of the errors, and the spans of its edits and notes.
@@ -226,7 +226,7 @@ def overlays() -> Iterator[Case]:
 
 
 def sensor_presets() -> Iterator[Case]:
-    """Mutate each preset, as a user's own one under another name, used with and without the driver."""
+    """Mutate each preset as a user's own, used with and without the driver."""
     with TemporaryDirectory() as folder:
         os.chdir(folder)
         Path("presets/own").mkdir(parents=True)

@@ -30,7 +30,7 @@ CASES = {
 
 
 def build(words: tuple[str, ...], output: Path, cwd: Path, **environment: str) -> dict[str, bytes]:
-    """Build with a process of its own and return the files, by their path below the output folder."""
+    """Build in a separate process and return the files by their path in the output folder."""
     processes.run(
         [sys.executable, "-m", "tfcompose", "build", *words, "-o", str(output)],
         cwd=cwd,

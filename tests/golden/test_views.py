@@ -1,4 +1,6 @@
-"""Golden views: what commands print, one file each; other tests assert names, numbers and exit codes.
+"""Golden views: what commands print, one file each.
+
+Other tests assert names, numbers and exit codes.
 
 No process runs: commands that look at recordings stand for those that look at a live tree, and
 statuses and notices are given as a launcher would. After an intended change: ``python -m

@@ -1,4 +1,6 @@
-"""Golden wording: what findings say, in one file for each family of codes; other tests assert code, place and names.
+"""Golden wording: what findings say, in one file for each family of codes.
+
+Other tests assert code, place and names.
 
 They come from what people wrote for these tests, not from mutations: marked specs, bad input,
 values, calibrations, presets, URDFs of others, and histories of live trees and processes
@@ -60,7 +62,10 @@ def texts() -> dict[str, str]:
 
 
 def text_of(found: Finding) -> str:
-    """Return the finding as ``lint`` prints it, but for its places: those stand in the golden findings."""
+    """Return the finding as ``lint`` prints it, but for its places.
+
+    Those stand in the golden findings.
+    """
     lines = render_text([found], lambda _file, _line: None, colour=False).splitlines(keepends=True)
     return (lines[0].removeprefix(f"{found.span}: ") + "".join(lines[1:])).replace(f"{ROOT}/", "")
 

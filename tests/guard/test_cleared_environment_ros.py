@@ -1,4 +1,4 @@
-"""Programs of a strict plan that were started with a cleared environment, and so without the fence."""
+"""Programs of a strict plan with a cleared environment, outside of its isolation."""
 
 import json
 import os

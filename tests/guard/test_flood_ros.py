@@ -1,4 +1,4 @@
-"""Long messages of a flood are read a little at a time, and not for more than a part of each second."""
+"""Long messages of a flood are read in pieces, for a bounded share of each second."""
 
 from itertools import count
 

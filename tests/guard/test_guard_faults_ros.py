@@ -1,4 +1,7 @@
-"""Faults of owners and strangers on the real thing: loops, stamps, QoS, leaks; the guard names each."""
+"""Faults of owners and strangers on the real thing: loops, stamps, QoS, leaks.
+
+The guard names each.
+"""
 
 import json
 import re
@@ -148,7 +151,10 @@ def command_of(process: psutil.Process) -> list[str]:
 
 @pytest.fixture
 def up(domain: object, tmp_path: Path) -> Iterator[Callable[[str], Running]]:
-    """Start a robot and wait until it is: who joins before the end of the first look was there before the start."""
+    """Start a robot and wait until it is.
+
+    Who joins before the end of the first look was there before the start.
+    """
     assert domain
     robots: list[Running] = []
 
@@ -270,7 +276,10 @@ def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(
         )
 
     def reported() -> bool:
-        """Return whether the page says what is; a process that was kept from running is slow for a while."""
+        """Return whether the page says what is.
+
+        A process that was kept from running is slow for a while.
+        """
         rclpy.spin_once(reader, timeout_sec=0.1)
         return bool(pages) and last()["slam"].level == DiagnosticStatus.OK
 
@@ -424,7 +433,10 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_p
     both = [robot.child("guard"), psutil.Process(robot.starts(LISTENER))]
 
     def attempt(_: int) -> bool:
-        """Return whether nobody fell silent: one who is kept from running does, and not each time."""
+        """Return whether nobody fell silent.
+
+        One who is kept from running does, and not each time.
+        """
         nonlocal silent
         before_s, before_bytes = (
             [sum(each.cpu_times()[:2]) for each in both],

@@ -1,4 +1,7 @@
-"""The guard's process on Zenoh: it names who takes an edge, who is silent, and who joins late, from peers' tokens."""
+"""The guard's process on Zenoh.
+
+It names who takes an edge, who is silent, and who joins late, from peers' tokens.
+"""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""The guard as it runs: the demo robot, started once for all of these tests, and strangers that join it."""
+"""The guard at work: the demo robot, started once, and strangers that join it."""
 
 import signal
 import subprocess
@@ -246,7 +246,10 @@ def test_a_guard_that_was_stopped_for_a_while_blames_nobody(robot: Robot) -> Non
     guard = robot.child("guard")
 
     def attempt(_: int) -> bool:
-        """Return whether nobody was blamed: an owner that is kept from running itself is, and not each time."""
+        """Return whether nobody was blamed.
+
+        An owner that is kept from running itself is, and not each time.
+        """
         before = len(robot.lines("error["))
         guard.send_signal(signal.SIGSTOP)
         time.sleep(3)

@@ -1,4 +1,4 @@
-"""What the guard finds of publishers and edges, from histories with a clock that is set by hand."""
+"""Findings of the guard about publishers and edges, from histories with a set clock."""
 
 import re
 
@@ -266,7 +266,10 @@ def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_not
 def test_of_who_has_new_frames_again_and_again_is_reported_ever_more_rarely_and_of_all_of_them(
     running: History,
 ) -> None:
-    """A tracker that names its frames after what it sees: tag_1, tag_2, …; for a minute, ten a second."""
+    """A tracker that names its frames after what it sees: tag_1, tag_2, ….
+
+    For a minute, ten a second.
+    """
     tracker = running.joins("/tracker")
     for number in range(600):
         running.send(tracker, f"base tag_{number}").wait(0.1)

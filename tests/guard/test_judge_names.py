@@ -1,4 +1,4 @@
-"""Whom the guard names: names that come late, two of one name, ids that do not say whose they are."""
+"""Whom the guard names: late names, two nodes of one name, ids that identify nobody."""
 
 import re
 from collections.abc import Sequence
@@ -91,7 +91,7 @@ def test_two_publishers_of_one_name_that_alternate_are_reported_and_the_edge_is_
 
 
 def test_two_that_latch_alternately_may_be_one_owner_that_is_heard_again() -> None:
-    """What an owner latched comes again, by each of its publishers, whenever a subscription is made anew."""
+    """Latched messages arrive again from each publisher after a new subscription."""
     running = History(edges=(edge("base arm", "arm", "static"),)).clear()
     a, b = (running.joins("/arm", static=True) for _ in range(2))
     for publisher in (a, b, a, b, a):
@@ -225,7 +225,10 @@ def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:
 def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
     node: str, edges: str, owner: str, process: str | None, *, foreign_first: bool
 ) -> None:
-    """The other is of another run, cannot be seen, or is another process of this run, and may come first."""
+    """The other one is of another run, invisible, or another process of this run.
+
+    It may also come first.
+    """
     running = History(GuardPolicy(mode="strict")).clear()
     static = owner == "static"
     pair = [
@@ -491,7 +494,10 @@ def send_all(
 @pytest.mark.parametrize("mode", ["watch", "strict"])
 @pytest.mark.parametrize("owner", ["slam", "drive"])
 def test_each_of_three_namesakes_is_named_and_who_remains(mode: GuardMode, owner: str) -> None:
-    """The plan starts slam, whose processes prove that; of drive, which is external, any may be it."""
+    """The plan starts slam, whose processes prove that.
+
+    Of drive, which is external, any may be it.
+    """
     running = History(GuardPolicy(mode=mode)).clear()
     edges = {"slam": "map odom", "drive": "odom base"}[owner]
     process = owner if owner == "slam" else None

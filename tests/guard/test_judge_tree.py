@@ -1,4 +1,4 @@
-"""Switched edges, loops, frames in themselves, edges that are allowed to anybody, and how they are published."""
+"""Switched edges, loops, self-loops, edges open to anybody, and how they are published."""
 
 import time
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""Children and strangers that bear an owner's name, or leave the fence: whom the guard names, and who is heard."""
+"""Children and strangers that bear an owner's name, or leave the fence.
+
+Whom the guard names, and who is heard.
+"""
 
 from __future__ import annotations
 
@@ -119,7 +122,10 @@ def run(domain: object, tmp_path: Path) -> Iterator[Callable[..., Liars]]:
 
 
 def heard_until(child: str, x: float, times: int = 20) -> list[float]:
-    """Return the x of each transform of the frame that a new listener receives, until this one came so often."""
+    """Return the x of each transform that a new listener receives of a frame.
+
+    It ends when this one came this often.
+    """
     with open_node("late", "/test") as node:
         reader = TFSubscription(node, static=False)
         found: list[float] = []

@@ -1,4 +1,4 @@
-"""What a strict guard passes on and latches, from histories of messages and of the graph, without ROS."""
+"""What a strict guard relays and latches, from histories, without ROS."""
 
 from __future__ import annotations
 

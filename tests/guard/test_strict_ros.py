@@ -1,4 +1,7 @@
-"""A strict guard on the real thing: children that send what is not theirs, late joiners, and a guard that is killed."""
+"""A strict guard on the real thing.
+
+Children that send what is not theirs, late joiners, and a guard that is killed.
+"""
 
 import json
 import os

@@ -1,4 +1,7 @@
-"""Judges of robots on topics of their own: what each of them is given, and what is said of all together."""
+"""Judges of robots on topics of their own.
+
+What each of them is given, and what is said of all together.
+"""
 
 from collections.abc import Callable
 

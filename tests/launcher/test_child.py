@@ -48,7 +48,7 @@ def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(
 
 
 def read_flood(source_text: bytes, ending: bytes) -> list[str]:
-    """Return the lines that are kept of a process that writes all at once, and then its end, and ends."""
+    """Return the lines kept of a process that writes everything at once and ends."""
     lines_read: list[str] = []
     read_end, write_end = os.pipe()
     with os.fdopen(write_end, "wb", buffering=0) as writer:

@@ -1,4 +1,7 @@
-"""Containers and components as real processes: a container of the tests' own, and rclcpp_components where it is."""
+"""Containers and components as real processes.
+
+A container of the tests' own, and rclcpp_components where it is.
+"""
 
 import json
 import os
@@ -75,7 +78,10 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def stand_in(package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file with what the containers of a ROS installation are requested; they are the stand-in."""
+    """The file with what the containers of a ROS installation are requested.
+
+    They are the stand-in.
+    """
     for name in ("component_container", "component_container_isolated"):
         program = tmp_path / "ros/lib/rclcpp_components" / name
         program.parent.mkdir(parents=True, exist_ok=True)
@@ -99,7 +105,10 @@ Step = Callable[[list[Notice]], bool | None]
 
 
 def run(folder: Path, text: str, *steps: Step) -> list[Notice]:
-    """Run a robot until each step in turn has returned True; a step is given all notices, after each."""
+    """Run a robot until each step in turn has returned True.
+
+    A step is given all notices, after each.
+    """
     compiled = compile_robot(text, str(folder / "robot.yaml"), library())
     assert compiled.robot is not None
     file = folder / "plan.json"
@@ -255,7 +264,7 @@ def test_a_component_that_takes_its_time_is_loaded_once_and_another_container_do
 
 
 def run_and_kill(folder: Path, log: Path, name: str) -> list[Notice]:
-    """Run the robot with a component that takes its time, and kill a process once its load was requested."""
+    """Run a robot with a slow component, and kill a process once its load was requested."""
     given: list[list[Notice]] = []
 
     def kill() -> None:

@@ -1,4 +1,7 @@
-"""What goes wrong on real robots, without ROS: floods, readers that stop, full disks, daemons, many processes."""
+"""What goes wrong on real robots, without ROS.
+
+Floods, readers that stop, full disks, daemons, many processes.
+"""
 
 import contextlib
 import os
@@ -244,7 +247,10 @@ def test_a_daemon_that_left_its_group_ends_with_the_run(
 def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_again(
     launch: Callable[..., Run], tmp_path: Path, how: Verb
 ) -> None:
-    """One that ignores signals ends before the next one of its process begins, and others when that is stopped."""
+    """A process that ignores signals ends before its successor begins.
+
+    Others end when it is stopped.
+    """
     assert "signal.SIG_IGN" in DAEMON
     code = (
         DAEMON if how == "restart" else DAEMON.replace("signal.SIG_IGN", "signal.SIG_DFL")

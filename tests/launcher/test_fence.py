@@ -1,4 +1,7 @@
-"""How a strict plan's processes are fenced off: by profiles with a partition, or by remappings; and what cannot be."""
+"""How a strict plan's processes are fenced off.
+
+By profiles with a partition, or by remappings; and what cannot be.
+"""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Gates at real nodes: a topic, a service, and a lifecycle node that is configured and activated."""
+"""Gates at real nodes: a topic, a service, and a managed lifecycle node."""
 
 import sys
 from dataclasses import replace

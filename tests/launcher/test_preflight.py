@@ -18,7 +18,7 @@ from tfcompose.tf.ros.environment import child_environment
 
 @pytest.fixture
 def prefix(tmp_path: Path) -> Path:
-    """Return a ROS prefix with one package that has two programs, one of which may not be executed."""
+    """Return a ROS prefix with one package of two programs, one of them not executable."""
     folder = tmp_path / "ros" / "lib" / "sllidar_ros2"
     folder.mkdir(parents=True)
     for name, mode in (("sllidar_node", 0o755), ("notes.txt", 0o644)):

@@ -1,4 +1,7 @@
-"""Histories of single processes: gates, restarts, requests by name, and plans that change, with a clock set by hand."""
+"""Histories of single processes.
+
+Gates, restarts, requests by name, and plans that change, with a clock set by hand.
+"""
 
 from dataclasses import replace
 from signal import SIGINT, SIGKILL, SIGQUIT, SIGTERM

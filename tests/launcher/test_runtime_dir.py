@@ -1,4 +1,4 @@
-"""Where a run is found: folders that nobody else can open, and a lock that ends with its holder."""
+"""Runtime directories: private folders, and a lock that ends with its holder."""
 
 import fcntl
 import os

@@ -1,4 +1,7 @@
-"""Relative mesh addresses mean the folder of the build, and only there; who hears the description gets whole ones."""
+"""Relative mesh addresses mean the folder of the build, and only there.
+
+Who hears the description gets whole ones.
+"""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A robot among liars: strange publishers beside it, and children that try to slip out of its guard's sight.
+"""A robot among hostile publishers, and children that try to evade its guard.
 
 Each edge's x says who sent it.
 """
@@ -82,7 +82,7 @@ def foreign(x: float, *edges: str) -> list[str]:
 
 
 def flood(count: int) -> str:
-    """Return a program of a node /flood that sends so many new frames, in a chain, in each message, at 20 Hz."""
+    """Return a program of a node /flood that sends chains of new frames at 20 Hz."""
     return _FLOOD.format(count=count)
 
 
@@ -93,14 +93,17 @@ def in_shell(first: str, command: Sequence[str]) -> list[str]:
 
 @dataclass
 class Child:
-    """A process of the robot's: its command, and the frames below base_link that it owns; its node is /NAME."""
+    """A process of the robot's: its command, and the frames below base_link that it owns.
+
+    Its node is /NAME.
+    """
 
     command: Sequence[str]
     frames: Sequence[str] = ()
 
 
 class Robot:
-    """A running robot with an owner /slam of map → odom, drive of odom → base_link, and further children."""
+    """A running robot with owners of map → odom and odom → base_link, and more children."""
 
     def __init__(
         self, folder: Path, guard: str, children: Mapping[str, Child], env: Mapping[str, str]
@@ -199,7 +202,10 @@ class Robot:
 
 @contextmanager
 def running(folder: Path, guard: str, children: Mapping[str, Child]) -> Iterator[Robot]:
-    """Run a robot in a domain of its own, which is this process's as well; what it keeps is in the folder."""
+    """Run a robot in a domain of its own, which is this process's as well.
+
+    What it keeps is in the folder.
+    """
     with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
         for name in ("XDG_RUNTIME_DIR", "ROS_LOG_DIR"):
             (folder / name).mkdir(mode=0o700)

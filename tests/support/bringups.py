@@ -64,7 +64,9 @@ def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
-    """Return what each process is started with, by its name; launch files, which have none in launch, by theirs.
+    """Return what each process is started with, by its name.
+
+    Launch files, which have none in launch, by theirs.
 
     Parameters have their types: 20.0 is not 20.
     """

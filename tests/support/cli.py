@@ -1,4 +1,7 @@
-"""The command line, run in the test's own process: most of what it claims needs none of its own."""
+"""The command line, run in the test's own process.
+
+Most of what it claims needs none of its own.
+"""
 
 import contextlib
 import io
@@ -21,7 +24,10 @@ def tfcompose(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]
 def tfcompose_in(
     folder: Path, *words: object, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command in this folder, with these variables too; return how it ended, and what it printed."""
+    """Run a command in this folder, with these variables too.
+
+    Return how it ended, and what it printed.
+    """
     output, errors = (
         io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2)
     )

@@ -1,4 +1,4 @@
-"""An interface package ``composition_interfaces``, made by the rosidl generators of PyPI, for a container of the tests.
+"""The package ``composition_interfaces``, made by the generators of PyPI, for tests.
 
 PyPI has no such package, and rclpy needs compiled type support: a C compiler makes it, of the
 fields that the services of rclcpp_components have. One library holds all of it.
@@ -67,7 +67,10 @@ def can_build() -> bool:
 
 
 def composition_interfaces(folder: Path) -> Path:
-    """Return a folder for PYTHONPATH that has the package; it is built there once, whoever asks first."""
+    """Return a folder for PYTHONPATH that has the package.
+
+    It is built there once, whoever asks first.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)

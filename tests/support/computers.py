@@ -1,4 +1,6 @@
-"""Computers for tests of deploy: namespaces with a network, a process table and an sshd of their own.
+"""Computers for tests of deploy.
+
+Namespaces with a network, a process table and an sshd of their own.
 
 Each has an address in a network that only these computers are in, a home, a runtime directory and
 shared memory. One more, the office, is where commands run. systemd does not run in them: a
@@ -73,7 +75,7 @@ def missing() -> str:
 
 @dataclass
 class Computer:
-    """One of them; ``folder`` outlives a loss of power, what runs and the runtime directory do not.
+    """A release folder; ``folder`` survives a power loss, the runtime directory does not.
 
     ``variables`` are in the environment of its user from the next boot on.
     """

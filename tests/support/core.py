@@ -43,7 +43,7 @@ def install(source: Path, folder: Path) -> Path:
 
 
 def write_tool(folder: Path, name: str, module: str) -> None:
-    """Write a package of one module whose ``TOOL`` is found by its entry point, as if it was installed."""
+    """Write a package of one module whose ``TOOL`` an entry point names."""
     folder.mkdir(exist_ok=True)
     (folder / f"{name}.py").write_text(module, encoding="utf-8")
     info = folder / f"{name}-1.0.dist-info"
@@ -55,7 +55,7 @@ def write_tool(folder: Path, name: str, module: str) -> None:
 def run_with(
     path: str | Path, cwd: Path, *arguments: object, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run tfcompose in a process of its own, with these folders before all others that Python searches."""
+    """Run tfcompose in its own process, with these folders first on Python's path."""
     command = [sys.executable, "-m", "tfcompose", *map(str, arguments)]
     env = os.environ | {"PYTHONPATH": str(path)} | environment
     return processes.run(command, cwd=cwd, env=env)

@@ -1,4 +1,7 @@
-"""Hosts that are deployed to and are none: they answer as agents do, and note what they were asked."""
+"""Hosts that are deployed to and are none.
+
+They answer as agents do, and note what they were asked.
+"""
 
 from __future__ import annotations
 

@@ -32,7 +32,10 @@ def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]
 
 
 def doctor_finds(expected: Mapping[str, Sequence[str]], others: set[str]) -> list[dict[str, Any]]:
-    """Run it until it finds these codes with these names, and no others but ``others``; a few times."""
+    """Run it until it finds these codes with these names, and no others but ``others``.
+
+    A few times.
+    """
     for seconds in OBSERVE_S:  # names may come late
         exit_code, found = doctor(seconds=seconds)
         if finds(found, expected, others):
@@ -47,7 +50,7 @@ def finds_nothing(*words: str) -> bool:
 
 
 def at_last(claim: Callable[[float], None]) -> None:
-    """Let the claim about what is seen in so many seconds hold once, of a few times that are longer and longer."""
+    """Let a claim about what is observed within a time hold once, with growing times."""
     for seconds in OBSERVE_S[:-1]:
         with contextlib.suppress(AssertionError):
             return claim(seconds)
@@ -57,7 +60,7 @@ def at_last(claim: Callable[[float], None]) -> None:
 def finds(
     found: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], others: set[str]
 ) -> bool:
-    """Return whether these codes were found, each with all its names, and no others but ``others``."""
+    """Return whether these codes were found, with their names, and none but ``others``."""
     codes = {one["code"] for one in found}
     named = (
         name in messages_of(found, code) for code, names in expected.items() for name in names

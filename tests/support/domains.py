@@ -16,14 +16,20 @@ _WINDOW = count(os.getpid())
 
 @dataclass(frozen=True)
 class Domain:
-    """A ROS domain that nobody else on this machine uses during the test; ``environment`` is a process's."""
+    """A ROS domain that nobody else on this machine uses during the test.
+
+    ``environment`` is a process's.
+    """
 
     id: int
     environment: Mapping[str, str]
 
 
 def own_domains() -> range:
-    """Return the domains of this worker of pytest-xdist: each has as many, and none has another's."""
+    """Return the domains of this worker of pytest-xdist.
+
+    Each has as many, and none has another's.
+    """
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     return DOMAINS[worker * len(DOMAINS) // workers : (worker + 1) * len(DOMAINS) // workers]
@@ -31,7 +37,7 @@ def own_domains() -> range:
 
 @contextmanager
 def reserved_domain() -> Iterator[int]:
-    """Give a domain of this worker's in which nobody is, locked by a file so that concurrent runs do not take it.
+    """Give a ROS domain of this worker's own, locked by a file against concurrent runs.
 
     Each test has the next one: what a test before left behind may need a moment to end.
 
@@ -64,7 +70,10 @@ def reserved_domain() -> Iterator[int]:
 
 
 def domains_in_use() -> set[int]:
-    """Return the domains of whoever runs here, tests or not: each has 250 ports to listen on (RTPS 2.2, 9.6.1.1)."""
+    """Return the domains of whoever runs here, tests or not.
+
+    Each has 250 ports to listen on (RTPS 2.2, 9.6.1.1).
+    """
     sockets = Path("/proc/net/udp").read_text("ascii").splitlines()[1:]
     ports = {int(line.split()[1].rpartition(":")[2], 16) for line in sockets}
     return {(port - 7400) // 250 for port in ports}

@@ -1,6 +1,9 @@
-"""Ways out of the sandbox, tried in a confined process: by Python, by ctypes, by a compiled library.
+"""Ways out of the sandbox, tried in a confined process.
 
-``python -m tests.support.escapes`` prints the table: each try, and how it ended with the sandbox and without.
+By Python, by ctypes, by a compiled library.
+
+``python -m tests.support.escapes`` prints the table: each try, and how it ended with the sandbox
+and without.
 """
 
 import ctypes

@@ -92,7 +92,7 @@ def sending(  # noqa: PLR0913 (all but three are named)
     topic: str = "/tf",
     bad: bytes = b"",
 ) -> Iterator[Callable[[], float]]:
-    """Send an edge from a node of this name, stamped ``late_s`` ago, and from time to time the ``bad`` message.
+    """Send an edge stamped ``late_s`` ago, and from time to time the ``bad`` message.
 
     Gives a function that returns the rate at which it was really sent so far.
     """

@@ -1,4 +1,4 @@
-"""Runs a seccomp filter on a system call without the kernel, so that those of other machines can be asked, too."""
+"""Interprets a seccomp filter without the kernel, so other machines' can be tested."""
 
 import struct
 from collections.abc import Sequence

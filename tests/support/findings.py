@@ -13,6 +13,9 @@ def words_of(text: str) -> set[str]:
 
 
 def expect(found: Finding, code: str, *names: str) -> None:
-    """Hold that a finding has this code, and names all of these in its message, its notes or its help."""
+    """Check that a finding has this code and contains all of these names.
+
+    They may be in its message, notes or help.
+    """
     text = "\n".join([found.message, *(note.message for note in found.notes), found.help])
     assert (found.code, [name for name in names if name not in text]) == (code, []), text

@@ -1,4 +1,4 @@
-"""Simulated robots of a fleet on loopback, each with a router of Zenoh, and links that can break."""
+"""Simulated robots of a fleet on loopback, each with a Zenoh router, and breakable links."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 def fleet_text(routers: Mapping[str, str], rate: str = "20 Hz") -> str:
-    """Return the file of a fleet whose robots share map → odom, which is fixed, and odom → base_link."""
+    """Return a fleet file whose robots share map → odom, fixed, and odom → base_link."""
     robots = "".join(f"  {name}: {{router: {router}}}\n" for name, router in routers.items())
     share = f"share: [map → odom, {{edge: odom -> base_link, rate: {rate}}}]"
     return f"fleet: 1\nname: tests\n{share}\nrobots:\n{robots}"
@@ -39,7 +39,10 @@ def fleet_of(routers: Mapping[str, str], rate: str = "20 Hz") -> FleetSpec:
 
 
 class SimulatedRobot:
-    """What shares a robot's edges, given TF of the robot by a thread instead of ROS: it stands at ``x``, in metres."""
+    """What shares a robot's edges, given TF of the robot by a thread instead of ROS.
+
+    It stands at ``x``, in metres.
+    """
 
     def __init__(self, fleet: FleetSpec, name: str, x: float, rate_hz: float = 50.0) -> None:
         self._x = x
@@ -104,7 +107,7 @@ class RobotProcesses:
 
 
 def _be(name: str, *words: str) -> None:
-    """Be the robot of that name in the fleet of this text, or without a name these routers, until the input ends."""
+    """Be one robot of a fleet, or its routers without a name, until the input ends."""
     with ExitStack() as stack:
         if name:
             robot = SimulatedRobot(validate_fleet(load(words[0], "fleet.yaml")), name, 1.0)
@@ -116,7 +119,10 @@ def _be(name: str, *words: str) -> None:
 
 
 class Link:
-    """A network link to a router, as a port that passes on what comes, until it breaks: then nothing passes."""
+    """A network link to a router, as a port that passes on what comes, until it breaks.
+
+    Then nothing passes.
+    """
 
     def __init__(self, router: str) -> None:
         self._to = router.partition("/")[2].split(":")

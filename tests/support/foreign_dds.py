@@ -1,4 +1,6 @@
-"""A publisher of TF of another vendor's DDS, and no ROS node: ``python -m tests.support.foreign_dds X EDGE…``.
+"""A publisher of TF of another vendor's DDS, and no ROS node.
+
+``python -m tests.support.foreign_dds X EDGE…``.
 
 It sends the edges, each ``parent child``, at 20 Hz, with X as x. TOPIC and PARTITION are taken
 from the environment.

@@ -1,4 +1,6 @@
-"""Mutated inputs for whatever reads what others wrote; each is read, or refused as it should be, in bounded time.
+"""Mutated inputs for whatever reads what others wrote.
+
+Each is read, or refused as it should be, in bounded time.
 
 ``python -m tests.support.fuzzing COUNT SEED`` tries so many inputs of each kind, and keeps those
 that end otherwise in ``tests/fuzz/corpus``, where the tests try them from then on.
@@ -72,7 +74,7 @@ PIECES = [word.encode() for word in WORDS.split()] + [
 
 
 def mutated(data: bytes, others: list[bytes], rng: random.Random) -> bytes:
-    """Return the data with some pieces replaced, removed, doubled, or taken from others of their kind."""
+    """Return the data with pieces replaced, removed, doubled, or taken from other inputs."""
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
         at = rng.randrange(len(data) + 1)
         end = min(len(data), at + rng.choice((0, 0, 1, 2, 4, 8, 40)))
@@ -243,7 +245,7 @@ def transforms(data: bytes, _folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of input: what reads it, and how many of it stand for one of another kind, since they are slow."""
+    """A kind of input: its reader, and how many inputs count as one of another kind."""
 
     read: Callable[[bytes, Path], None]
     weight: float = 1.0

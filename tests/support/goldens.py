@@ -1,4 +1,4 @@
-"""Golden files: a folder of texts that are compared as a whole, and rewritten by ``python -m MODULE --write``."""
+"""Golden files: a folder of texts, rewritten by ``python -m MODULE --write``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def compare(folder: Path, texts: Mapping[str, str]) -> None:
-    """Fail with the difference where texts, by the names of their files, are not those in the folder."""
+    """Fail with the difference if texts differ from the files of the same names."""
     difference: list[str] = []
     for name, text in texts.items():
         golden = (folder / f"{name}.txt").read_text("utf-8").splitlines(keepends=True)

@@ -216,7 +216,7 @@ class History:
         return self
 
     def dies(self, down_s: float = 1.5) -> History:
-        """Let another judge follow with this one's memory, after a time in which nobody looked, and forget events."""
+        """Let another judge continue with this one's memory after a gap, and forget events."""
         memory = decode(JudgeMemory, json.loads(json.dumps(encode(self.judge.memory()))))
         self.now += down_s
         self.judge = Judge(self.judge.plan, 0.0, self.now, 0)

@@ -1,4 +1,4 @@
-"""A guard that reads TF from Zenoh, as that of a robot with rmw_zenoh does, where rclpy has no such middleware.
+"""A guard that reads TF from Zenoh where rclpy has no such middleware.
 
 Its node stays on the middleware that is there, and finds nobody; messages come by eclipse-zenoh,
 with the ids of their attachments, and who publishes is asked of liveliness tokens, as always on

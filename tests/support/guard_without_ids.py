@@ -1,4 +1,4 @@
-"""A guard whose rmw does not say with a message who sent it, as that of Cyclone DDS, where there is none such."""
+"""A guard whose rmw does not say who sent a message, as with Cyclone DDS."""
 
 import os
 import sys

@@ -1,4 +1,7 @@
-"""Stands for a confined process that was taken over: it answers with what a file beside the document says."""
+"""Stands for a confined process that was taken over.
+
+It answers with what a file beside the document says.
+"""
 
 import json
 import os

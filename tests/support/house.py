@@ -19,18 +19,24 @@ BEGIN, END = "```mermaid\n", "```\n"
 
 
 def part_of(file: Path) -> str:
-    """Return the wing that a file of the package belongs to, or its name directly below the package."""
+    """Return the wing that a file of the package belongs to, or its name on the top floor."""
     return file.relative_to(PACKAGE).with_suffix("").parts[0]
 
 
 def room_of(file: Path) -> str:
-    """Return the file's dotted name below the package: ``spec.load.nodes``; a package's own is that of its folder."""
+    """Return the file's dotted name below the package: ``spec.load.nodes``.
+
+    A package's own is that of its folder.
+    """
     parts = file.relative_to(PACKAGE).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def imports_of(file: Path, *, for_types: bool = True) -> set[str]:
-    """Return the modules that a file imports, anywhere in it; without ``for_types`` only those loaded at run time."""
+    """Return the modules that a file imports, anywhere in it.
+
+    Without ``for_types`` only those loaded at run time.
+    """
     names: set[str] = set()
     tree = ast.parse(file.read_text("utf-8"))
     if not for_types:
@@ -80,7 +86,10 @@ def reachable(graph: dict[str, set[str]], part: str) -> set[str]:
 
 
 def reduced(graph: dict[str, set[str]]) -> dict[str, set[str]]:
-    """Return the graph without the imports that follow from others: what is left says the same order."""
+    """Return the graph without the imports that follow from others.
+
+    What is left says the same order.
+    """
     below = {part: reachable(graph, part) for part in graph}
     return {
         part: {one for one in others if not any(one in below[via] for via in others)}

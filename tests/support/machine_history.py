@@ -69,7 +69,10 @@ def run_process(
 
 @dataclass
 class History:
-    """A machine that is fed events; what it does is written down, and starts succeed by themselves."""
+    """A machine that is fed events.
+
+    What it does is written down, and starts succeed by themselves.
+    """
 
     plan: Plan
     now: float = 100.0

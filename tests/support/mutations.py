@@ -132,7 +132,10 @@ def _spot(
 
 
 def _end(text: str, node: Any) -> int:
-    """Return where the node's text ends: PyYAML's mark of a block stands behind the blank lines and comments."""
+    """Return where the node's text ends.
+
+    PyYAML's mark of a block stands behind the blank lines and comments.
+    """
     end: int = node.end_mark.index
     if isinstance(node, yaml.ScalarNode) or node.flow_style:
         return end

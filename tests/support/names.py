@@ -1,7 +1,7 @@
 """Names of the core and of the tools that ship, as ``tfcompose/data/names.json`` holds them.
 
-``python -m tests.support.names --write`` writes the file. It is read where a tool of another package
-must not take one of these names, and where a tool is absent, to say what installs it.
+``python -m tests.support.names --write`` writes the file. It is read where a tool of another
+package must not take one of these names, and where a tool is absent, to say what installs it.
 """
 
 from __future__ import annotations

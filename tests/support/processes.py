@@ -1,4 +1,7 @@
-"""Processes that tests start: in a session of their own, with no signal ignored, bounded, and ended with the test."""
+"""Processes that tests start.
+
+In a session of their own, with no signal ignored, bounded, and ended with the test.
+"""
 
 import contextlib
 import os
@@ -19,7 +22,7 @@ _started: list[subprocess.Popen[str]] = []
 
 
 def start(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[str]:
-    """Start a process as ``subprocess.Popen`` does, in a session of its own and with the default action of each signal.
+    """Start a process like ``subprocess.Popen``, in its own session, with default signals.
 
     Its pipes are text, and it reads nothing unless it is given something. It is killed at the end
     of the test, with its group, if it still runs then.
@@ -137,7 +140,10 @@ def ended_at_exit() -> Iterator[None]:
 
 @contextlib.contextmanager
 def default_signal_actions() -> Iterator[None]:
-    """Heed the signals that this process was started to ignore, as Python does: an interrupt is an exception."""
+    """Heed the signals that this process was started to ignore, as Python does.
+
+    An interrupt is an exception.
+    """
     before = {number: signal.getsignal(number) for number in _IGNORABLE}
     ignored = [number for number, handler in before.items() if handler == signal.SIG_IGN]
     for number in ignored:

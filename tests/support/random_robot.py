@@ -1,4 +1,7 @@
-"""A family of robots that only a seed tells apart: random trees with every joint type, shape and way to give a mass."""
+"""A family of robots that only a seed tells apart.
+
+Random trees with every joint type, shape and way to give a mass.
+"""
 
 import random
 from typing import Any
@@ -9,7 +12,10 @@ LIMIT = {"lower": -3, "upper": 3, "effort": 10, "velocity": 2}
 
 
 def spec(seed: int, types: tuple[str, ...] = TYPES, links: int = 14) -> dict[str, Any]:
-    """Return a robot in which each link but the root hangs on an earlier one by a joint, an edge, or as a frame."""
+    """Return a robot in which each link but the root hangs on an earlier one.
+
+    By a joint, an edge, or as a frame.
+    """
     chance = random.Random(seed)
     robot: dict[str, Any] = {
         "tfcompose": 1,

@@ -1,4 +1,7 @@
-"""Whether two URDFs describe the same robot; read with the standard library, poses computed with scipy."""
+"""Whether two URDFs describe the same robot.
+
+Read with the standard library, poses computed with scipy.
+"""
 
 import os
 import xml.etree.ElementTree as ET
@@ -199,7 +202,7 @@ def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # 
 
 
 def _blocks(root: Any) -> list[Any]:
-    """Return what stands beside links and joints, but for what is about a link or joint that is not there."""
+    """Return the elements next to links and joints, except those about missing ones."""
     joints = {one.get("name") for one in root.findall("joint")}
     there = {one.get("name") for one in root.findall("link")} | joints
     blocks = []

@@ -37,7 +37,10 @@ COMMANDS = {
 
 
 class Shell:
-    """An interactive shell on a terminal of 80 columns; what it shows is on ``screen``, and all bytes in ``text``."""
+    """An interactive shell on a terminal of 80 columns.
+
+    What it shows is on ``screen``, and all bytes in ``text``.
+    """
 
     def __init__(self, folder: Path, shell: str = "bash", **environment: str) -> None:
         self.screen = pyte.Screen(80, 24)

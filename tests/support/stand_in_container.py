@@ -1,4 +1,6 @@
-"""A container of components with the services of rclcpp_components: ``python -m tests.support.stand_in_container``.
+"""A container of components with the services of rclcpp_components.
+
+``python -m tests.support.stand_in_container``.
 
 It loads the plugins below, each a node of its own, one after the other as stock containers do.
 Every request goes to the file that CONTAINER_LOG names, as a line of JSON. While the file BROKEN
@@ -91,7 +93,10 @@ def _plain(parameter: Any) -> Any:
 
 
 def component(request: Any) -> Any:
-    """Return the node that a request asks for; ``edge`` is what a publisher of TF sends, parent and child."""
+    """Return the node that a request asks for.
+
+    ``edge`` is what a publisher of TF sends, parent and child.
+    """
     words = [word for rule in request.remap_rules for word in ("-r", rule)]
     node: Any = Node(
         request.node_name,

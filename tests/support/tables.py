@@ -7,7 +7,9 @@ from typing import Any
 
 
 def for_each(cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make one test of all cases; its failure names each case that does not hold, with what is wrong in it.
+    """Make one test of all cases.
+
+    Its failure names each case that does not hold, with what is wrong in it.
 
     The test's first parameter is given the case; where cases are tuples, as many parameters are
     given their members. Further parameters are fixtures, which all cases share.

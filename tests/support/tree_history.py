@@ -47,7 +47,10 @@ class TreeHistory:
         stamp: Callable[[int], int] = lambda now: now,
         parents: Callable[[int], str] | None = None,
     ) -> TreeHistory:
-        """Send an edge again and again; ``parents`` says for each message of which parent it is."""
+        """Send an edge again and again.
+
+        ``parents`` says for each message of which parent it is.
+        """
         for tick in range(int(until_s * hz)):
             now = BEGUN_NS + int(tick * SECOND_NS / hz)
             names = f"{parents(tick)} {edge.split()[1]}" if parents else edge
@@ -75,7 +78,10 @@ def row(edge: str, stamp_ns: int, x: float = 0.0, w: float = 1.0) -> Any:
 
 
 def late(seconds: float) -> Callable[[int], int]:
-    """Return how a publisher stamps that is late by so many seconds; ahead, where they are negative."""
+    """Return how a publisher stamps that is late by so many seconds.
+
+    Ahead, where they are negative.
+    """
     return lambda now: now - int(seconds * SECOND_NS)
 
 

@@ -1,4 +1,6 @@
-"""Four programs that read URDF, each behind the same two questions: where is every link, and how heavy are bodies?
+"""Four programs that read URDF, each behind the same two questions.
+
+Where is every link, and how heavy are bodies?
 
 Poses are 4×4 matrices of a link in the robot's base. A body is what cannot move in itself: mass in
 kg, centre of mass in m and tensor in kg m² about it, in the axes of the link that it is asked for
@@ -57,12 +59,15 @@ def together(bodies: list[Body]) -> Body:
 
 
 class Reader(Protocol):
-    """A URDF that somebody else read. ``moving`` are the joints that it takes positions for, by URDF's name."""
+    """A URDF that somebody else read.
+
+    ``moving`` are the joints that it takes positions for, by URDF's name.
+    """
 
     moving: set[str]
 
     def poses(self, positions: Mapping[str, float]) -> dict[str, Matrix]:
-        """Return the pose in the base of every link, with the joints at these positions, the others at 0."""
+        """Return the pose of every link in the base, with joints at these positions or 0."""
 
     def bodies(self) -> dict[str, Body]:
         """Return bodies by the link in whose axes they are given."""
@@ -92,7 +97,10 @@ class Yourdfpy:
 
 
 class Pinocchio:
-    """C++, on urdfdom: the parser of ROS. It joins what is fixed together, and gives that as one body."""
+    """C++, on urdfdom: the parser of ROS.
+
+    It joins what is fixed together, and gives that as one body.
+    """
 
     def __init__(self, urdf: str, base: str) -> None:
         self.base = base

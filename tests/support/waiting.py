@@ -32,12 +32,18 @@ def in_one_of_a_few(attempt: Callable[[int], bool], tries: int = 4) -> bool:
 
 
 def complete_lines(file: Path) -> list[str]:
-    """Return the lines of a file that somebody still writes: what stands behind the last line's end is not one yet."""
+    """Return the lines of a file that somebody still writes.
+
+    What stands behind the last line's end is not one yet.
+    """
     return file.read_bytes().rpartition(b"\n")[0].decode().splitlines()
 
 
 def offences(output: str) -> list[str]:
-    """Return the codes of what was found live, but of silence and slowness: a process may be kept from running."""
+    """Return the codes of what was found live, but of silence and slowness.
+
+    A process may be kept from running.
+    """
     return re.findall(r"TF8(?!0[45])\d\d", output)
 
 
@@ -51,5 +57,8 @@ def gone(process: int | psutil.Process) -> bool:
 
 
 def none_but(threads: list[threading.Thread]) -> bool:
-    """Wait until all threads have ended but these, some of which may end meanwhile; return whether they did in time."""
+    """Wait until all threads have ended but these, some of which may end meanwhile.
+
+    Return whether they did in time.
+    """
     return until(lambda: set(threading.enumerate()) <= set(threads))

@@ -1,4 +1,4 @@
-"""Zenoh on loopback: routers, and peers that speak rmw_zenoh's format as its source says it, not as tfcompose reads it.
+"""Zenoh on loopback: routers, and peers that speak rmw_zenoh's format from its source.
 
 rmw_zenoh hashes tokens with a copy of XXH3; PyPI's xxhash is the binding of the original.
 """
@@ -33,7 +33,7 @@ def free_port() -> int:
 def config(
     mode: str, *, connect: list[str] | None = None, listen: list[str] | None = None
 ) -> zenoh.Config:
-    """Return the configuration of a session on loopback, with timestamps, as rmw_zenoh's sessions have them."""
+    """Return the configuration of a loopback session with timestamps, as rmw_zenoh has it."""
     made: zenoh.Config = zenoh.Config()
     settings = {"mode": mode, "timestamping/enabled": True, "scouting/multicast/enabled": False}
     settings |= {"connect/endpoints": connect or [], "listen/endpoints": listen or []}
@@ -55,7 +55,7 @@ def session(
 
 
 class RosPeer:
-    """A ROS node on rmw_zenoh with publishers of TF, in a session of its own, a peer of the router's others."""
+    """A ROS node on rmw_zenoh with TF publishers, in a session of its own."""
 
     def __init__(self, stack: ExitStack, router: str, node: str, domain: int = 0) -> None:
         self.session = stack.enter_context(

@@ -1,4 +1,7 @@
-"""A tool from outside of this repository can do what a tool inside does; one that is broken stops nothing."""
+"""A tool from outside of this repository can do what a tool inside does.
+
+One that is broken stops nothing.
+"""
 
 from __future__ import annotations
 

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 
 def show_args(arguments: Namespace) -> int:
-    """Print the arguments of the robot file; exit code 0, or as for ``build`` where it cannot be read."""
+    """Print the arguments of the robot file.
+
+    Exit code 0, or as for ``build`` where it cannot be read.
+    """
     file = _file(arguments)
     if is_plan(file):
         fail(f"{file} is a built plan, and arguments are those of a robot file", UNREADABLE)

@@ -1,4 +1,7 @@
-"""A build in a process of its own: the launcher, which lives as long as the robot runs, never holds the compiler."""
+"""A build in a process of its own.
+
+The launcher, which lives as long as the robot runs, never holds the compiler.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,9 @@ if TYPE_CHECKING:
 
 
 class BuildProcess:
-    """Builds a robot while this process goes on; what is found is printed there, on the same terminal.
+    """Builds a robot while this process goes on.
+
+    What is found is printed there, on the same terminal.
 
     It has a process group of its own, so that a Ctrl-C comes to it once, from here: an error in
     the ``with`` block interrupts the build and waits for its end.
@@ -65,7 +70,7 @@ class BuildProcess:
         self._exit_code()
 
     def built(self) -> tuple[Path, list[Finding]]:
-        """Wait for the end of the build, and return the file of its plan, and the warnings, which it has printed.
+        """Wait for the build to end; return its plan file and the warnings it printed.
 
         Raises:
             SystemExit: with the build's exit code, if it failed, after it said why.
@@ -91,7 +96,9 @@ class BuildProcess:
 
 
 def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
-    """Build and return the exit code; write the plan's file and the findings, or the number of an OSError.
+    """Build and return the exit code.
+
+    Write the plan's file and the findings, or the number of an OSError.
 
     ``mask`` is the mask of signals of before the fork.
     """

@@ -1,4 +1,6 @@
-"""Combinations of the values that a robot's arguments can have: which ones are judged, and in which ones a finding is.
+"""Combinations of the values that a robot's arguments can have.
+
+Which ones are judged, and in which ones a finding is.
 
 Up to ``MOST`` they are all judged; beyond it so many that each two values of any two arguments are
 together in one.
@@ -39,7 +41,10 @@ def combinations(
 
 
 def _pairwise(values: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
-    """Return rows that hold each pair of values of two arguments, found greedily; at most ``MOST``."""
+    """Return rows that hold each pair of values of two arguments, found greedily.
+
+    At most ``MOST``.
+    """
     missing = {
         frozenset(((i, a), (j, b))): None
         for i, j in subsets(range(len(values)), 2)
@@ -70,7 +75,7 @@ Key = tuple[str, str, Span | None]
 
 
 def merged(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Finding]:
-    """Return each finding once; one that is not in all combinations has a note that says in which it is."""
+    """Return each finding once, with a note if only some combinations have it."""
     where: dict[Key, list[int]] = {}
     firsts: dict[Key, Finding] = {}
     for index, (_, findings) in enumerate(judged):

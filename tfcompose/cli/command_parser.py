@@ -31,7 +31,10 @@ class Parser(ArgumentParser):
         fail(f"{self.prog.partition(' ')[2]}: {message}; {advice}", UNREADABLE)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Return the arguments; words such as ``cameras:=4`` are those of the source, wherever they stand."""
+        """Return the parsed arguments; ``cameras:=4`` is an argument of the robot file.
+
+        It may stand anywhere on the command line.
+        """
         words = list(args or ())
         takes_given = any(action.dest == "given" for action in self._actions)
         given = [word for word in words if _GIVEN.match(word)] if takes_given else []
@@ -51,7 +54,10 @@ class Parser(ArgumentParser):
         return not names <= self._option_string_actions.keys()
 
     def _may_lack_the_first(self) -> bool:
-        """Return whether required words follow an optional one: options must not part them then."""
+        """Return whether required words follow an optional one.
+
+        Options must not part them then.
+        """
         positional = [action for action in self._actions if not action.option_strings]
         return len(positional) > 1 and positional[0].nargs == "?" and positional[1].nargs is None
 
@@ -61,7 +67,10 @@ _GIVEN = re.compile(r"[^\s=:-][^\s=:]*:=")
 
 
 class CommandModule(Protocol):
-    """Module of a command, or an object in one; its docstring is its line in the list, and below that its help."""
+    """Module of a command, or an object in one.
+
+    Its docstring is its line in the list, and below that its help.
+    """
 
     __doc__: str | None
 

@@ -1,4 +1,6 @@
-"""From the files that the command line names to a compiled robot: presets, overlays, findings printed.
+"""From the files that the command line names to a compiled robot.
+
+Presets, overlays, findings printed.
 
 The compiler asks here about files on this machine: which are there, where packages are, and a
 mesh's volume.
@@ -47,7 +49,10 @@ PRESET_INDEX = "share/ament_index/resource_index/tfcompose_presets"
 
 
 def library(read: Callable[[str], str] = read_text) -> Library:
-    """Return the presets that are known without a robot file: tfcompose's own, then those of packages."""
+    """Return the presets that are known without a robot file.
+
+    Tfcompose's own, then those of packages.
+    """
     return Library((str(PRESETS),), PresetFolders(read), str(PRESETS))
 
 
@@ -90,7 +95,7 @@ class PresetFolders:
 
 @cache
 def _preset_packages() -> list[str]:
-    """Return the folders of presets of Python packages, then those of ROS packages, each by name."""
+    """Return the preset folders of Python packages, then of ROS packages, by name."""
     from importlib.metadata import entry_points  # needed only where a preset is in no other folder
 
     folders: list[str] = []
@@ -106,8 +111,9 @@ def _preset_packages() -> list[str]:
 def _ros_preset_packages() -> list[str]:
     """Return the folders that ROS packages register in the ament index of the sourced workspaces.
 
-    A marker names the folder, relative to its prefix; an empty one stands for ``share/NAME/presets``.
-    Of a package in several workspaces that of the first one counts, as ROS has it.
+    A marker names the folder, relative to its prefix; an empty one stands for
+    ``share/NAME/presets``. Of a package in several workspaces that of the first one counts, as ROS
+    has it.
     """
     folders: dict[str, str] = {}
     for prefix in _ament_prefixes():
@@ -119,13 +125,15 @@ def _ros_preset_packages() -> list[str]:
 
 
 def _ament_prefixes() -> tuple[str, ...]:
-    """Return the prefixes of the workspaces that are sourced, the one that overlays the others first."""
+    """Return the prefixes of the sourced workspaces, overlays first."""
     prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return tuple(prefix for prefix in prefixes if prefix)
 
 
 def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) -> list[Source]:
-    """Return what --overlay and --set lay over a robot, in that order; ``read`` gives a file's text.
+    """Return what --overlay and --set lay over a robot, in that order.
+
+    ``read`` gives a file's text.
 
     Raises:
         RejectedError: if a file cannot be read or is not YAML, or a setting is not one.
@@ -253,7 +261,7 @@ def disk(
 
 @cache
 def _is_pointer(path: str) -> bool:
-    """Return whether the file is what a checkout without Git LFS has in another's place (git-lfs's own spec, v1)."""
+    """Return whether the file is a Git LFS pointer, as checkouts without LFS have (spec v1)."""
     with contextlib.suppress(OSError), Path(path).open("rb") as file:
         return file.read(len(_POINTER)) == _POINTER
     return False
@@ -261,7 +269,9 @@ def _is_pointer(path: str) -> bool:
 
 @cache
 def moments(path: str, scale: Vector) -> Moments:
-    """Return volume, centre and tensor of a closed mesh at a scale; what reads meshes is loaded only here.
+    """Return volume, centre and tensor of a closed mesh at a scale.
+
+    What reads meshes is loaded only here.
 
     Raises:
         UnmeasurableError: as ``tfcompose.urdf.mesh.moments``, and if trimesh is not installed.
@@ -279,7 +289,10 @@ def moments(path: str, scale: Vector) -> Moments:
 
 
 def print_output(file: str, text: str) -> None:
-    """Print what a file had printed while it was read: each line with the file's name, on stderr."""
+    """Print what a file had printed while it was read.
+
+    Each line with the file's name, on stderr.
+    """
     for line in text.splitlines():
         sys.stderr.write(f"{printable(file)}: {plain(line)}\n")
 

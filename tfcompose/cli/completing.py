@@ -1,4 +1,7 @@
-"""What a word of a command line can be: commands, options, their values, and names that the robot file has."""
+"""What a word of a command line can be.
+
+Commands, options, their values, and names that the robot file has.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +80,10 @@ def candidates(
 
 
 def split_line(line: str) -> list[str]:
-    """Return the words of a command line up to the cursor; the last one may be empty, or its quotes still open."""
+    """Return the words of a command line up to the cursor.
+
+    The last one may be empty, or its quotes still open.
+    """
     for end in ("", "'", '"', "\\"):
         try:
             words = shlex.split(f"{line}{end}")

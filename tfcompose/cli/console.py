@@ -1,4 +1,4 @@
-"""What ``up`` prints: each process's log behind its name, what the launcher reports between, and a status line."""
+"""Output of ``up``: each process's log behind its name, reports, and a status line."""
 
 from __future__ import annotations
 
@@ -283,7 +283,7 @@ class Console:
         )
 
     def _is_printed(self, quoted: str) -> bool:
-        """Return whether a line that a finding quotes is among the last ones that its process printed."""
+        """Return whether a quoted line is among the last that its process printed."""
         return any(quoted in lines for lines in self._printed.values())
 
     def _say(self, text: str) -> None:
@@ -322,7 +322,10 @@ def vanished(edges: tuple[str, ...]) -> str:
 
 
 def _start_table(notice: AllReady) -> list[str]:
-    """Return the lines: process, seconds from the start until it was started, and until it was ready; and the total."""
+    """Return a line per process: when it started and when it was ready; and the total.
+
+    Times are seconds from the start.
+    """
     width = max(len(row.process) for row in notice.rows)
     lines = [f"{'process':<{max(width, 7)}}  started   ready"]
     for row in sorted(notice.rows, key=lambda row: row.ready):
@@ -332,7 +335,9 @@ def _start_table(notice: AllReady) -> list[str]:
 
 
 class StatusLine:
-    """The line below the log on a terminal: how many processes run, how many edges are live, and what is missing.
+    """The line below the log on a terminal.
+
+    How many processes run, how many edges are live, and what is missing.
 
     It counts what notices say. ``columns`` gives the terminal's width.
     """
@@ -375,7 +380,10 @@ class StatusLine:
         return _CLEAR_LINE if self._drawn else ""
 
     def drawn(self) -> str:
-        """Return what draws the line anew; nothing where that would change nothing, or was done a moment ago."""
+        """Return what draws the line anew.
+
+        Nothing where that would change nothing, or was done a moment ago.
+        """
         text = "" if self._ended else self._fitting(max(self._columns() - STATUS_FREE_COLUMNS, 1))
         now = self._clock()
         if text == self._shown or (self._shown and now - self._at < STATUS_EVERY_S):
@@ -398,7 +406,7 @@ class StatusLine:
         return text if len(text) <= columns else f"{text[: columns - 1]}…"
 
     def _parts(self, processes: str, edges: str, of: str) -> list[str]:
-        """Return what is wrong, how many processes run, how many edges are live, and what is missing."""
+        """Return findings, running processes, live edges, and what is missing."""
         wrong = [
             f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count
         ]
@@ -408,7 +416,10 @@ class StatusLine:
         return [*wrong, *shown, self._missing()]
 
     def _runs(self, name: str) -> bool:
-        """Return whether the process runs; one that others start does when its edges are live, as far as is known."""
+        """Return whether the process runs.
+
+        One that others start does when its edges are live, as far as is known.
+        """
         state = self._states.get(name)
         return state in ("running", "stopping") or (
             state == "expected" and (not self._owned[name] or name in self._live)

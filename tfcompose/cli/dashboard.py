@@ -1,4 +1,6 @@
-"""What the live view of ``up`` shows: pages of lines for a terminal of any size, and what each key does.
+"""What the live view of ``up`` shows.
+
+Pages of lines for a terminal of any size, and what each key does.
 
 It knows what it is given: notices and answers of the launcher, the plan, what processes use, and
 lines of logs. Lines are rich's texts, because characters of several columns count there as a
@@ -96,7 +98,10 @@ class _Reported:
 
 @dataclass(slots=True)
 class _Scroll:
-    """Which part of a list is shown: ``back`` is how many of its last lines are below the window."""
+    """Which part of a list is shown.
+
+    ``back`` is how many of its last lines are below the window.
+    """
 
     back: int = 0
     room: int = 1
@@ -115,7 +120,9 @@ class _Scroll:
 
 @dataclass(slots=True)
 class Dashboard:
-    """The live view's state. ``name`` is the robot's with its domain; ``clock`` gives seconds since 1970.
+    """The live view's state. ``name`` is the robot's with its domain.
+
+    ``clock`` gives seconds since 1970.
 
     The findings of the build and ``warnings`` were printed before the view, and are its first
     findings and events.
@@ -348,7 +355,7 @@ class Dashboard:
         return found
 
     def _process_lines(self, columns: int, rows: int) -> list[Text]:
-        """Return the table's head and as many processes as there is room for, the chosen one among them."""
+        """Return the table's head and the processes that fit, the chosen one among them."""
         rows_of = [row(one, self.used) for one in self._processes()]
         head, *shown = (
             Text.from_ansi(line)

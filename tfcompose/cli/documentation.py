@@ -1,4 +1,7 @@
-"""Pages of topics and commands: Markdown in ``topics/``, and what the code knows better than a page."""
+"""Pages of topics and commands.
+
+Markdown in ``topics/``, and what the code knows better than a page.
+"""
 
 from __future__ import annotations
 
@@ -41,13 +44,16 @@ _COMMENT = re.compile(r"<!--.*?-->\n*", re.DOTALL)
 
 
 def topics() -> dict[str, str]:
-    """Return the topics of the core, then those of installed tools, with what their pages are about."""
+    """Return the topics of the core and of installed tools, with their subjects."""
     of_tools = installed().topics()
     return TOPICS | {name: topic.about for name, (_, topic) in of_tools.items()}
 
 
 def page(word: str, commands: Mapping[str, CommandModule]) -> str | None:
-    """Return the page of a topic, a command's options with its page, or what a key means; None if there is none."""
+    """Return the page of a topic, a command's options with its page, or what a key means.
+
+    None if there is none.
+    """
     if word in commands:
         options, about = _options(word, commands[word]), _about(word, commands[word])
         return f"{options}\n{about}" if about else options

@@ -1,4 +1,7 @@
-"""``up --dry-run``: what would be started, for people who review it. The same plan gives the same text everywhere."""
+"""``up --dry-run``: what would be started, for people who review it.
+
+The same plan gives the same text everywhere.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,10 @@ if TYPE_CHECKING:
 
 
 def dry_run(arguments: Namespace) -> int:
-    """Print the processes of a robot or a built plan; exit code as for ``build``. Nothing is written."""
+    """Print the processes of a robot or a built plan; exit code as for ``build``.
+
+    Nothing is written.
+    """
     if is_plan(arguments.file):
         file = Path(arguments.file)
         plan = built_plan(file)

@@ -38,7 +38,7 @@ def lines_of(
     *,
     coloured: bool = False,
 ) -> list[str]:
-    """Return a line about all, and a table with a line for each edge of each publisher, fitted to the width."""
+    """Return a summary line and a table of edges and publishers, fitted to the width."""
     several = _several(edges)
     rows = [HEADS, *(_row(state, several) for state in edges)]
     table = TABLE.lines(rows, width, coloured=coloured) if edges else []
@@ -46,7 +46,7 @@ def lines_of(
 
 
 def _several(edges: Sequence[EdgeState]) -> set[str]:
-    """Return the children that more than one publisher sends, or that have more than one parent."""
+    """Return the children with more than one publisher or more than one parent."""
     counts = Counter(state.stream.child for state in edges if state.present is not False)
     return {child for child, number in counts.items() if number > 1}
 
@@ -114,7 +114,10 @@ def duration(seconds: float | None) -> str:
 
 
 def chain_line(chain: Chain | str, a: str, b: str) -> str:
-    """Return how many edges are between two frames and how old the newest pose is, or why there is none."""
+    """Return the number of edges between two frames and the newest pose's age.
+
+    Or why there is no chain.
+    """
     ends = f"{printable(a)} → {printable(b)}"
     if isinstance(chain, str):
         return f"{ends}: {printable(chain)}"
@@ -133,7 +136,10 @@ def objects_of(
     now_ns: int,
     chain: Chain | str | None = None,
 ) -> str:
-    """Return one line of JSON: what was counted, and a list of edges; times in seconds, stamps in nanoseconds."""
+    """Return one line of JSON: what was counted, and a list of edges.
+
+    Times in seconds, stamps in nanoseconds.
+    """
     data: dict[str, Any] = {
         "time_ns": now_ns,
         "messages": observer.messages,

@@ -1,4 +1,4 @@
-"""``tfcompose lint --fix``: the one safe answer is written into the file, and nothing else changes.
+"""``tfcompose lint --fix``: apply fixes that have one safe answer.
 
 Edits are tried in memory first. Only those are kept that take away their finding and bring no new
 one.
@@ -34,7 +34,9 @@ class ChangedError(OSError):
 
 @dataclass(slots=True)
 class Fixer:
-    """Fixes files that were named; ``lint`` returns a file's findings, through the reader that it is given.
+    """Fixes files that were named.
+
+    ``lint`` returns a file's findings, through the reader that it is given.
 
     ``fixed`` are the findings that are gone, with their places before; ``texts`` what the files
     then hold.
@@ -73,7 +75,7 @@ class Fixer:
             rewrite(Path(path), self._read[path], text)
 
     def diff(self) -> Iterator[str]:
-        """Yield the lines of a unified diff of the files that would change, under the names that they were given."""
+        """Yield the unified diff of files that would change, under the names given."""
         names = {_path(file): file for file in self.files}
         for path, text in self.texts.items():
             before = self._read[path].splitlines(keepends=True)
@@ -96,7 +98,7 @@ class Fixer:
         return [one for file in files for one in self.lint(file, self.read)]
 
     def _sound(self, file: str, kept: list[Finding], todo: list[Finding]) -> list[Finding]:
-        """Return ``kept`` and those of ``todo`` that can be fixed with it, halving what is not sound as a whole."""
+        """Return ``kept`` and the fixes of ``todo`` that are sound with it, found by halving."""
         if not todo:
             return kept
         if self._is_sound(file, [*kept, *todo]):
@@ -138,7 +140,9 @@ def _counted(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
 
 
 def rewrite(path: Path, old: str, new: str) -> None:
-    """Put the new text into the file, whole or not at all; its mode, owner and byte order mark stay.
+    """Put the new text into the file, whole or not at all.
+
+    Its mode, owner and byte order mark stay.
 
     Raises:
         OSError: if the file cannot be written; it is as it was.

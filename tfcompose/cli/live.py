@@ -1,4 +1,7 @@
-"""What the commands share that observe a running tree, or read a recording: the topics, and what can be in the way."""
+"""What the commands share that observe a running tree, or read a recording.
+
+The topics, and what can be in the way.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +49,9 @@ def refuse_live_bag(arguments: Namespace) -> None:
 
 
 def observed_topics(arguments: Namespace) -> tuple[Plan | None, list[Topics]]:
-    """Return the plan of FILE, if one is given, and the topics (moving, fixed) to observe: its own, or --namespace's.
+    """Return the plan of FILE, if one is given, and the topics (moving, fixed) to observe.
+
+    Its own, or --namespace's.
 
     Raises:
         SystemExit: after saying what cannot be read, or cannot be asked for together.
@@ -137,7 +142,9 @@ def observe(  # noqa: PLR0913 (all but two are named)
 
 
 def set_up_ros(ros: RosSettings | None = None, *, zenoh_alone: bool = False) -> bool:
-    """Set this process up as the plan says; return whether TF is to be read from Zenoh alone, if that is enough.
+    """Set this process up as the plan says.
+
+    Return whether TF is to be read from Zenoh alone, if that is enough.
 
     Raises:
         SystemExit: after saying why ROS cannot be started so.

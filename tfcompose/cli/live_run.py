@@ -1,4 +1,4 @@
-"""``up`` on a terminal: the launcher runs in a process of its own, and this one shows what it reports.
+"""``up`` on a terminal: the launcher runs in its own process, and this one shows it.
 
 So what is drawn, however slowly the terminal takes it, never delays the robot; Ctrl-Z stops the
 view alone; and a fault of the view costs the view. The launcher ends with this process, whatever
@@ -62,7 +62,7 @@ PRINTED_AT_MOST = 20
 
 
 def can_show_live() -> bool:
-    """Return whether this is a terminal of which this process is in the foreground, and somebody may sit at it."""
+    """Return whether this is an interactive terminal with this process in the foreground."""
     if not can_redraw(sys.stdout) or not sys.stdin.isatty() or os.environ.get("CI"):
         return False
     try:

@@ -30,7 +30,7 @@ def add_file(parser: ArgumentParser) -> None:
 
 
 def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> None:
-    """Add what is merged over a robot file, --profile, then --overlay, then --set, and values of its arguments.
+    """Add the options that are merged over a robot file: --profile, --overlay, --set, args.
 
     To be called after FILE is added, if that is a word too.
     """
@@ -182,7 +182,9 @@ def add_format(parser: ArgumentParser, *others: str, text: str = "default: text"
 
 
 def namespace(text: str) -> str:
-    """Read a namespace as ROS has it, and return it without slashes around; empty for the global one.
+    """Read a namespace as ROS has it, and return it without slashes around.
+
+    Empty for the global one.
 
     Raises:
         ArgumentTypeError: if no topic can be below it.

@@ -102,7 +102,10 @@ def find_command(name: str) -> CommandModule | None:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line and return the exit code: 0 clean, 1 findings or a failed process, 2 wrong use."""
+    """Run the command line and return the exit code.
+
+    0 clean, 1 findings or a failed process, 2 wrong use.
+    """
     _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         _escape_what_cannot_be_encoded(stream)
@@ -255,7 +258,10 @@ def _unknown(command: str) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Give a process that was started with closed streams (``>&-``) some that lead nowhere: Python has None there."""
+    """Give a process that was started with closed streams (``>&-``) some that lead nowhere.
+
+    Python has None there.
+    """
     for fd, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         if getattr(sys, name) is not None:
             continue
@@ -267,7 +273,7 @@ def _open_closed_streams() -> None:
 
 
 def _escape_what_cannot_be_encoded(stream: TextIO) -> None:
-    """Let a terminal that lacks a character, or a file name that is no text, show as an escape, not as a traceback."""
+    """Print what a stream cannot encode as an escape instead of raising."""
     reconfigure = getattr(stream, "reconfigure", None)
     if reconfigure:
         reconfigure(errors="backslashreplace")

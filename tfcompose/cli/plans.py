@@ -1,4 +1,4 @@
-"""Plans: read from a built file, compiled from a robot file, and the copy that a run is made from."""
+"""Plans: read from a built file, compiled from a robot file, copied for a run."""
 
 from __future__ import annotations
 
@@ -29,12 +29,18 @@ PLAN = "plan.json"
 
 
 def is_plan(file: str) -> bool:
-    """Return whether the file that a command was given is a built plan; else it is a robot file."""
+    """Return whether the file that a command was given is a built plan.
+
+    Else it is a robot file.
+    """
     return file.endswith(".json")
 
 
 def in_folder(file: str) -> str:
-    """Return the plan in the folder that a command was given, as ``build`` writes one; else the file as it is."""
+    """Return the plan in the folder that a command was given, as ``build`` writes one.
+
+    Else the file as it is.
+    """
     plan = Path(file) / PLAN
     return str(plan) if is_file(plan) else file
 
@@ -52,7 +58,7 @@ def built_plan(file: Path) -> Plan:
 
 
 def refuse_variant(arguments: Namespace, *more: str) -> None:
-    """Refuse --profile, --overlay, --set and arguments, and further options, with a plan that is built already.
+    """Refuse --profile, --overlay, --set and arguments with a plan that is already built.
 
     Raises:
         SystemExit: after saying so.
@@ -78,7 +84,7 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
 
 
 def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]]:
-    """Return the plan of a robot file, a plan.json or a folder with one, and where edges are in the robot's file.
+    """Return the plan of a robot file, plan.json or folder, and the edges' places.
 
     Places are by child; a built plan has none.
 
@@ -171,7 +177,10 @@ def copy_plan(
 
 
 def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
-    """Write the files, each at once: another ``up`` may write the same, and the run's processes read them."""
+    """Write the files, each at once.
+
+    Another ``up`` may write the same, and the run's processes read them.
+    """
     for name, data in parts.items():
         file = folder / name
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -181,7 +190,10 @@ def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
 
 
 def _with_absolute_addresses(urdf: bytes, folder: Path) -> bytes:
-    """Return a description with whole addresses; bytes that are no text stay, for their reader to refuse."""
+    """Return a description with whole addresses.
+
+    Bytes that are no text stay, for their reader to refuse.
+    """
     try:
         return with_absolute_addresses(urdf.decode("utf-8"), folder).encode()
     except UnicodeDecodeError:

@@ -1,4 +1,7 @@
-"""One preset of a sensor, or of a node that publishes TF: as plain data, and as a page for people."""
+"""One preset of a sensor, or of a node that publishes TF.
+
+As plain data, and as a page for people.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,10 @@ NAME = "NAME"
 
 
 def facts(name: str, library: Library) -> dict[str, Any]:
-    """Return the preset, with the default variant of each of its options, as plain data; what is unknown is null."""
+    """Return the preset, with the default variant of each of its options, as plain data.
+
+    What is unknown is null.
+    """
     plain = library.get(name)
     defaults = {
         key: option.default for key, option in plain.options.items() if option.type == "choice"
@@ -95,7 +101,10 @@ def text(preset: dict[str, Any], columns: int | None = None) -> str:
 
 
 def _fitted(page: str, columns: int | None) -> str:
-    """Return the page with lines of at most so many columns; what has no room goes on below, by cells."""
+    """Return the page with lines of at most so many columns.
+
+    What has no room goes on below, by cells.
+    """
     if columns is None:
         return page
     lines = []
@@ -356,7 +365,10 @@ def _topic(topic: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _degrees(sector: Sequence[float]) -> str:
-    """Return a sector in degrees: its whole angle where it is symmetric, else from where to where."""
+    """Return a sector in degrees.
+
+    Its whole angle where it is symmetric, else from where to where.
+    """
     start, end = (round(math.degrees(angle), 3) for angle in sector)
     return f"{number(2 * end)} deg" if start == -end else f"{number(start)} to {number(end)} deg"
 
@@ -384,7 +396,10 @@ def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
-    """Return where the values of the optics are from: each document once, with what it is and what it gives."""
+    """Return where the values of the optics are from.
+
+    Each document once, with what it is and what it gives.
+    """
     given: dict[tuple[str, str], list[str]] = {}
     for optics in streams:
         for one in optics.get("source", ()):
@@ -423,7 +438,10 @@ def node_rows() -> list[dict[str, str]]:
 
 
 def node_facts(name: str) -> dict[str, Any]:
-    """Return the preset as plain data; the frames of a claim have the names that they have by default."""
+    """Return the preset as plain data.
+
+    The frames of a claim have the names that they have by default.
+    """
     preset = node_preset(name)
     usual = {role: frame.default for role, frame in preset.frames.items()}
     return {

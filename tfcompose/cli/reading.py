@@ -45,7 +45,10 @@ def _standard_input() -> bytes:
 
 
 def _decode_as_declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
-    """Return the text of a URDF in the encoding that it declares; xacro reads UTF-8 whatever a file says."""
+    """Return the text of a URDF in the encoding that it declares.
+
+    Xacro reads UTF-8 whatever a file says.
+    """
     is_urdf = path.endswith(".urdf")
     declared = is_urdf and re.match(
         rb"""<\?xml\b[^>]*\bencoding\s*=\s*["']([A-Za-z][\w.-]*)""", data
@@ -67,7 +70,10 @@ _withheld: set[str] = set()
 
 
 def quote(file: str) -> None:
-    """Let ``line_of`` quote a file, whatever it holds: the user named it for a command that reads such files."""
+    """Let ``line_of`` quote a file, whatever it holds.
+
+    The user named it for a command that reads such files.
+    """
     _quoted.add(file)
 
 
@@ -86,7 +92,10 @@ def _lines(file: str) -> list[str]:
 
 
 def _is_of_a_robot(text: str) -> bool:
-    """Return whether a text is about robots; others can hold passwords, and lint's output may be public."""
+    """Return whether a text is about robots.
+
+    Others can hold passwords, and lint's output may be public.
+    """
     if text.lstrip().startswith("<"):
         return _XML.search(text) is not None
     if "\0" in text:
@@ -104,7 +113,10 @@ def forget_lines() -> None:
 
 
 def line_of(file: str, line: int) -> str | None:
-    """Return a line of a file, counted from 1; None if there is none, or the file is not about robots."""
+    """Return a line of a file, counted from 1.
+
+    None if there is none, or the file is not about robots.
+    """
     if file in _withheld:
         return None
     lines = _lines(file)

@@ -55,7 +55,10 @@ def running() -> list[tuple[RuntimeDir, Holder]]:
 
 
 def is_meant(place: RuntimeDir, name: str) -> bool:
-    """Return whether this name means the robot: its own, one without the domain, or without a host's name too."""
+    """Return whether this name means the robot.
+
+    Its own, one without the domain, or without a host's name too.
+    """
     return name in {place.name, place.share, place.robot}
 
 
@@ -96,7 +99,10 @@ def chosen_run(
 
 
 def in_scope(places: list[RuntimeDir]) -> list[RuntimeDir]:
-    """Return the robots in this shell's ROS domain; where there is none, those that the ``robot.yaml`` here names."""
+    """Return the robots in this shell's ROS domain.
+
+    Where there is none, those that the ``robot.yaml`` here names.
+    """
     found = [place for place in places if place.domain == domain_of(os.environ)]
     robot = _robot_here() if places and not found else None
     return found or [place for place in places if place.robot == robot]
@@ -175,7 +181,10 @@ def notices(
 
 
 def wait_until_ready(place: RuntimeDir, timeout_s: float | None) -> int:
-    """Wait until every process is ready and every edge live; 0 then, and 1 after saying why that did not come."""
+    """Wait until every process is ready and every edge live.
+
+    0 then, and 1 after saying why that did not come.
+    """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     while True:
         try:
@@ -213,7 +222,10 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
 
 
 def _why_not_ready(process: ProcessStatus) -> str:
-    """Return what it waits for before its start; else its state, what it is without, and what is seen there."""
+    """Return what it waits for before its start.
+
+    Else its state, what it is without, and what is seen there.
+    """
     if process.state == "stopped" and process.waits:
         return process.waits
     parts: list[str] = [process.state]
@@ -234,7 +246,7 @@ def since(holder: Holder) -> str:
 
 
 def hidden_run(place: RuntimeDir) -> str | None:
-    """Return what there is to say if the robot runs already, where this runtime folder does not show it."""
+    """Return a message if the robot already runs in another runtime directory."""
     led = [one for one in leftovers(f"{place.name}:") if one.launcher not in (None, os.getpid())]
     if not led or led[0].launcher is None:
         return None
@@ -254,7 +266,10 @@ def warnings_before_start(place: RuntimeDir, plan: Plan, run_id: str) -> list[st
 
 
 def _neighbours(place: RuntimeDir, plan: Plan) -> Iterator[str]:
-    """Name other robots that run in the domain on the same TF topics: each guard would report the other's."""
+    """Name other robots that run in the domain on the same TF topics.
+
+    Each guard would report the other's.
+    """
     found = [
         (other.robot, holder)
         for other, holder in running()
@@ -273,7 +288,7 @@ def _neighbours(place: RuntimeDir, plan: Plan) -> Iterator[str]:
 
 
 def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
-    """Return whether the plan that runs there, as far as it can be read, has TF topics of this one."""
+    """Return whether the plan that runs there has TF topics of this one."""
     running_plan = plan_of_run(other)
     return running_plan is not None and not judged_topics(plan).isdisjoint(
         judged_topics(running_plan)
@@ -281,7 +296,7 @@ def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
 
 
 def other_domains(place: RuntimeDir) -> Iterator[str]:
-    """Name runs of the same robot in other domains, such as that of a domain_id that has changed."""
+    """Name runs of the same robot in other domains, such as before a domain_id changed."""
     for other, holder in running():
         if other.share == place.share and other.domain != place.domain:
             yield (
@@ -291,7 +306,10 @@ def other_domains(place: RuntimeDir) -> Iterator[str]:
 
 
 def plan_file(place: RuntimeDir) -> Path:
-    """Return the copy of the plan that a robot runs; raises OSError or ValueError if it is not there any more."""
+    """Return the copy of the plan that a robot runs.
+
+    Raises OSError or ValueError if it is not there any more.
+    """
     return max(place.plan_folders(), key=lambda folder: folder.stat().st_mtime) / "plan.json"
 
 
@@ -304,7 +322,10 @@ def plan_of_run(place: RuntimeDir) -> Plan | None:
 
 
 def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
-    """Return the one robot that runs in this shell's ROS domain, and its plan; None for none, or for several."""
+    """Return the one robot that runs in this shell's ROS domain, and its plan.
+
+    None for none, or for several.
+    """
     try:
         found = [place for place, _ in running() if place.domain == domain_of(os.environ)]
     except RuntimeDirError:
@@ -314,7 +335,10 @@ def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
 
 
 def plan_of_domain() -> Plan | None:
-    """Return the plan of the one robot that runs in this shell's ROS domain, after saying so; None if there is none."""
+    """Return the plan of the one robot that runs in this shell's ROS domain, after saying so.
+
+    None if there is none.
+    """
     running = run_of_domain()
     if running is None:
         return None

@@ -1,4 +1,7 @@
-"""The terminal of a live view: its other screen, keys as they are pressed, and how everything is put back."""
+"""The terminal of a live view.
+
+Its other screen, keys as they are pressed, and how everything is put back.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +44,10 @@ class Keys:
 
     @property
     def waits(self) -> bool:
-        """Whether a key has begun that may go on; after a moment without more, ``end`` says what it was."""
+        """Whether a key has begun that may go on.
+
+        After a moment without more, ``end`` says what it was.
+        """
         return bool(self._rest)
 
     def feed(self, data: bytes) -> list[str]:
@@ -141,7 +147,7 @@ class Screen:
             termios.tcsetattr(self.fd, termios.TCSANOW, self._before)
 
     def draw(self, lines: Callable[[int, int], list[Text]]) -> bool:
-        """Draw the lines that are returned for these columns and rows, unless the terminal has not taken the last."""
+        """Draw the lines returned for this size, unless the terminal is still busy."""
         if self._live is None:
             return True
         if self.output.owes:

@@ -1,4 +1,6 @@
-"""How ``up`` starts a robot here: it checks first all that the plan needs, then makes the runtime directory.
+"""How ``up`` starts a robot here.
+
+It checks first all that the plan needs, then makes the runtime directory.
 
 With ``-d`` the launcher goes on in the background, and the command follows it until the robot is
 up.
@@ -72,7 +74,9 @@ if TYPE_CHECKING:
 
 
 def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) -> int:
-    """Check all that the plan in the file needs, and start it; return the exit code as ``up`` does.
+    """Check all that the plan in the file needs, and start it.
+
+    Return the exit code as ``up`` does.
 
     ``built_with`` are the warnings of its build, which were printed.
     """
@@ -151,7 +155,10 @@ def _run(
 
 
 def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> int:
-    """Bring the running robot to the plan; exit code 0, 1 where it runs as it is and was to be started here."""
+    """Bring the running robot to the plan.
+
+    Exit code 0, 1 where it runs as it is and was to be started here.
+    """
     holder = place.holder()
     who = (
         f"{place.name} runs already: pid {holder.pid}, since {since(holder)}"
@@ -194,7 +201,7 @@ def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
 
 
 def _profiles_that_start(arguments: Namespace) -> list[str]:
-    """Return the profiles with which, laid over those that were asked for, every program is there."""
+    """Return the profiles with which every program exists, added to those requested."""
     from tfcompose.spec.language import profiles_in, with_includes
     from tfcompose.spec.load import load
 
@@ -229,7 +236,10 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
 def _detach(
     plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace
 ) -> int:
-    """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
+    """Start the launcher as a process of its own; return 0 when all is started, or ready.
+
+    1 when it is not.
+    """
     if goes_with_logout(place):
         user = user_name()
         warn(

@@ -1,4 +1,6 @@
-"""Tables of text: as wide as they are for files and pipes; for a terminal fitted, coloured and drawn again in place.
+"""Tables of text: as wide as they are for files and pipes.
+
+For a terminal fitted, coloured and drawn again in place.
 
 A pipe gets the same bytes whatever the terminal is. On a narrow terminal the columns that matter
 least are left out, and names are shortened after their first third: their ends tell them apart. Of
@@ -42,7 +44,10 @@ class Table:
         coloured: bool = False,
         indent: str = "",
     ) -> list[str]:
-        """Return a line for each row, narrower than ``width`` where possible: a terminal's last column stays free."""
+        """Return a line for each row, narrower than ``width`` where possible.
+
+        A terminal's last column stays free.
+        """
         widths = {
             column: max(map(len, cells)) for column, cells in enumerate(zip(*rows, strict=True))
         }
@@ -83,7 +88,9 @@ def _excess(widths: dict[int, int], width: int) -> int:
 
 
 def shortened(text: str, width: int, *, at_end: bool = False) -> str:
-    """Return the text in so many characters: with an ellipsis at its end, or after its first third.
+    """Return the text in so many characters.
+
+    With an ellipsis at its end, or after its first third.
 
     Of an edge, ``parent → child``, that is the first third of the parent; of the child alone where
     there is no room.
@@ -103,7 +110,10 @@ def shortened(text: str, width: int, *, at_end: bool = False) -> str:
 
 
 class LiveLines:
-    """Some lines at the end of a terminal's output; each drawing replaces the last one, without flicker."""
+    """Some lines at the end of a terminal's output.
+
+    Each drawing replaces the last one, without flicker.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -111,7 +121,10 @@ class LiveLines:
         self._columns = 0
 
     def draw(self, lines: Sequence[str]) -> None:
-        """Draw the lines where the last ones were; those that the terminal has no room for are counted only."""
+        """Draw the lines where the last ones were.
+
+        Those that the terminal has no room for are counted only.
+        """
         columns, rows = size_of(self._stream.fileno())
         room = max(rows - 1, 2)
         shown = list(lines)

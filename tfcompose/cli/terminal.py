@@ -1,4 +1,4 @@
-"""What commands write to: exit codes, findings and complaints, the terminal's size and colours, readers that leave."""
+"""Output of commands: exit codes, findings, terminal size, colours, closed readers."""
 
 from __future__ import annotations
 
@@ -67,29 +67,38 @@ def reject(found: Sequence[Finding], code: int | None = None) -> NoReturn:
 
 
 def exit_code_of(found: Sequence[Finding]) -> int:
-    """Return 2 where the command cannot do its work, since it lacks a file, ROS or a package, else 1."""
+    """Return 2 if the command lacks a file, ROS or a package, else 1."""
     return UNREADABLE if any(one.code in _LACKING for one in found) else FAILED
 
 
 def coloured(stream: TextIO) -> bool:
-    """Return whether to colour: on a terminal, or with FORCE_COLOR; never with NO_COLOR (no-color.org)."""
+    """Return whether to colour: on a terminal, or with FORCE_COLOR.
+
+    Never with NO_COLOR (no-color.org).
+    """
     if os.environ.get("NO_COLOR"):
         return False
     return bool(os.environ.get("FORCE_COLOR")) or can_redraw(stream)
 
 
 def can_redraw(stream: TextIO) -> bool:
-    """Return whether lines can be drawn again in their place: on a terminal that moves its cursor."""
+    """Return whether lines can be drawn again in their place.
+
+    On a terminal that moves its cursor.
+    """
     return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
 def table_width(stream: TextIO) -> int | None:
-    """Return the width that tables are fitted to: the terminal's, or None into a file or a pipe."""
+    """Return the width that tables are fitted to.
+
+    The terminal's, or None into a file or a pipe.
+    """
     return size_of(stream.fileno())[0] if can_redraw(stream) else None
 
 
 def size_of(fd: int) -> tuple[int, int]:
-    """Return the columns and rows of the terminal behind the descriptor, 80 and 24 if there is none."""
+    """Return the terminal's columns and rows, 80 and 24 if there is none."""
     try:
         size = os.get_terminal_size(fd)
     except OSError:
@@ -103,7 +112,10 @@ def printable(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    """Return the text without control sequences; other characters that cannot be seen are marked."""
+    """Return the text without control sequences.
+
+    Other characters that cannot be seen are marked.
+    """
     return "".join(map(_marked, _SEQUENCE.split(text)[::2]))
 
 
@@ -123,12 +135,17 @@ def _marked(text: str) -> str:
 
 
 def has_reader(stream: TextIO) -> bool:
-    """Return whether what is written there can still be read; ``tfcompose logs -f | head -1`` ends that."""
+    """Return whether what is written there can still be read.
+
+    ``tfcompose logs -f | head -1`` ends that.
+    """
     return _first_ready(stream, None, 0) != stream
 
 
 def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
-    """Wait until there is something to receive, or nobody reads the stream any more; return whether it is read.
+    """Wait until there is something to receive, or nobody reads the stream any more.
+
+    Return whether it is read.
 
     The connection's timeout limits the wait.
     """

@@ -1,7 +1,7 @@
 """Commands and options of tools, as the parser, the help and the completion have them.
 
-Tools that ship are looked up first. Those of other packages are looked up only where a command or an
-option is still unknown, and for the help.
+Tools that ship are looked up first. Those of other packages are looked up only where a command or
+an option is still unknown, and for the help.
 """
 
 from __future__ import annotations
@@ -57,7 +57,10 @@ class ToolOption:
         _loaded(self.tool, self.option.module).arguments(parser)
 
     def run(self, command: str, arguments: Namespace) -> int | None:
-        """Run the command their way, and return the exit code; None where it is to run as usual."""
+        """Run the command their way, and return the exit code.
+
+        None where it is to run as usual.
+        """
         code: int | None = _loaded(self.tool, self.option.module).run(command, arguments)
         return code
 
@@ -102,7 +105,10 @@ def find(name: str) -> ToolCommand | None:
 
 
 def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOption]:
-    """Add the options that tools bring for a command, if it lacks one that is given; return what was added."""
+    """Add the options that tools bring for a command, if it lacks one that is given.
+
+    Return what was added.
+    """
     added: list[ToolOption] = []
     for toolset in (shipped, installed):
         if not parser.lacks_option(argv):

@@ -1,4 +1,6 @@
-"""``lint --untrusted``: robot files of strangers read their own tree, installed packages and presets, and no more.
+"""``lint --untrusted``: strangers' robot files read only their own tree.
+
+Installed packages and presets may be read besides it.
 
 So a pull request shows nothing of the computer that checks it: neither other files nor the
 environment, which in CI holds secrets.
@@ -40,7 +42,10 @@ _PLAIN = re.compile(r"true|false|yes|no|on|off|[-+]?[0-9]{0,9}(?:\.[0-9]{0,9})?"
 
 @contextmanager
 def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
-    """Take all variables but those that programs need from this process, so that none is read; yield all that there were."""
+    """Take all variables but those that programs need from this process, so that none is read.
+
+    Yield all that there were.
+    """
     before = dict(os.environ)
     if applies:
         for name in before.keys() - _NEEDED:
@@ -122,7 +127,7 @@ class UntrustedFiles:
         )
 
     def disk_for(self, source: Source) -> Disk:
-        """Return the same for a robot file, which may read the folders under ``packages`` that are packages."""
+        """Return the same for a robot file, which may read packages under ``packages``."""
         packages = source.data.get("packages")
         for name, folder in packages.items() if isinstance(packages, dict) else ():
             if isinstance(folder, str):

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write the file, whole or not at all; who reads it meanwhile sees the one before, whose mode and owner stay.
+    """Write the file, whole or not at all.
+
+    Who reads it meanwhile sees the one before, whose mode and owner stay.
 
     A device, a pipe or a symbolic link is written through.
 
@@ -70,7 +72,9 @@ def _umask() -> int:
 
 
 def write_all(folder: Path, files: Sequence[File]) -> None:
-    """Write the files of a build below ``folder``; a reader sees each as it was or as it is, never half.
+    """Write the files of a build below ``folder``.
+
+    A reader sees each as it was or as it is, never half.
 
     All of them are written to a folder beside first. Only when the last byte is on the disk are
     they moved into place, which needs no more space; if one cannot be moved, those before it are
@@ -98,7 +102,10 @@ def write_all(folder: Path, files: Sequence[File]) -> None:
 
 
 def _move(staging: Path, folder: Path, paths: list[str]) -> None:
-    """Move the files into place, all or none: what they replace is kept until the last one is there."""
+    """Move the files into place, all or none.
+
+    What they replace is kept until the last one is there.
+    """
     made = [
         parent for parent in {(folder / path).parent: None for path in paths} if not exists(parent)
     ]
@@ -124,7 +131,10 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
 
 
 def _back_up(target: Path, old: Path) -> None:
-    """Keep the file under another name: what takes its place does not change it. A copy where that cannot be."""
+    """Keep the file under another name: what takes its place does not change it.
+
+    A copy where that cannot be.
+    """
     with contextlib.suppress(OSError):
         if not target.is_symlink():
             os.link(target, old)
@@ -154,7 +164,10 @@ def _write_to_disk(path: Path, text: str) -> None:
 
 
 def _parameter_files(folder: Path) -> list[str]:
-    """Return the parameter files that the plan in the folder names: those that an earlier build wrote."""
+    """Return the parameter files that the plan in the folder names.
+
+    Those that an earlier build wrote.
+    """
     if not is_folder(folder / "params"):
         return []
     try:
@@ -178,7 +191,7 @@ def _remove_stale(folder: Path, stale: Sequence[str]) -> None:
 
 
 def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
-    """Build the robot and return the folder, the names of the files and the warnings, which are printed.
+    """Build the robot; return the folder, the file names and the printed warnings.
 
     Raises:
         SystemExit: after saying why nothing was written.
@@ -211,7 +224,10 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
 
 
 def _source_file(folder: Path) -> Path:
-    """Return the file, beside a folder that a robot's name chose, with the robot file's path: two may have one name."""
+    """Return the file, beside a folder that a robot's name chose, with the robot file's path.
+
+    Two may have one name.
+    """
     return folder.with_name(f".{folder.name}.source")
 
 
@@ -232,7 +248,7 @@ def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:
 
 
 def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Finding]:
-    """Return where the descriptions among the robot's files differ from it when they are read back."""
+    """Return where descriptions among the robot's files differ when read back."""
     from tfcompose.compiler.urdf.read_back import differences
 
     texts = {file.path: file.text for file in files}

@@ -29,7 +29,9 @@ NOTHING = Given()
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """A robot and everything that was found; ``robot`` is None where the text did not get that far.
+    """A robot and everything that was found.
+
+    ``robot`` is None where the text did not get that far.
 
     ``allows`` are the comments that silence findings, ``used`` those that did, with the code.
     ``sources`` are what the robot was made from, overlays merged over it: its own file's, and
@@ -59,7 +61,7 @@ def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
     disk: Disk | None = None,
     given: Given = NOTHING,
 ) -> Compiled:
-    """Return the robot that the text describes with profiles and overlays merged over it, and all findings, by place.
+    """Return the robot with profiles and overlays merged, and all findings by place.
 
     ``read`` gives the text of a file that is included or holds a calibration; without it nothing
     can be. ``disk`` says which files and packages there are; without it no mesh is looked for.
@@ -82,7 +84,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     disk: Disk | None = None,
     given: Given = NOTHING,
 ) -> Compiled:
-    """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
+    """Return what ``compile_robot`` does, from text that is loaded, with its includes."""
     try:
         validated = validate(
             composed(source, profiles, overlays, given), profiles_in(source), given
@@ -103,6 +105,6 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
 
 
 def _checked(robot: Robot) -> list[Finding]:
-    """Return what the rules find, those of the tools among them whose sections the robot's file has."""
+    """Return the findings of the rules, including those of the tools it uses."""
     rules, found = rules_of_tools(robot)
     return [*check(robot), *check(robot, rules), *found]

@@ -33,7 +33,10 @@ def read_mesh(path: str, scale: Vector) -> Any:
 
 
 def _collada_unit(path: str) -> float:
-    """Return the metres in the unit of a COLLADA file; 1 where it declares none, and for other files."""
+    """Return the metres in the unit of a COLLADA file.
+
+    1 where it declares none, and for other files.
+    """
     if not path.lower().endswith(".dae"):
         return 1.0
     with Path(path).open("rb") as file:

@@ -29,7 +29,9 @@ _KEYS = (
 
 
 def values_of(edge: Edge, sources: Sequence[Source]) -> list[str]:
-    """Return a line for each value that the edge was made of: key, value, place, and the places of what it replaced.
+    """Return a line for each value that the edge was made of.
+
+    Key, value, place, and the places of what it replaced.
 
     ``sources`` are the robot's own, and those of its parts.
     """
@@ -55,7 +57,10 @@ def _given_values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Sourc
 
 
 def _entries(edge: Edge, source: Source) -> Iterator[Path]:
-    """Yield where the edge may be given; in a part without the prefix that its names have in the robot."""
+    """Yield where the edge may be given.
+
+    In a part without the prefix that its names have in the robot.
+    """
     named = (
         {"joints": edge.joint_name, "sensors": edge.sensor}
         if edge.sensor

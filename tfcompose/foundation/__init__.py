@@ -1,4 +1,6 @@
-"""What every wing builds on: findings and their codes, geometry, units, numbers, text, trees and signals.
+"""What every wing builds on.
+
+Findings and their codes, geometry, units, numbers, text, trees and signals.
 
 Must not import ``model``, ``spec``, ``compiler``, ``tf``, ``guard``, ``launcher``, ``cli``,
 ``tools``.

@@ -103,7 +103,10 @@ class Catalogue(Mapping[str, Code]):
         self._codes: dict[str, Code] = {}
 
     def load(self) -> None:
-        """Read every code of the core now: a process that runs for long depends on no file later."""
+        """Read every code of the core now.
+
+        A process that runs for long depends on no file later.
+        """
         for code in _codes_in(self._folders):
             self[code]
 

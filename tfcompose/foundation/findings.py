@@ -87,7 +87,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Allow:
-    """A comment in a file that lets findings with these codes stand from ``line`` to ``last``, and says why."""
+    """A comment that allows findings with these codes from ``line`` to ``last``, and why."""
 
     codes: tuple[str, ...]
     line: int
@@ -114,7 +114,7 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     severity: Severity | None = None,
     edits: Iterable[Edit] = (),
 ) -> Finding:
-    """Return the finding with the name that the catalogue has for its code, and unless one is given the severity."""
+    """Return the finding with its code's name, and its default severity if none is given."""
     known = CATALOGUE[code]
     return Finding(
         code,
@@ -129,7 +129,10 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
 
 
 def without_duplicates(found: Iterable[Finding]) -> list[Finding]:
-    """Return each finding once, in order; of those that differ in notes only, the first, with the notes of all."""
+    """Return each finding once, in order.
+
+    Of those that differ in notes only, the first, with the notes of all.
+    """
     first: dict[Finding, Finding] = {}
     for one in found:
         alone = replace(one, notes=()) if one.notes else one
@@ -175,7 +178,10 @@ def edited(text: str, edits: Sequence[Edit]) -> str | None:
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """Return the known word that a person most likely meant by ``word``, or None; 1 is as near as the word itself."""
+    """Return the known word that a person most likely meant by ``word``, or None.
+
+    1 is as near as the word itself.
+    """
     import difflib
 
     found = difflib.get_close_matches(
@@ -213,6 +219,6 @@ def _is_one_slip(a: str, b: str) -> bool:
 
 
 def did_you_mean(word: str, known: Iterable[str], otherwise: str = "") -> str:
-    """Return advice that names the word that was probably meant, or ``otherwise`` where none is near."""
+    """Return advice that names the nearest word, or ``otherwise`` if none is near."""
     near = nearest(word, list(known))
     return f"did you mean {near}?" if near else otherwise

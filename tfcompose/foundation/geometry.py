@@ -47,7 +47,7 @@ class Pose(NamedTuple):
 
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the quaternion of rotation ``b`` followed by ``a`` (Hamilton product a·b), normalised."""
+    """Return the quaternion of rotation ``b`` followed by ``a`` (Hamilton product a·b)."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return normalised(
@@ -78,7 +78,9 @@ def norm(values: tuple[float, ...]) -> float:
 
 
 def normalised(quat_xyzw: Quaternion) -> Quaternion:
-    """Return the quaternion at unit length; one that is there already to the last bit is returned as it is.
+    """Return the quaternion at unit length.
+
+    One that is there already to the last bit is returned as it is.
 
     Raises:
         ZeroDivisionError: if all four parts are 0.
@@ -106,7 +108,9 @@ def quat_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def rpy_from_quat(quat_xyzw: Quaternion) -> Vector:
-    """Return roll, pitch, yaw in radians about fixed axes; at pitch ±π/2 only yaw ∓ roll is defined, and roll is 0.
+    """Return roll, pitch, yaw in radians about fixed axes.
+
+    At pitch ±π/2 only yaw ∓ roll is defined, and roll is 0.
 
     Near there the yaw is known to few digits only; the roll is what then remains to be turned, so
     that the three together are the rotation to the last digits.
@@ -174,7 +178,7 @@ _NO_MM, _NO_RAD, _ROUNDING = 1e-6, 1e-6, 1e-9
 
 
 class Offset(NamedTuple):
-    """A distance in metres, and the angle of the one rotation between two orientations, in radians, 0 to π."""
+    """A distance in metres, and the angle between two orientations in radians, 0 to π."""
 
     xyz_m: float
     rot_rad: float
@@ -188,7 +192,7 @@ class Offset(NamedTuple):
         return " and ".join(parts) or "nothing"
 
     def beyond(self, limit: Offset) -> bool:
-        """Whether the distance or the angle is larger than that of ``limit``, by more than what computing adds."""
+        """Whether the distance or angle exceeds ``limit`` by more than rounding."""
         return self.xyz_m > limit.xyz_m + _ROUNDING or self.rot_rad > limit.rot_rad + _ROUNDING
 
 

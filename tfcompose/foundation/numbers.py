@@ -1,4 +1,7 @@
-"""The one writer of numbers: the shortest text that reads back the same, no −0, no noise from computing."""
+"""The one writer of numbers.
+
+The shortest text that reads back the same, no −0, no noise from computing.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,7 @@ def numbers(values: tuple[float, ...]) -> str:
 
 @lru_cache(maxsize=_REMEMBERED)
 def clean_xyz(xyz: Vector) -> Vector:
-    """Return the lengths rounded to a picometre, which removes what adding and turning left behind."""
+    """Return the lengths rounded to a picometre, which removes rounding residue."""
     x, y, z = xyz
     return (
         round(x, METRE_DECIMALS) + 0.0,
@@ -70,7 +73,9 @@ def clean(pose: Pose) -> Pose:
 
 
 def clean_rpy(quat_xyzw: Quaternion) -> Vector:
-    """Return roll, pitch, yaw in radians; a whole degree within the noise of computing is exactly that.
+    """Return roll, pitch, yaw in radians.
+
+    A whole degree within the noise of computing is exactly that.
 
     Near pitch ±π/2 the yaw is known to few digits only, and the roll is what then remains to be
     turned.

@@ -1,4 +1,6 @@
-"""How commands and processes of tfcompose's own take signals: none is lost, and each ends whoever waits.
+"""How commands and processes of tfcompose's own take signals.
+
+None is lost, and each ends whoever waits.
 
 While a command loads, Ctrl-C ends it also where Python can raise nothing: Python throws an
 exception away that comes up in a callback of its own, such as those that its import system has,
@@ -37,7 +39,9 @@ def take_interrupt() -> bool:
 
 
 class RememberedInterrupt:
-    """Lets SIGINT raise KeyboardInterrupt, as Python does, and remembers it; ignored, as below ``nohup``, it stays so.
+    """Lets SIGINT raise KeyboardInterrupt, as Python does, and remembers it.
+
+    Ignored, as below ``nohup``, it stays so.
 
     It is for the main thread; in others, which get no signals, it does nothing.
     """
@@ -78,7 +82,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _interrupt_again(_number: int, frame: FrameType | None) -> None:
-    """Raise an interrupt that nobody took yet, or try it again soon where pydantic called what runs now."""
+    """Raise a pending interrupt, or retry it soon if pydantic called what runs now."""
     if not _remembered:
         return
     while frame is not None:
@@ -136,7 +140,10 @@ class Stop:
         return self._event.wait(timeout_s)
 
     def waker(self, owner: object, make: Callable[[], Waker]) -> Waker:
-        """Return the waker of that owner (a ROS context), made at the first call and triggered by ``request``."""
+        """Return the waker of that owner (a ROS context), made on first use.
+
+        ``request`` triggers it.
+        """
         with self._lock:
             known = self._wakers.get(id(owner))
             if known is None:

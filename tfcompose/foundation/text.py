@@ -22,7 +22,10 @@ def with_more(first: str, more: int, word: str = "edge") -> str:
 
 
 def listed(names: Iterable[object], most: int = LISTED) -> str:
-    """Return names with commas, and how many more there are than the first few: "a, b and 3 more"."""
+    """Return names with commas, and how many more there are than the first few.
+
+    "a, b and 3 more".
+    """
     some = [str(name) for name in names]
     more = f" and {len(some) - most} more" if len(some) > most else ""
     return ", ".join(some[:most]) + more
@@ -39,7 +42,7 @@ def duration(seconds: float) -> str:
 
 
 def visible(text: str) -> str:
-    """Return the text with what cannot be seen, such as control characters, as Python's escapes."""
+    """Return the text with invisible characters, such as control ones, as Python escapes."""
     return "".join(map(_visible_character, text))
 
 
@@ -48,7 +51,7 @@ def _visible_character(character: str) -> str:
 
 
 def masked(text: str, mark: str, kept: str = "") -> str:
-    """Return the text with a mark for each character that cannot be seen, but those of ``kept``."""
+    """Return the text with a mark for each invisible character, except those of ``kept``."""
     if text.isprintable():
         return text
     hidden = {character for character in text if not character.isprintable()} - {*kept}

@@ -1,7 +1,7 @@
 """Description of a tool, and the one place where the core finds tools.
 
-A tool adds commands, codes, topics and keys of the robot file to the core. Those that ship stand in
-the table of ``tfcompose.tools``; other packages bring theirs by the entry-point group
+A tool adds commands, codes, topics and keys of the robot file to the core. Those that ship stand
+in the table of ``tfcompose.tools``; other packages bring theirs by the entry-point group
 ``tfcompose.tools``. No wing imports a tool: ``shipped`` loads the table by its name, and returns
 nothing where that folder is absent; ``installed`` adds the tools of other packages. What a tool
 does is named as ``module:attribute`` and loaded when it is used, so the table costs little.
@@ -30,7 +30,9 @@ _FOREIGN_CODE = re.compile(r"(?!TF\d)[A-Z]{2,8}\d{3}")
 
 
 class Command(NamedTuple):
-    """A command. Its module has ``arguments(parser)`` and ``run(arguments)``, its docstring is the help.
+    """A command, in a module with ``arguments(parser)`` and ``run(arguments)``.
+
+    The module's docstring is the help.
 
     ``topic`` is the page that ``help`` prints below the options, by default that of the command's
     name. ``completes`` pairs arguments with the sections of the robot file whose names they take.
@@ -54,11 +56,12 @@ class Topic(NamedTuple):
 class Key(NamedTuple):
     """A section of the robot file, with its own model, validated like every other section.
 
-    ``model`` leads to a pydantic model based on ``tfcompose.spec.language.spec.Spec``. The hooks run
-    only for robots whose file has the key:
+    ``model`` leads to a pydantic model based on ``tfcompose.spec.language.spec.Spec``. The hooks
+    run only for robots whose file has the key:
 
     - ``processes``: a function of a ``ToolSection``, returns processes that the robot starts;
-    - ``check``: a function of a ``ToolSection`` and the ``Robot``, returns findings; it may read files;
+    - ``check``: a function of a ``ToolSection`` and the ``Robot``, returns findings; it may read
+      files;
     - ``rules``: a module with rules, as ``tfcompose.compiler.check.rule.rule`` makes them.
     """
 
@@ -76,7 +79,10 @@ class Key(NamedTuple):
 
 
 class Language(NamedTuple):
-    """A kind of file of its own, for ``schema``: its name, its model, and the heading of its reference."""
+    """A kind of file of its own, for ``schema``.
+
+    Its name, its model, and the heading of its reference.
+    """
 
     name: str
     model: str
@@ -86,8 +92,8 @@ class Language(NamedTuple):
 class Option(NamedTuple):
     """Options that a tool adds to commands of the core.
 
-    The module has ``arguments(parser)`` and ``run(name, arguments)``, which returns an exit code, or
-    None for the command itself to go on.
+    The module has ``arguments(parser)`` and ``run(name, arguments)``, which returns an exit code,
+    or None for the command itself to go on.
     """
 
     commands: tuple[str, ...]
@@ -124,7 +130,7 @@ class Tool(NamedTuple):
         return _folder(self.codes) / "codes" if self.codes else None
 
     def names(self) -> Iterator[tuple[str, str]]:
-        """Yield everything that it brings under a name that no other tool may have, as (kind, name)."""
+        """Yield everything it brings under a unique name, as (kind, name)."""
         yield from (("command", command.name) for command in self.commands)
         yield from (("code", code) for code in self.code_names())
         yield from (("topic", topic.name) for topic in self.topics)
@@ -139,7 +145,10 @@ class Tool(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What is wrong with a tool of another package: the code of the finding, its message and its help."""
+    """What is wrong with a tool of another package.
+
+    The code of the finding, its message and its help.
+    """
 
     code: str
     message: str
@@ -200,7 +209,7 @@ def shipped() -> Toolset:
 
 @cache
 def installed() -> Toolset:
-    """Return the tools that ship, then those of other packages that load and clash with none before them."""
+    """Return the tools that ship, then those of other packages without clashes."""
     entries = _entry_points()
     if not entries:
         return shipped()
@@ -244,7 +253,10 @@ def _wrong_codes(tool: Tool) -> Iterator[Problem]:
 
 
 def code_folders() -> Iterator[Path]:
-    """Yield the folders with the codes of the tools that ship, then of the others; those are looked up when reached."""
+    """Yield the folders with the codes of the tools that ship, then of the others.
+
+    Those are looked up when reached.
+    """
     ships = shipped().tools
     yield from filter(None, (tool.code_folder for tool in ships))
     others = installed().tools[len(ships) :]
@@ -252,7 +264,10 @@ def code_folders() -> Iterator[Path]:
 
 
 def absent(kind: str, name: str) -> str:
-    """Return what installs the tool that ships and has this command, key or option; empty if none has."""
+    """Return what installs the tool that ships and has this command, key or option.
+
+    Empty if none has.
+    """
     tool, extra = _reserved().get((kind, name), ("", ""))
     if not extra or any(other.name == tool for other in shipped().tools):
         return ""
@@ -263,8 +278,8 @@ def absent(kind: str, name: str) -> str:
 def _reserved() -> dict[tuple[str, str], tuple[str, str]]:
     """Return who owns each name of the core and of the tools that ship, with what installs that.
 
-    The file is written by ``python -m tests.support.names --write``: it also answers where a tool is
-    absent.
+    The file is written by ``python -m tests.support.names --write``: it also answers where a tool
+    is absent.
     """
     from json import loads
 

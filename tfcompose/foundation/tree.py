@@ -1,4 +1,4 @@
-"""Trees of frames: what is below a frame, the way up from it, roots, loops, and how a tree is drawn as text.
+"""Trees of frames: descendants, ancestors, roots, loops, and drawing as text.
 
 Edges are (parent, child) pairs of names. What was declared or seen need be no tree: a frame may
 have several parents, and frames may be each other's ancestors. Every function here ends all the
@@ -56,7 +56,7 @@ def trees(edges: Iterable[Edge]) -> dict[str, set[str]]:
 
 
 def way_up(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
-    """Return the frame, its parent, and so on up to a frame without a parent, or before one that is there already."""
+    """Return the frame and its ancestors, up to a root or before a repeated frame."""
     way = {frame: None}
     parent = parent_of(frame)
     while parent is not None and parent not in way:
@@ -66,7 +66,9 @@ def way_up(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
 
 
 def loop_closed_by(edge: Edge, parent_of: Callable[[str], str | None]) -> tuple[str, ...]:
-    """Return the loop that a further edge closes, from its child down to that again; () if it closes none.
+    """Return the loop that a further edge closes, from its child down to that again.
+
+    () if it closes none.
 
     ``parent_of`` says which parent a frame has; what it says of the edge's child does not matter.
     """
@@ -76,7 +78,9 @@ def loop_closed_by(edge: Edge, parent_of: Callable[[str], str | None]) -> tuple[
 
 
 def loops(edges: Iterable[Edge]) -> list[tuple[str, ...]]:
-    """Return each loop once, from its first frame by name downwards; at most one for each frame that is in loops.
+    """Return each loop once, from its first frame by name downwards.
+
+    At most one for each frame that is in loops.
 
     A frame that is its own parent is a loop of one.
     """
@@ -94,7 +98,7 @@ def loops(edges: Iterable[Edge]) -> list[tuple[str, ...]]:
 
 
 def _around_loops(parents: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
-    """Return the parents of the frames that are on loops, or between two, as far as they are so too."""
+    """Return the parents of frames that are on loops or between two loops."""
     above = {frame: set(some) for frame, some in parents.items()}
     below: dict[str, set[str]] = {}
     for frame, some in parents.items():

@@ -137,7 +137,10 @@ class Truth:
 
 
 class UnitError(ValueError):
-    """A string is not a quantity; ``advice`` says what to write instead, ``unit`` is the unit that is not known."""
+    """A string is not a quantity.
+
+    ``advice`` says what to write instead, ``unit`` is the unit that is not known.
+    """
 
     def __init__(self, message: str, advice: str = "", unit: str = "") -> None:
         super().__init__(message)
@@ -146,7 +149,9 @@ class UnitError(ValueError):
 
 
 def quantity(text: str, wanted: Dimension | None = None) -> Quantity:
-    """Return what a text such as ``30 cm`` or ``1e-3`` says; ``wanted`` is the dimension that advice is given for.
+    """Return what a text such as ``30 cm`` or ``1e-3`` says.
+
+    ``wanted`` is the dimension that advice is given for.
 
     Raises:
         UnitError: if it is no number, or its unit is not known.
@@ -168,7 +173,9 @@ def quantity(text: str, wanted: Dimension | None = None) -> Quantity:
 
 
 def in_unit(number: float, unit: str, wanted: Dimension | None = None) -> Quantity:
-    """Return ``number`` times the unit; ``wanted`` is the dimension that advice is given for, None: any.
+    """Return ``number`` times the unit.
+
+    ``wanted`` is the dimension that advice is given for, None: any.
 
     Raises:
         UnitError: if the unit is not known, or the result too large for a number.
@@ -184,7 +191,7 @@ def in_unit(number: float, unit: str, wanted: Dimension | None = None) -> Quanti
 
 
 def _instead_of(unit: str, wanted: Dimension | None) -> str:
-    """Return which unit of the wanted dimension (None: of any) is probably meant, or all that there are."""
+    """Return the unit of the dimension (None: any) that is probably meant, or all."""
     known = [name for name, (_, its) in UNITS.items() if wanted in {None, its}]
     if _SPELLINGS.get(unit) in known:
         return f"write {_SPELLINGS[unit]}"
@@ -229,7 +236,7 @@ _SPELLINGS = {
 
 
 def respelt(text: str, unit: str, dimension: Dimension) -> str | None:
-    """Return the quantity with the only unit of the dimension that can be meant by ``unit``, or None."""
+    """Return the quantity with the only unit of the dimension that fits ``unit``, or None."""
     known = [name for name, (_, its) in UNITS.items() if its == dimension]
     meant = _SPELLINGS.get(unit) or _SPELLINGS.get(unit.lower()) or slip_of(unit, known)
     if meant not in known or not text.rstrip().endswith(unit):
@@ -309,7 +316,9 @@ SMALLEST = 1 / LARGEST
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """Annotates a float that may be written with a unit. ``least`` is the smallest value that it can have.
+    """Annotates a float that may be written with a unit.
+
+    ``least`` is the smallest value that it can have.
 
     With ``sliding`` it is of the one dimension for joints that turn, and of the other for joints
     that slide.

@@ -1,4 +1,6 @@
-"""The guard, a process of the plan: it observes /tf and reports who publishes an edge that another process owns.
+"""The guard, a process of the plan.
+
+It observes /tf and reports who publishes an edge that another process owns.
 
 ``judge`` decides over messages and publishers, ``liveness`` over rates; ``relay`` passes messages
 on in strict mode, ``channel`` and ``ipc`` talk to the launcher. Must not import ``spec``,

@@ -1,4 +1,6 @@
-"""The guard's ends of the pipes to and from the launcher: orders in, events out, and what the next guard must know.
+"""The guard's ends of the pipes to and from the launcher.
+
+Orders in, events out, and what the next guard must know.
 
 Without a launcher there are no orders, and events go to the guard's own output. What a guard
 leaves to the one that follows it, should it die, the launcher keeps without looking into it:
@@ -75,7 +77,7 @@ class OrderReader:
             os.set_blocking(self._fd, False)
 
     def take(self) -> None:
-        """Carry out the orders that have come, and check the gates and the components that are to be loaded."""
+        """Carry out pending orders, and check the gates and components that are to load."""
         for line in self._lines():
             match GUARD_ORDERS.read(line):
                 case Absent(process):
@@ -103,7 +105,7 @@ class OrderReader:
 
 
 class EventWriter:
-    """Writes the events of one cycle at once, so that a guard that is killed leaves no half of them."""
+    """Writes the events of one cycle at once, so that a killed guard leaves no half of them."""
 
     def __init__(self, *, judges: bool) -> None:
         self._judges = judges
@@ -143,7 +145,10 @@ class EventWriter:
 
 
 class SilentEdges:
-    """Reports which edges that were live became silent, and which are no longer: the launcher counts them out."""
+    """Reports which edges that were live became silent, and which are no longer.
+
+    The launcher counts them out.
+    """
 
     def __init__(self, judges: Sequence[Judge], emit: Callable[[GuardEvent], None]) -> None:
         self._judges, self._emit = judges, emit
@@ -183,7 +188,7 @@ def recalled(env: Mapping[str, str]) -> dict[str, Any]:
 
 
 class Memory:
-    """Hands on what a judge knows, and a relay latches, part by part, whenever a part has changed."""
+    """Hands on what a judge knows and a relay latches, each part whenever it changes."""
 
     def __init__(
         self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]
@@ -210,7 +215,7 @@ class Memory:
 
 
 class SwitchMemory:
-    """Remembers which nodes have answered for their switches, so that nothing is reported twice."""
+    """Remembers which nodes have answered for their switches, so nothing repeats."""
 
     def __init__(
         self, switches: Switches, emit: Callable[[GuardEvent], None], left: Mapping[str, Any]

@@ -1,4 +1,6 @@
-"""What the guard has containers load and unload: by orders of the launcher, or, where there is none, by itself.
+"""What the guard has containers load and unload.
+
+By orders of the launcher, or, where there is none, by itself.
 
 A container is asked one thing at a time, in the order of the orders. Where no launcher gives
 orders, in units and containers of an export, the guard looks at each container now and then, and
@@ -95,7 +97,10 @@ class Components:
         jobs.append(_Job(order, request, since=time.monotonic()))
 
     def forget(self, process: str) -> None:
-        """Carry out no order about the component any more: it is stopped, or its container has ended."""
+        """Carry out no order about the component any more.
+
+        It is stopped, or its container has ended.
+        """
         self._loaded.pop(process, None)
         for name, jobs in self._jobs.items():
             self._jobs[name] = deque(job for job in jobs if job.order.process != process)
@@ -177,7 +182,10 @@ class Components:
         return False
 
     def _begins(self, job: _Job, container: Container, now: float, step: str) -> bool:
-        """Look whether the component is there, or load it; return False where that cannot be asked, and is answered."""
+        """Look whether the component is there, or load it.
+
+        Return False where that cannot be asked, and is answered.
+        """
         if step == "look" and not container.list.is_there:
             return True
         job.step, job.since, job.absent = step, now, 0
@@ -232,7 +240,10 @@ class Components:
 
 
 def _already(request: LoadRequest, there: Any) -> str:
-    """Return why a component is not loaded whose node the container has already: two would have one name."""
+    """Return why a component is not loaded whose node the container has already.
+
+    Two would have one name.
+    """
     number = there.unique_ids[list(there.full_node_names).index(request.node)]
     unload = f"ros2 component unload {request.container} {number}"
     return (

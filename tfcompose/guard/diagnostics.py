@@ -1,4 +1,4 @@
-"""What the guard knows, edge by edge, and as a page on /diagnostics (diagnostic_msgs/DiagnosticArray)."""
+"""The guard's knowledge edge by edge, and as /diagnostics (DiagnosticArray)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ OK, WARN, ERROR, STALE = 0, 1, 2, 3
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One line of a diagnostics page: ``level`` is one of OK, WARN, ERROR, STALE; ``values`` are keys and values."""
+    """One line of a diagnostics page: ``level`` is one of OK, WARN, ERROR, STALE.
+
+    ``values`` are keys and values.
+    """
 
     name: str
     level: int
@@ -83,7 +86,10 @@ def _level(edge: EdgeHealth) -> int:
 
 
 def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
-    """Return the status of what a strict guard held back: transforms by their sender's node, parent and child."""
+    """Return the status of what a strict guard held back.
+
+    Transforms by their sender's node, parent and child.
+    """
     lines = [
         (f"{parent} → {child} from {who}", str(count))
         for (who, parent, child), count in held.items()
@@ -93,7 +99,7 @@ def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
 
 
 def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) -> list[Status]:
-    """Return one status for the tree, with what is wrong now, and one for each owner, with its edges."""
+    """Return one status for the tree, with current faults, and one for each owner."""
     severe = any(one.severity == "error" for one in found)
     level = ERROR if severe else WARN if found else OK
     message = (
@@ -123,7 +129,7 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) 
 
 
 class DiagnosticsPage:
-    """Publishes what judges know of the robot on /diagnostics, once a second while anybody reads it."""
+    """Publishes the judges' knowledge on /diagnostics, once a second while anybody reads."""
 
     def __init__(self, node: Node, robot: str) -> None:
         self._robot = robot
@@ -139,7 +145,10 @@ class DiagnosticsPage:
         judges: Sequence[Judge],
         held: Callable[[], Mapping[tuple[str, str, str], int] | None],
     ) -> None:
-        """Publish if it is due and there is a subscriber; ``held`` says what a strict guard held back."""
+        """Publish if it is due and there is a subscriber.
+
+        ``held`` says what a strict guard held back.
+        """
         now = time.monotonic()
         if self._publisher is None or now < self._due:
             return

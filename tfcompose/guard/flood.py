@@ -1,4 +1,7 @@
-"""Reads what those send who flood the tree: beside everything else, and a little at a time, so that nothing waits."""
+"""Reads what those send who flood the tree.
+
+Beside everything else, and a little at a time, so that nothing waits.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ class FloodReader:
         self._data, self._rest, self._found = data, transforms(data.received.data), []
 
     def read(self, now: float) -> TFData | None:
-        """Read on for a moment, and return the declared edges of the message once it is read, if it has any."""
+        """Read on for a moment; return the message's declared edges once it is read."""
         if now - self._since >= 1.0:
             self._spent_s, self._since = 0.0, now
         if self._data is None or self._spent_s > BUSY_S:

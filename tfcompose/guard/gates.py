@@ -1,4 +1,6 @@
-"""What the guard requests from nodes: whether gates that the plan waits for are open, and whether switches apply.
+"""What the guard requests from nodes.
+
+Whether gates that the plan waits for are open, and whether switches apply.
 
 Gates are topics, services, and the lifecycle states of nodes, which the guard may also drive.
 Where no launcher gives orders, in units and containers, the guard brings nodes into their states
@@ -69,7 +71,7 @@ class Gates:
             self._nodes.pop(key).close()
 
     def check(self) -> None:
-        """Check all gates where it is time, and report which are open and what is observed at the others."""
+        """Check all gates that are due; report open ones and the state of the others."""
         now = time.monotonic()
         if not self._gates or now < self._due:
             return
@@ -152,7 +154,7 @@ class LifecycleDriver:
 
 
 def _some(what: str, names: list[str], wanted: str) -> str:
-    """Return the first names: those with another namespace, then those of the same, then the others."""
+    """Return the names in order: another namespace first, then the same, then the rest."""
     above, _, last = wanted.rpartition("/")
     names = sorted(
         names,
@@ -206,7 +208,10 @@ class Switches:
         return [one.node for one in self._nodes if one.done]
 
     def recall(self, answered: Collection[str]) -> None:
-        """Ask these no more, unless they leave: the guard before this one has; those that are not found yet, too."""
+        """Ask these no more, unless they leave: the guard before this one has.
+
+        Those that are not found yet, too.
+        """
         self._finds_until = time.monotonic() + FINDING_S
         for one in self._nodes:
             one.done = one.node in answered

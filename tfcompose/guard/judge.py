@@ -52,7 +52,7 @@ class JudgeMemory:
 
 @dataclass(slots=True)
 class Judge:
-    """The state of one watch over one plan, which observes ``settle_s`` before it reports all clear.
+    """The state of a watch over a plan; it observes ``settle_s`` before all clear.
 
     ``says_who`` says whether the ids of messages are those of the graph; where they are not, they
     tell senders apart. ``remapped`` says that what the plan's processes send is fenced off by
@@ -143,7 +143,7 @@ class Judge:
             self.ledger.forget_stamps()
 
     def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[GuardEvent]:
-        """Take who publishes on the global topics while the plan's own (moving, static) are ``topics``."""
+        """Take the publishers on the global topics while the plan's own are ``topics``."""
         return list(self._publishers.leaks(publishers, topics))
 
     def is_flooded_by(self, gid: bytes | None) -> bool:
@@ -151,7 +151,7 @@ class Judge:
         return gid in self.ledger.flooders
 
     def flooded_by(self, gid: bytes | None, transforms: int, now: float) -> None:
-        """Take a message of so many transforms from a publisher of more undeclared edges than are judged."""
+        """Take a message from a publisher with more undeclared edges than are judged."""
         self.ledger.count_flood(gid, transforms, now)
 
     def tick(self, now: float) -> list[GuardEvent]:
@@ -194,7 +194,10 @@ class Judge:
         return [found[edge.child] for edge in self.plan.edges]
 
     def wrong(self) -> list[Finding]:
-        """Return what was reported and is not over, worst first; silence and low rates are part of ``health``."""
+        """Return what was reported and is not over, worst first.
+
+        Silence and low rates are part of ``health``.
+        """
         return self.ledger.wrong()
 
     def absent(self, owner: str) -> None:
@@ -224,7 +227,7 @@ class Judge:
         )
 
     def recall(self, memory: JudgeMemory, now: float) -> list[GuardEvent]:
-        """Restore the state of the guard before this one, and return that the observation before the start is over."""
+        """Restore the previous guard's state; return that the initial observation is over."""
         self._finds_until = now + FINDING_S
         begun = memory.start
         self._start.begun, self._start.begun_ns = begun.begun, begun.begun_ns
@@ -247,7 +250,10 @@ class Judge:
         ]
 
     def _judge_stamps(self, judged: JudgedMessage, message: Message, now: float) -> float | None:
-        """Judge the stamps of an owner's message; return the age of the first in seconds, if known."""
+        """Judge the stamps of an owner's message.
+
+        Return the age of the first in seconds, if known.
+        """
         if message.static or not message.stamps_ns:
             return None
         # A message that waited for the guard says nothing of its sender's clock.

@@ -80,7 +80,10 @@ class EdgeHealth:
 
 @dataclass(slots=True)
 class WatchedTime:
-    """The seconds in which the guard ran: a clock that stops while the guard is kept from running."""
+    """The seconds in which the guard ran.
+
+    A clock that stops while the guard is kept from running.
+    """
 
     _seconds: float = 0.0
     _ticked: float | None = None
@@ -97,7 +100,10 @@ class WatchedTime:
         self._catching_up_until = until
 
     def is_behind(self, now: float) -> bool:
-        """Return whether what comes now may have waited: the guard was kept from running, or still catches up."""
+        """Return whether what comes now may have waited.
+
+        The guard was kept from running, or still catches up.
+        """
         stalled = self._ticked is not None and now - self._ticked > STALLED_S
         return stalled or now < self._catching_up_until
 
@@ -144,7 +150,7 @@ class Track:
             self.forget()
 
     def arrived(self, watched: float, now: float) -> None:
-        """Note an arrival. An edge that was silent is steady again with two arrivals close enough to each other."""
+        """Note an arrival; two arrivals close together end an edge's silence."""
         after = self.silent_after
         self.steady = after is not None and self.live and watched - self.heard <= after
         self.last, self.heard = now, watched
@@ -156,7 +162,10 @@ class Track:
         self.arrivals = Arrivals(int(STRETCH * self._window_ns))
 
     def rate(self) -> float | None:
-        """Return the rate over the window in hertz, without its longest gap; None while there is too little to say."""
+        """Return the rate over the window in hertz, without its longest gap.
+
+        None while there is too little to say.
+        """
         return self.arrivals.steady_rate(self._window_ns // 2)
 
 
@@ -170,7 +179,10 @@ class SilentMemory:
 
 @dataclass(frozen=True, slots=True)
 class LivenessMemory:
-    """What the next guard must know: the edges, by their children, that are live, slow and silent, and gone owners."""
+    """What the next guard must know.
+
+    The edges, by their children, that are live, slow and silent, and gone owners.
+    """
 
     live: tuple[str, ...]
     slow: tuple[str, ...]
@@ -179,7 +191,10 @@ class LivenessMemory:
 
 
 class Liveness:
-    """The planned edges and their owners; ``changes`` counts what was reported, and what became of owners."""
+    """The planned edges and their owners.
+
+    ``changes`` counts what was reported, and what became of owners.
+    """
 
     def __init__(self, plan: Plan) -> None:
         self.changes = 0
@@ -199,7 +214,10 @@ class Liveness:
         self._watched = WatchedTime()
 
     def absent(self, owner: str) -> None:
-        """Note that the owner was stopped on purpose: its edges are not live, and not missing either."""
+        """Note that the owner was stopped on purpose.
+
+        Its edges are not live, and not missing either.
+        """
         self._absent.add(owner)
         self.changes += 1
         self._gone.discard(owner)
@@ -225,7 +243,10 @@ class Liveness:
         return LivenessMemory(_children(live), _children(slow), silent, tuple(sorted(self._gone)))
 
     def recall(self, memory: LivenessMemory, now: float, until: float) -> None:
-        """Restore the previous guard's state, and report no silence before ``until``: discovery starts anew."""
+        """Restore the previous guard's state, and report no silence before ``until``.
+
+        Discovery starts anew.
+        """
         self._watched.begins_late(until)
         self._gone = set(memory.gone)
         for track in self._parted(self._planned(memory.live)):
@@ -294,7 +315,7 @@ class Liveness:
         return events
 
     def seconds_since(self, track: Track, now: float) -> tuple[float, float | None]:
-        """Return the age of the track's last arrival, and its rate in hertz, None while there is too little to say."""
+        """Return the age of the last arrival and the rate in Hz, None while unknown."""
         return now - track.last, track.rate() if track.silent_after is not None else None
 
     def silent(self) -> tuple[str, ...]:
@@ -319,7 +340,9 @@ class Liveness:
         self._watched.tick(now)
 
     def judge(self, now: float, speed: float = 1.0, *, paused: bool = False) -> list[GuardEvent]:
-        """Return which owners fell silent or slow since the last time, and came back: one event for each owner.
+        """Return which owners fell silent or slow since the last time, and came back.
+
+        One event for each owner.
 
         ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are
         lower, and in one that is ``paused`` nobody falls silent.
@@ -364,7 +387,10 @@ class Liveness:
         return missing
 
     def static_writers(self, nodes: Collection[str]) -> list[GuardEvent]:
-        """Take the nodes that write /tf_static now; an owner whose edges were live and that is gone is silent."""
+        """Take the nodes that write /tf_static now.
+
+        An owner whose edges were live and that is gone is silent.
+        """
         lost: dict[str, list[Track]] = {}
         events: list[GuardEvent] = []
         for track in self._in_order(self.tracks):
@@ -385,7 +411,10 @@ class Liveness:
 
 
 def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
-    """Return the event for tracks that fell silent or slow, or came back: ``change`` says which."""
+    """Return the event for tracks that fell silent or slow, or came back.
+
+    ``change`` says which.
+    """
     edges = [edge for track in tracks for edge in track.edges]
     named, are = listed([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
     match change:

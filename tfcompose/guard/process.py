@@ -74,7 +74,9 @@ REPORT_EVERY_S = 10.0
 
 
 class TopicWatch:
-    """Feeds a judge with a pair of topics (moving, fixed); where the plan is strict, passes on what is admitted.
+    """Feeds a judge with a pair of topics (moving, fixed).
+
+    Where the plan is strict, passes on what is admitted.
 
     ``private`` are the topics that the plan's processes are remapped to, where they are.
     """
@@ -167,7 +169,10 @@ class TopicWatch:
                 say(f"held back: {held}")
 
     def _take(self, data: Iterable[TFData], now: float) -> bool:
-        """Take messages, and the graph before, where it must say who sent some; return whether that was so."""
+        """Take messages, and the graph before, where it must say who sent some.
+
+        Return whether that was so.
+        """
         taken = [_with_id(one) for one in data]
         strangers = {one.received.gid for one in taken} - self._known.keys()
         self._known |= dict.fromkeys(strangers)
@@ -178,7 +183,7 @@ class TopicWatch:
         return bool(strangers)
 
     def _take_one(self, data: TFData, now: float) -> None:
-        """Take a message; what is long, or other than before from one who floods the tree, is read little by little."""
+        """Take a message; long or unfamiliar ones from a flooding publisher are read in parts."""
         received, judge = data.received, self.judge
         number = number_of_transforms(received.data)
         if number > self._most or judge.is_flooded_by(received.gid):
@@ -223,7 +228,10 @@ class TopicWatch:
 
 
 def _run_marks(plan: Plan, profile: str) -> RunMarks:
-    """Return what the environments of this run's processes say; a component is where its container is."""
+    """Return what the environments of this run's processes say.
+
+    A component is where its container is.
+    """
     inside = {
         (process.component.container, node): process.name
         for process in plan.components
@@ -242,7 +250,10 @@ def _run_marks(plan: Plan, profile: str) -> RunMarks:
 
 
 def _with_id(data: TFData) -> TFData:
-    """Return it with the id that it has instead, where the rmw does not say who sent it: that tells senders apart."""
+    """Return it with the id that it has instead, where the rmw does not say who sent it.
+
+    That tells senders apart.
+    """
     received = data.received
     return (
         data if received.gid else replace(data, received=replace(received, gid=received.raw_gid))
@@ -260,7 +271,7 @@ def held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int] | No
 
 
 def plans_by_topics(plan: Plan, guard: PlanProcess) -> dict[Topics, Plan]:
-    """Return, for each pair of topics (moving, fixed) that owners publish on, the plan with the edges on these.
+    """Return the plan for each pair of topics, with the edges published on them.
 
     The guard's own topics are always among them.
     """
@@ -364,7 +375,10 @@ def _watches(
     emit: Callable[[GuardEvent], None],
     left: dict[str, Any],
 ) -> list[TopicWatch]:
-    """Return the watch over each pair of topics; one that follows another guard, or has mode off, has begun."""
+    """Return the watch over each pair of topics.
+
+    One that follows another guard, or has mode off, has begun.
+    """
     judges, joins = own.plan.guard.mode != "off", bool(os.environ.get(JOINS))
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges and not joins else 0.0
     private = private_topics(own.plan) if REMAPPED in os.environ else None

@@ -1,4 +1,6 @@
-"""What a strict guard passes on: of what the plan's own processes send, which is fenced off, that which is theirs.
+"""What a strict guard passes on.
+
+Of what the plan's own processes send, which is fenced off, that which is theirs.
 
 A message that is all its sender's goes on as it is, byte for byte. Of others what is not is left
 out. Each sender of fixed edges has a latched publisher here, so that late joiners get all of them
@@ -43,7 +45,7 @@ MOST_REFUSED = 100
 
 @dataclass(slots=True)
 class _Latched:
-    """The fixed edges of one sender, by their child, and the process whose own topic they came on, if any."""
+    """The fixed edges of one sender by child, and the process whose topic they came on."""
 
     publisher: TFPublisher
     process: str
@@ -117,14 +119,17 @@ class Relay:
             self._send(encode(list(_admitted(data, message, admitted))), sent.process)
 
     def memory(self) -> dict[str, Any]:
-        """Return what the guard that follows must latch: not every sender latches all that it has sent."""
+        """Return what the guard that follows must latch.
+
+        Not every sender latches all that it has sent.
+        """
         return {
             f"{_LATCHED}{gid.hex()}": [one.process, b64encode(one.data).decode()]
             for gid, one in self._fixed.items()
         }
 
     def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
-        """Latch what the guard before this one latched and may still pass, and forget no sender before ``until``.
+        """Latch what the previous guard latched and may still relay, keeping senders a while.
 
         Until then the senders are found again.
         """
@@ -139,7 +144,7 @@ class Relay:
                 self._latch(gid, data, message, admits(message), entry[0])
 
     def update(self, writers: Collection[Publisher], now: float) -> None:
-        """Latch the edges of those no more who are not in the graph any more, and feed listeners."""
+        """Latch the edges of those that remain in the graph, and feed listeners."""
         if now >= self._finds_until:
             present = {writer.gid for writer in writers}
             for gid in [gid for gid in self._fixed if gid not in present]:
@@ -152,7 +157,10 @@ class Relay:
             self._feedback.update()
 
     def _forget_others(self, writers: Collection[Publisher], present: Collection[bytes]) -> None:
-        """Feed no more what everybody had from one that has left; where ids do not tell who, from all when all have."""
+        """Feed no more what everybody had from one that has left.
+
+        Where ids do not tell who, from all when all have.
+        """
         if self._feedback is None:
             return
         others = self._feedback.sources("")
@@ -161,7 +169,10 @@ class Relay:
         self._feedback.forget([source for source in others if source not in present])
 
     def _refuse(self, gid: bytes) -> None:
-        """Say once of a publisher that nothing of it is passed on. Its node's name may be an owner's."""
+        """Say once of a publisher that nothing of it is passed on.
+
+        Its node's name may be an owner's.
+        """
         if gid in self._refused or len(self._refused) >= MOST_REFUSED:
             return
         self._refused[gid] = None
@@ -220,7 +231,7 @@ def _admitted(
 
 
 class HeldBack:
-    """What was not passed on: ``counts`` are transforms, by the sender's node, parent and child."""
+    """What was not relayed: ``counts`` are transforms by sender's node, parent and child."""
 
     def __init__(self) -> None:
         self.counts: dict[tuple[str, str, str], int] = {}
@@ -236,7 +247,10 @@ class HeldBack:
                 self.counts[key] = self.counts.get(key, 0) + 1
 
     def report(self) -> str:
-        """Return how much was held back since the last time, and whose it is; empty if nothing was."""
+        """Return how much was held back since the last time, and whose it is.
+
+        Empty if nothing was.
+        """
         now = {
             key: count for key, count in self.counts.items() if count != self._reported.get(key)
         }
@@ -260,7 +274,7 @@ class _Listener:
 
 
 class Feedback:
-    """Sends to processes that are fenced off by remapping what others send, which their listeners would miss.
+    """Sends foreign TF to processes that are isolated by remapping.
 
     Moving edges go on as they come, fixed ones latched, all in one message, as long as there is a
     subscriber. ``own`` takes the ids of its publishers; the node listens there itself.
@@ -284,7 +298,10 @@ class Feedback:
                 one.fixed.publish(encode(self._rest(process)))
 
     def moving(self, data: bytes, sender: str) -> None:
-        """Send a message to all but the process that it is from; empty: it is from none of them."""
+        """Send a message to all but the process that it is from.
+
+        Empty: it is from none of them.
+        """
         for process, one in self._listeners.items():
             if one.moving and process != sender:
                 one.moving.publish(data)
@@ -301,7 +318,10 @@ class Feedback:
             self._outdate_all_but(self._fixed.pop(source)[0])
 
     def sources(self, sender: str) -> list[bytes]:
-        """Return the sources of fixed edges that are from that process; empty: from none of them."""
+        """Return the sources of fixed edges that are from that process.
+
+        Empty: from none of them.
+        """
         return [source for source, (process, _) in self._fixed.items() if process == sender]
 
     def _rest(self, process: str) -> list[Transform]:

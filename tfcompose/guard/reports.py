@@ -50,7 +50,10 @@ class Pace(Generic[Key]):
         self._reported: dict[Key, tuple[float, float]] = {}
 
     def is_due(self, key: Key, now: float, *, grows: bool) -> bool:
-        """Return whether a report is due, and take it as given; if it ``grows``, later ones wait."""
+        """Return whether a report is due, and take it as given.
+
+        If it ``grows``, later ones wait.
+        """
         reported, collected_s = self._reported.pop(key, (-COLLECTED_AT_MOST_S, 0.0))
         if now - reported < collected_s:
             self._reported[key] = (reported, collected_s)
@@ -65,7 +68,10 @@ class Pace(Generic[Key]):
 
 @dataclass(slots=True)
 class Flood:
-    """What a publisher of more undeclared edges than are judged has sent since then: messages, up to how long ones."""
+    """What a publisher of more undeclared edges than are judged has sent since then.
+
+    Messages, up to how long ones.
+    """
 
     since: float
     last: float = 0.0
@@ -88,7 +94,9 @@ class Flood:
 
 
 class PublisherReports:
-    """Publishers whose QoS or topic keeps listeners from receiving all of their messages; each is reported once.
+    """Publishers whose QoS or topic keeps listeners from receiving all of their messages.
+
+    Each is reported once.
 
     That holds for as long as guards follow each other; ``changes`` counts what was reported.
     """
@@ -105,7 +113,7 @@ class PublisherReports:
         return len(self._reported)
 
     def wrong_settings(self, publishers: Sequence[Publisher]) -> list[FindingShown]:
-        """Return the findings for those on the plan's topics whose quality of service no listener accepts."""
+        """Return findings for publishers whose quality of service no listener accepts."""
         return [
             found
             for one in publishers
@@ -130,7 +138,7 @@ class PublisherReports:
     def leaving_the_fence(
         self, publishers: Sequence[Publisher], senders: Senders, now: float
     ) -> list[Publisher]:
-        """Return the run's own publishers that send past the fence, once something of theirs was judged.
+        """Return the run's own publishers that bypass the filter, once judged.
 
         One that sends nothing for a while is returned then.
         """
@@ -163,7 +171,10 @@ class PublisherReports:
     def floods(
         self, senders: Senders, flooders: dict[bytes | None, Flood], now: float
     ) -> list[FindingShown]:
-        """Return the findings for publishers of more undeclared edges than are judged; forget those that have left."""
+        """Return the findings for publishers of more undeclared edges than are judged.
+
+        Forget those that have left.
+        """
         found = []
         for gid, one in list(flooders.items()):
             publisher = senders.known.get(gid) if gid is not None else None
@@ -179,7 +190,7 @@ class PublisherReports:
     def leaks(
         self, publishers: Sequence[Publisher], topics: tuple[str, str]
     ) -> list[FindingShown]:
-        """Return the findings for the plan's nodes on the global topics, while its own (moving, static) are others."""
+        """Return findings for the plan's nodes on the global topics instead of their own."""
         inside = f"/{self._plan.ros.namespace.strip('/')}/"
         return [
             found

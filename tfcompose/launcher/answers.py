@@ -93,7 +93,7 @@ def answer(
     base: Mapping[str, str],
     environment: Environment,
 ) -> Outcome:
-    """Return the answer, what it means for the machine, and, for another plan, its file and commands."""
+    """Return the answer, its meaning for the machine, and a new plan's file and commands."""
     match request:
         case DownRequest():
             return Done(), request, None
@@ -175,7 +175,7 @@ def _plain_file(file: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """The processes that are in both plans and different, and the fixed frames that listeners keep as they were."""
+    """The processes that differ between two plans, and fixed frames that listeners keep."""
 
     changed: frozenset[str]
     held: tuple[str, ...]
@@ -206,7 +206,10 @@ def _bytes(folder: Path, name: str | None) -> bytes | None:
 
 
 def _held(old: Plan, new: Plan) -> tuple[str, ...]:
-    """Return the fixed edges that vanish: tf2 never forgets one, so listeners keep it until they start anew."""
+    """Return the fixed edges that vanish.
+
+    Tf2 never forgets one, so listeners keep it until they start anew.
+    """
     children = {edge.child for edge in new.edges}
     return tuple(
         edge.name for edge in old.edges if edge.kind == "static" and edge.child not in children

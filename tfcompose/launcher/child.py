@@ -1,4 +1,4 @@
-"""One child process: it dies with the launcher, leads a process group of its own, and is read without waiting.
+"""One child process: bound to the launcher, leading its own group, read without waiting.
 
 The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own
 children; for those there is the reaper.
@@ -113,7 +113,10 @@ def _text(line: bytes) -> str:
 
 
 class Bucket:
-    """How much more of a process's output is taken now, for all its pipes together; and what was thrown away."""
+    """How much more of a process's output is taken now, for all its pipes together.
+
+    And what was thrown away.
+    """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -152,7 +155,10 @@ class Pipe:
         os.set_blocking(file.fileno(), False)
 
     def read(self) -> int | None:
-        """Pass on some of what is there to read: how many bytes, 0 at the end, None if nothing is there now."""
+        """Pass on some of what is there to read.
+
+        How many bytes, 0 at the end, None if nothing is there now.
+        """
         try:
             data = self.file.read(READ_SIZE)
         except OSError as error:  # what a pseudo-terminal says when nobody has its other end
@@ -222,7 +228,7 @@ class Child:
 
     @property
     def last_lines(self) -> tuple[str, ...]:
-        """Its last lines of output; stderr comes last and takes precedence, because two pipes have no common order."""
+        """Its last lines of output, stderr last, because two pipes have no common order."""
         return (*self.last_out, *self.last_err)[-LAST_LINES:]
 
 
@@ -268,7 +274,7 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
 def _on_terminals(
     command: Command, before_the_program: Callable[[], None], pass_fds: tuple[int, ...]
 ) -> subprocess.Popen[bytes]:
-    """Start the command with a pseudo-terminal each for output and errors, which are read as pipes are.
+    """Start the command with pseudo-terminals for output and errors.
 
     Raises:
         OSError: if it cannot be started.
@@ -300,7 +306,10 @@ def _on_terminals(
 
 
 def has_ended(pid: int) -> bool:
-    """Return whether the child has ended. It stays a zombie, so that its group's number is not given away."""
+    """Return whether the child has ended.
+
+    It stays a zombie, so that its group's number is not given away.
+    """
     return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
@@ -312,7 +321,7 @@ def kill_group(pid: int, number: int) -> None:
 
 @contextlib.contextmanager
 def subreaper() -> Iterator[None]:
-    """Have what children leave behind become this process's own children, instead of init's, during the block."""
+    """Adopt orphaned descendants in place of init during the block."""
     _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
     try:
         yield
@@ -328,7 +337,10 @@ def end_with(parent: int, number: signal.Signals) -> None:
 
 
 def reap_adopted(known: Collection[int]) -> None:
-    """Take the exit codes of children that have ended and are not known: those that were left to this process."""
+    """Take the exit codes of children that have ended and are not known.
+
+    Those that were left to this process.
+    """
     with contextlib.suppress(ChildProcessError):
         while found := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
             if found.si_pid in known:

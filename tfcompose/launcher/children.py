@@ -64,7 +64,7 @@ EVENT_LIMIT = 1024 * 1024
 
 
 class Children:
-    """The processes that run. ``happened`` is given what becomes of them, ``notify`` what they write.
+    """The running processes. ``happened`` takes their events, ``notify`` their output.
 
     ``writer`` says, of a process and a line that it wrote, whose line it is: a container writes
     its components'. With a run's id, what they leave behind is this process's to reap and to end.
@@ -96,7 +96,7 @@ class Children:
     def start(
         self, process: PlanProcess, command: Command, guard: GuardPipes | None = None
     ) -> Event:
-        """Start the process, with the pipes of a guard if it is one, and return what came of it."""
+        """Start the process, with pipes if it is a guard, and return what came of it."""
         if process.name in self._held:
             return self._let_go(process.name)
         try:
@@ -125,7 +125,10 @@ class Children:
         return Started(process.name, child.popen.pid)
 
     def prepare(self, process: PlanProcess, command: Command) -> None:
-        """Have one of tfcompose's own load what it needs; it joins ROS when it is started, without that delay."""
+        """Have one of tfcompose's own load what it needs.
+
+        It joins ROS when it is started, without that delay.
+        """
         theirs, ours = os.pipe()
         try:
             self._spawn(
@@ -174,7 +177,7 @@ class Children:
             reap_adopted(self._groups() | {self._reaper.pid})
 
     def find_strays(self) -> None:
-        """Note which groups there are of what descends from this process, and have a reaper that knows them."""
+        """Note the groups of this process's descendants, and have a reaper that knows them."""
         if not self._run_id:
             return
         if self._reaper.ended:
@@ -293,7 +296,10 @@ class Children:
             self._happened(event)
 
     def _ended(self, child: Child) -> None:
-        """Take what the process leaves behind: the rest of its group, its last words, and its exit code."""
+        """Take what the process leaves behind.
+
+        The rest of its group, its last words, and its exit code.
+        """
         kill_group(child.popen.pid, signal.SIGKILL)
         for pipe in list(child.pipes):
             self._drain(child, pipe)

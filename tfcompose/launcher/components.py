@@ -51,7 +51,10 @@ def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -
 
 
 def _ended(step: Transition, one: Tracked, why: str, message: str) -> None:
-    """Take a component that was not loaded, or is not there any more: it is loaded again, or has failed."""
+    """Take a component that was not loaded, or is not there any more.
+
+    It is loaded again, or has failed.
+    """
     name = one.process.name
     if step.state.stop:
         step.enter(name, "stopped", why)
@@ -88,7 +91,10 @@ _BEGINNING = 300
 
 
 def writer_of(state: State, process: str, line: str) -> str:
-    """Return whose a line is that a process wrote: of a container, the component's whose logger is named in it."""
+    """Return whose a line is that a process wrote.
+
+    Of a container, the component's whose logger is named in it.
+    """
     components = state.components_of(process)
     if not components:
         return process

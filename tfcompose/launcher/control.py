@@ -63,7 +63,10 @@ def _at(place: RuntimeDir) -> Iterator[str]:
 
 
 def listen(place: RuntimeDir) -> socket.socket:
-    """Return the listening socket of a robot whose lock this process holds; one that was left there is replaced."""
+    """Return the listening socket of a robot whose lock this process holds.
+
+    One that was left there is replaced.
+    """
     with contextlib.suppress(FileNotFoundError):
         place.socket.unlink()
     listener = socket.socket(socket.AF_UNIX)
@@ -131,7 +134,7 @@ def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
 
 
 class Control:
-    """The launcher's end. ``answer`` is given each request and returns the object that is sent back."""
+    """The launcher's end. ``answer`` takes each request and returns the object to send."""
 
     def __init__(
         self,

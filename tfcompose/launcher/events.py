@@ -43,7 +43,10 @@ class StartFailed:
 
 @dataclass(frozen=True, slots=True)
 class Exited:
-    """A process ended: exit code, or minus the signal's number. ``last_lines`` is the end of its log."""
+    """A process ended: exit code, or minus the signal's number.
+
+    ``last_lines`` is the end of its log.
+    """
 
     name: str
     returncode: int
@@ -130,7 +133,10 @@ class Kill:
 
 @dataclass(frozen=True, slots=True)
 class LoadComponent:
-    """Have the guard load a component; ``number`` is that of its start, ``again`` says that another was told before."""
+    """Have the guard load a component.
+
+    ``number`` is that of its start, ``again`` says that another was told before.
+    """
 
     name: str
     number: int

@@ -63,7 +63,7 @@ def not_started(name: str, why: str) -> Finding:
 
 
 def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
-    """Return the finding for a process that is not started, because it waits for what cannot come any more."""
+    """Return the finding for a process that waits for something that cannot come."""
     return finding(
         "TF808",
         f"{name} is not started: it waits for {other} to be {what}, and {other} {why}",

@@ -30,7 +30,7 @@ _PARTITIONS = "partitions"
 
 
 def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partitions: str) -> str:
-    """Return the text of a profile file that puts what writes or reads these topics into the partitions.
+    """Return a profile file that puts readers or writers of topics into partitions.
 
     What ``file`` holds stays, but for its comments.
 

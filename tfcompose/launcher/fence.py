@@ -1,4 +1,4 @@
-"""How a strict plan's processes are fenced off, so that only the guard receives what they send on TF.
+"""Isolation of a strict plan's processes: only the guard receives their TF.
 
 Where their rmw is Fast DDS, a profile file moves their writers into a DDS partition. Elsewhere, or
 where the plan says so, their TF topics are remapped to topics of their own: then their listeners
@@ -42,7 +42,10 @@ _LEAVES = re.compile(rf"\b({'|'.join(PROFILE_VARIABLES)})\b(=(?P<file>[^\s;&|]*)
 
 
 def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
-    """Return how the plan's processes are fenced off; empty: they are not. ``base`` is their common environment."""
+    """Return how the plan's processes are fenced off; empty: they are not.
+
+    ``base`` is their common environment.
+    """
     if plan.guard.mode != "strict":
         return ""
     if plan.guard.fence != "auto":
@@ -56,7 +59,7 @@ def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
 
 
 def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
-    """Return the process with its TF on its own topics, also where it uses the names that the plan gives to them.
+    """Return the process with its TF on its own topics, whatever names it uses.
 
     ROS takes the first remapping that fits, so these come first.
     """
@@ -99,7 +102,7 @@ def not_remapped(plan: Plan) -> list[Finding]:
 def by_partition(
     plan: Plan, commands: Mapping[str, Command], folder: Path
 ) -> tuple[dict[str, Command], list[Finding]]:
-    """Return the commands with profiles that move what they send on TF into a partition, and why that cannot be."""
+    """Return the commands with profiles that partition their TF, and why that fails."""
     judged = judged_topics(plan)
     fenced: dict[str, Command] = {}
     wrong: dict[tuple[str, str], list[str]] = {}
@@ -166,7 +169,10 @@ def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) ->
 
 
 def _refuse_own_profile(process: PlanProcess, command: Command) -> None:
-    """Refuse an owner whose command names another profile file by itself: it would leave the fence."""
+    """Refuse an owner whose command names another profile file by itself.
+
+    It would leave the fence.
+    """
     found = next(filter(None, map(_LEAVES.search, command.argv)), None) if process.owns else None
     if found is None:
         return

@@ -1,4 +1,6 @@
-"""The launch file that ``ros2 launch`` runs: the user's, with the plan's settings for all of its nodes.
+"""The launch file that ``ros2 launch`` runs.
+
+The user's, with the plan's settings for all of its nodes.
 
 The variable ``TFCOMPOSE_LAUNCH`` holds it as JSON: ``file``, ``arguments``, ``namespace``,
 ``remap``, ``sim_time``. The Python of ROS runs this file, and tfcompose need not be installed
@@ -17,7 +19,10 @@ from launch_ros.actions import PushRosNamespace, SetParameter, SetRemap
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the launch description: the file in a group that sets namespace, remappings and simulated time."""
+    """Return the launch description.
+
+    The file in a group that sets namespace, remappings and simulated time.
+    """
     given = json.loads(os.environ["TFCOMPOSE_LAUNCH"])
     group = [PushRosNamespace(given["namespace"])] if given["namespace"] else []
     group += [SetRemap(old, new) for old, new in given["remap"].items()]

@@ -86,7 +86,10 @@ if TYPE_CHECKING:
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
-    """Return what is known after the event, and what is to be done, in that order. ``now`` is in seconds."""
+    """Return what is known after the event, and what is to be done, in that order.
+
+    ``now`` is in seconds.
+    """
     if state.finished:
         return state, ()
     transition = Transition(state, now)
@@ -188,7 +191,7 @@ def _started(step: Transition, name: str, pid: int) -> None:
 
 
 def _introduce(step: Transition, owner: Tracked) -> None:
-    """Tell a guard that joins what became of an owner meanwhile, whatever the one before it knew."""
+    """Send a joining guard what happened to an owner meanwhile."""
     name = owner.process.name
     runs = owner.state in ("starting", "running", "expected")
     missing = any(child not in step.state.live for _, child in owner.process.owns)
@@ -255,7 +258,9 @@ def _complete(step: Transition, edges: int) -> None:
 
 
 def _violation(step: Transition, found: Finding, process: str) -> None:
-    """Report what the guard found; by the plan's policy, ``process``, which surely did it, is stopped, or everything.
+    """Report what the guard found.
+
+    By the plan's policy, ``process``, which surely did it, is stopped, or everything.
 
     ``process`` is empty where it is not sure, or not a process of the plan.
     """
@@ -276,7 +281,7 @@ def _process_of(state: State, pid: int) -> str:
 
 
 def _left_the_fence(step: Transition, found: Finding, process: str, pid: int) -> None:
-    """Report a process that sends past a strict plan's fence, and stop it, or everything, if that is the policy.
+    """Report a process that bypasses a strict plan's filter, and stop it by policy.
 
     ``process`` is empty where one of the plan's started ``pid``, and nothing says which.
     """
@@ -396,7 +401,10 @@ def _go_on(step: Transition) -> None:
 
 
 def _before_clear(state: State) -> tuple[str, ...]:
-    """Return what starts before the guard has listened: itself, and what it waits for, such as a Zenoh router."""
+    """Return what starts before the guard has listened.
+
+    Itself, and what it waits for, such as a Zenoh router.
+    """
     return (state.guard, *state.tracked[state.guard].process.after) if state.guard else ()
 
 

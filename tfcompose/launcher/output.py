@@ -1,4 +1,6 @@
-"""Where the launcher's notices and the output of processes go: to a person, to the control socket, and into files.
+"""Where the launcher's notices and the output of processes go.
+
+To a person, to the control socket, and into files.
 
 The robot does not wait for its reader: a terminal that was stopped, a pipe to a pager. What cannot
 be written at once is kept, up to a limit; beyond it, lines of processes are left out and counted,
@@ -98,7 +100,7 @@ class NonBlockingOutput:
             self._announced = self._announced if self._owed else 0
 
     def finish(self, patience_s: float = 0.5) -> None:
-        """Write the rest, as far as the reader takes it in that time, and forget what it does not take."""
+        """Write the rest, as far as the reader takes it in that time, and drop what remains."""
         with contextlib.suppress(OSError):
             while self._owed and select.select([], [self.fd], [], patience_s)[1]:
                 self.push()
@@ -170,7 +172,10 @@ class Notifier:
             self._try(partial(self._report, notice))
 
     def catch_up(self) -> None:
-        """Bring what is shown up to date; have what is owed written when its reader is ready again."""
+        """Bring what is shown up to date.
+
+        Have what is owed written when its reader is ready again.
+        """
         if self._refresh and self._report:
             self._try(self._refresh)
         output = self._output
@@ -278,7 +283,7 @@ class Logs:
 
 
 def _ensure_own(folder: Path) -> None:
-    """Refuse a folder of another user, as a shared ROS_LOG_DIR may have, and a link that leads elsewhere.
+    """Refuse another user's folder, as in a shared ROS_LOG_DIR, and links elsewhere.
 
     Raises:
         OSError: if it is a link, or another user's.
@@ -291,7 +296,7 @@ def _ensure_own(folder: Path) -> None:
 
 
 def _ensure_kept(folder: Path) -> None:
-    """Refuse a folder of another user than root, who could exchange what is in it for a link at any time.
+    """Refuse a folder whose owner, not root, could replace its content by a link.
 
     Raises:
         OSError: if it is another user's.
@@ -308,7 +313,9 @@ def logged(folder: Path) -> list[str]:
 
 
 def last_modified(folder: Path) -> float:
-    """Return when a line was last written below the folder, in seconds since 1970; 0 where there is none.
+    """Return when a line was last written below the folder, in seconds since 1970.
+
+    0 where there is none.
 
     A folder's own time is only that of its last new file.
     """
@@ -338,13 +345,13 @@ class Follower:
     """Reads what is added to the logs, across turning over."""
 
     def __init__(self, folder: Path, names: list[str], *, back: int = 0) -> None:
-        """Begin at the end of what is there now, or with the first line within so many bytes before it."""
+        """Begin at the current end, or at the first line within so many bytes before it."""
         self._folder, self._names = folder, names
         self._at = {name: self._before(back, *self._end(name), name) for name in names}
         self._rest = dict.fromkeys(names, b"")
 
     def more(self) -> list[tuple[str, str, str]]:
-        """Return (time, process, text) of the lines that came since the last call, oldest first."""
+        """Return (time, process, text) of the lines since the last call, oldest first."""
         found = [line for name in self._names for line in self._more(name)]
         return sorted(found, key=lambda line: line[0])
 

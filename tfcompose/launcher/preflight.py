@@ -1,4 +1,6 @@
-"""Before anything is started: the command of each process, and all that cannot work on this machine, at once.
+"""Before anything is started.
+
+The command of each process, and all that cannot work on this machine, at once.
 
 What only the starting machine knows stands in a plan as a placeholder, ``tfcompose.model.plan``
 lists them. A ROS package's program, ``${executable:PACKAGE/NAME}``, is ``lib/PACKAGE/NAME`` below
@@ -63,7 +65,9 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     environment: Environment,
     built_in: Path | None = None,
 ) -> tuple[dict[str, Command], list[Finding]]:
-    """Return each process's command, and what is wrong; with anything wrong, nothing should be started.
+    """Return each process's command, and what is wrong.
+
+    With anything wrong, nothing should be started.
 
     ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
     """
@@ -207,14 +211,17 @@ def _promises(process: PlanProcess) -> tuple[str, ...]:
 
 
 def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
-    """Return the folder that the process runs in, an absolute path without ``..`` where the plan has one."""
+    """Return the process's folder as an absolute path without ``..``, if the plan has one."""
     if process.cwd is None:
         return _here()
     return Path(os.path.normpath(build_dir / _filled(process.cwd, process, plan_file, build_dir)))
 
 
 def _here() -> Path:
-    """Return the folder that this program runs in; where it was removed meanwhile, the one that it was."""
+    """Return the folder that this program runs in.
+
+    Where it was removed meanwhile, the one that it was.
+    """
     try:
         return Path.cwd()
     except FileNotFoundError:
@@ -253,7 +260,10 @@ def _filled(
 
 @dataclass(frozen=True, slots=True)
 class NotFound:
-    """A program that was not found: its process, its name, the folders searched, and what may help."""
+    """A program that was not found.
+
+    Its process, its name, the folders searched, and what may help.
+    """
 
     process: str
     program: str

@@ -1,4 +1,4 @@
-"""The kernel's processes: who descends from whom, what a run left behind, and what groups of them use.
+"""The kernel's processes: descendants, what a run left behind, and usage of groups.
 
 They are read from /proc, not with psutil: a process differs from a later one of the same number by
 when it began, in clock ticks since the machine's start, which holds in every process and whatever
@@ -48,7 +48,9 @@ def _stat(pid: int | str) -> list[str]:
 
 
 def began(pid: int | str) -> int:
-    """Return when the process began, in clock ticks since the machine's start; ``self`` is this process.
+    """Return when the process began, in clock ticks since the machine's start.
+
+    ``self`` is this process.
 
     Raises:
         OSError: if it has ended.
@@ -65,7 +67,7 @@ def is_suspended(pid: int) -> bool:
 
 
 def descendants(ancestor: int, but: int) -> dict[int, int]:
-    """Return the group of each process that descends from ``ancestor``, by its number, without ``but`` and its own."""
+    """Return the group of each descendant of ``ancestor``, without ``but`` and its own."""
     parents, groups = {}, {}
     for pid in _all_pids():
         with contextlib.suppress(OSError, IndexError, ValueError):
@@ -89,7 +91,9 @@ def descendants(ancestor: int, but: int) -> dict[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Leftover:
-    """A process that a run started: its number, its run's id, its command, and when it began (clock ticks).
+    """A process that a run started.
+
+    Its number, its run's id, its command, and when it began (clock ticks).
 
     ``launcher`` is the number of the run's launcher if that one still runs: then nothing was left
     behind. ``process`` is the plan's process that started it, as far as its environment names one.
@@ -109,7 +113,10 @@ def launcher_mark() -> str:
 
 
 def leftovers(run: str) -> list[Leftover]:
-    """Return the processes whose run's id is, or begins with, ``run``: "rover@0:" finds all of rover's runs."""
+    """Return the processes whose run's id is, or begins with, ``run``.
+
+    "rover@0:" finds all of rover's runs.
+    """
     found = []
     for pid in _all_pids():
         with contextlib.suppress(OSError, ValueError, IndexError):

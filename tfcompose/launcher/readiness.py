@@ -1,4 +1,6 @@
-"""When a process may start and when it is ready: what it waits for, and what is reported of one that is late.
+"""When a process may start and when it is ready.
+
+What it waits for, and what is reported of one that is late.
 
 A process waits for others, as the plan's ``after`` says, before it is started; and for its own
 gate to open before it counts as ready.
@@ -39,7 +41,10 @@ def unmet(state: State, one: Tracked) -> tuple[tuple[str, StartCondition], ...]:
 
 
 def unmet_in_words(state: State, one: Tracked) -> str:
-    """Return what a process that was not started waits for: "slam to be ready and map to be done", or ""."""
+    """Return what a process that was not started waits for.
+
+    "slam to be ready and map to be done", or "".
+    """
     return " and ".join(f"{name} to be {what}" for name, what in unmet(state, one))
 
 
@@ -151,7 +156,10 @@ def late_at(state: State, one: Tracked) -> float | None:
 
 
 def _is_awaited(one: Tracked) -> bool:
-    """Return whether it is expected to become ready by itself; of a component, whether its container was asked."""
+    """Return whether it is expected to become ready by itself.
+
+    Of a component, whether its container was asked.
+    """
     return one.state in ("running", "expected") or (
         one.state == "starting" and one.process.component is not None
     )

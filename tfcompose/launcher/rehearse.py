@@ -1,7 +1,9 @@
-"""Check of whether a plan's share could be started on this machine: ``tfcompose rehearse PLAN HOST``.
+"""Check of whether a plan's share could be started on this machine.
 
-Whoever deploys runs it on a host, with the environment that the unit has, before anything changes. It
-prints the findings as one line of JSON.
+``tfcompose rehearse PLAN HOST``.
+
+Whoever deploys runs it on a host, with the environment that the unit has, before anything changes.
+It prints the findings as one line of JSON.
 """
 
 from __future__ import annotations

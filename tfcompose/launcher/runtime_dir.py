@@ -1,4 +1,6 @@
-"""The runtime directory of a robot: a folder that only the user can open, with a lock, a control socket and the plan.
+"""The runtime directory of a robot.
+
+A folder that only the user can open, with a lock, a control socket and the plan.
 
 A robot is one name in one ROS domain; a host's share of it has the host in its name. Its folder is
 in XDG_RUNTIME_DIR, or else in ``/run/user/UID``, or else in ``tfcompose-UID`` below the folder for
@@ -42,7 +44,7 @@ class RuntimeDirError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """Who runs a robot: the launcher's process number, since when (seconds since 1970), and the run's id."""
+    """Who runs a robot: the launcher's pid, its start (seconds since 1970), the run's id."""
 
     pid: int
     since: float
@@ -78,7 +80,7 @@ class RuntimeDir:
         return self.folder / "control"
 
     def plan_folder(self, digest: str) -> Path:
-        """Return where a plan with its files is copied to, so that a build does not affect a run."""
+        """Return where a plan with its files is copied to, so that builds do not affect a run."""
         return self.folder / f"{_PLAN}{digest}"
 
     def plan_folders(self) -> list[Path]:
@@ -98,7 +100,10 @@ class RuntimeDir:
 
 
 class Lock:
-    """One run at a time: held while this process lives, however it ends. Children do not inherit it."""
+    """One run at a time: held while this process lives, however it ends.
+
+    Children do not inherit it.
+    """
 
     def __init__(self, directory: RuntimeDir) -> None:
         """Take the lock, or raise BlockingIOError."""
@@ -143,7 +148,10 @@ def _open_lock(directory: RuntimeDir) -> int:
 
 
 def _is_held(descriptor: int) -> bool:
-    """Return whether a launcher runs the robot: a check shares the lock for a moment with other checks."""
+    """Return whether a launcher runs the robot.
+
+    A check shares the lock for a moment with other checks.
+    """
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -175,7 +183,9 @@ def _read_holder(descriptor: int) -> Holder | None:
 
 
 def runtime_dir_of(plan: Plan, env: Mapping[str, str]) -> RuntimeDir:
-    """Return the runtime directory of the plan's robot in its domain; the folder above it is there afterwards.
+    """Return the runtime directory of the plan's robot in its domain.
+
+    The folder above it is there afterwards.
 
     Raises:
         RuntimeDirError: if there is no folder that only this user can open.
@@ -251,7 +261,9 @@ def substitute_of(directory: RuntimeDir) -> RuntimeDir:
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder, and those above it, for this user alone; but not what the system makes for users.
+    """Make a folder, and those above it, for this user alone.
+
+    But not what the system makes for users.
 
     Raises:
         OSError: if it cannot be made.

@@ -1,4 +1,6 @@
-"""What the process machine knows, and one step of it while it is being taken: what is known, and what is to be done.
+"""What the process machine knows, and one step of it while it is being taken.
+
+What is known, and what is to be done.
 
 Times are seconds of one monotonic clock. What is known are values only: a step replaces them.
 """
@@ -250,7 +252,7 @@ class Transition:
         self.notify(FindingShown(found))
 
     def fail_process(self, name: str, found: Finding) -> None:
-        """Report that the process has failed for good, and stop everything, unless the run goes on without it."""
+        """Report that the process failed for good, and stop everything if it is required."""
         one = self.state.tracked[name]
         if one.process.required is not False:
             self.fail(found)
@@ -265,7 +267,10 @@ class Transition:
             )
 
     def fail(self, found: Finding) -> None:
-        """Report the finding and stop everything; once that is under way, further failures follow from it."""
+        """Report the finding and stop everything.
+
+        Once that is under way, further failures follow from it.
+        """
         if self.state.stop is None:
             self.report(found)
             self.update(because=(found.message, *(note.message for note in found.notes)))

@@ -44,7 +44,10 @@ def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
 
 
 def process_exited(step: Transition, event: Exited) -> None:
-    """Take the end of a process: meant, to be followed by a restart, or a failure; components go with a container."""
+    """Take the end of a process: meant, to be followed by a restart, or a failure.
+
+    Components go with a container.
+    """
     _take_end(step, event)
     lose_components(step, event.name)
 
@@ -89,7 +92,10 @@ def _take_end(step: Transition, event: Exited) -> None:
 
 
 def _is_to_end(state: State, process: PlanProcess) -> bool:
-    """Return whether the process is there to end: it is ready then, or another one waits until it is done."""
+    """Return whether the process is there to end.
+
+    It is ready then, or another one waits until it is done.
+    """
     ends = process.ready is not None and process.ready.kind == "exit"
     return ends or any(
         one.process.after.get(process.name) == "done" for one in state.tracked.values()
@@ -97,7 +103,10 @@ def _is_to_end(state: State, process: PlanProcess) -> bool:
 
 
 def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:
-    """Have a guard that died follow itself: what it reported holds, and the next one is given its memory."""
+    """Have a guard that died follow itself.
+
+    What it reported holds, and the next one is given its memory.
+    """
     if not step.state.memory:
         lose_edges(step, one)
     unwatched = step.now if step.state.unwatched is None else step.state.unwatched
@@ -125,7 +134,10 @@ def lose_edges(step: Transition, one: Tracked) -> None:
 
 
 def lose_components(step: Transition, container: str) -> None:
-    """Take the components of a container as gone with it; those that are wanted come again when it is ready again."""
+    """Take the components of a container as gone with it.
+
+    Those that are wanted come again when it is ready again.
+    """
     for one in step.state.components_of(container):
         if one.alive or one.state == "backoff":
             lose_edges(step, one)
@@ -142,7 +154,10 @@ def lose_components(step: Transition, container: str) -> None:
 
 
 def left(step: Transition, one: Tracked, how: str) -> None:
-    """Take a process that was meant to end as ended: it stays so, is started again, or leaves the plan."""
+    """Take a process that was meant to end as ended.
+
+    It stays so, is started again, or leaves the plan.
+    """
     name = one.process.name
     step.track(name, one)
     step.enter(name, "stopped", how, level=0, failures=0)
@@ -168,7 +183,10 @@ def _restart_after(step: Transition, one: Tracked, event: Exited) -> None:
 def schedule_restart(
     step: Transition, one: Tracked, how: str, failure: Callable[[str], Finding]
 ) -> None:
-    """Have a process started again after a while, unless it was too often; ``failure`` makes the finding then."""
+    """Have a process started again after a while, unless it was too often.
+
+    ``failure`` makes the finding then.
+    """
     name, times = one.process.name, step.state.times
     most = one.process.restart_limit
     failures = 1 if step.now - one.since >= times.steady_s else one.failures + 1
@@ -232,7 +250,7 @@ def process_requested(step: Transition, request: ProcessRequest) -> None:
 
 
 def follow_plan(step: Transition, event: NewPlan) -> None:
-    """Follow another plan: stop what it has no more, start what is new, restart what is different."""
+    """Follow another plan: stop removed processes, start new ones, restart changed ones."""
     state, plan = step.state, event.plan
     before = state.tracked
     guards = [process.name for process in plan.processes if process.kind == "guard"]
@@ -315,7 +333,10 @@ def _time_up(step: Transition) -> None:
 
 
 def edge_taken(step: Transition, found: Finding) -> None:
-    """Stop everything, because an edge of the plan is published already; each such edge is reported."""
+    """Stop everything, because an edge of the plan is published already.
+
+    Each such edge is reported.
+    """
     stop = step.state.stop
     if stop is None or stop.cause == "taken":
         step.report(found)
@@ -326,7 +347,9 @@ def edge_taken(step: Transition, found: Finding) -> None:
 
 
 def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
-    """Return what the process is sent, each when the one before did not help: its own signal, SIGTERM, SIGKILL.
+    """Return what the process is sent, each when the one before did not help.
+
+    Its own signal, SIGTERM, SIGKILL.
 
     To unload a component is one step, too.
     """
@@ -338,7 +361,7 @@ def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
 
 
 def send_due_signals(step: Transition) -> None:
-    """Signal processes that are to end, in reverse order of their start, and more firmly where that did not help."""
+    """Signal ending processes in reverse order of start, escalating if needed."""
     alive = [one for one in step.state.tracked.values() if one.alive]
     for name in [one.process.name for one in sorted(alive, key=lambda one: -one.order)]:
         one = step.state.tracked.get(name)
@@ -360,7 +383,10 @@ def send_due_signals(step: Transition) -> None:
 
 
 def _end_component(step: Transition, one: Tracked, level: int, container: str) -> None:
-    """Have a component unloaded, if it is time; where everything is stopped, it ends with its container."""
+    """Have a component unloaded, if it is time.
+
+    Where everything is stopped, it ends with its container.
+    """
     name, state = one.process.name, step.state
     if level and state.stop and state.tracked[container].state != "expected":
         step.enter(name, "stopped", f"with {container}")
@@ -372,7 +398,10 @@ def _end_component(step: Transition, one: Tracked, level: int, container: str) -
 
 
 def firmer_at(times: Times, one: Tracked) -> float | None:
-    """Return when the next signal is due: the plan's time counts for each, or else the launcher's."""
+    """Return when the next signal is due.
+
+    The plan's time counts for each, or else the launcher's.
+    """
     if one.state != "stopping" or not 0 < one.level < len(stop_signals(one.process)):
         return None
     rule, kills = one.process.stop, one.level + 1 == len(stop_signals(one.process))

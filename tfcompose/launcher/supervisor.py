@@ -1,4 +1,4 @@
-"""Runs a plan: one loop that turns pipes, signals and time into the machine's events, and does what it decides.
+"""Runs a plan: one loop turns pipes, signals and time into events and acts on them.
 
 The launcher has one thread. Its children lead sessions of their own, so that a Ctrl-C in the
 terminal reaches the launcher alone. A process whose output comes faster than it can be passed on
@@ -109,7 +109,10 @@ class Session:
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """What commands are made with: the launcher's environment, and what makes a process's of it."""
+    """What commands are made with.
+
+    The launcher's environment, and what makes a process's of it.
+    """
 
     base: Mapping[str, str]
     environment: Environment
@@ -126,7 +129,9 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     times: Times | None = None,
     session: Session | None = None,
 ) -> int:
-    """Run the plan until it ends, and return the exit code: 0 after a clean end, 1 after a failure or a finding.
+    """Run the plan until it ends, and return the exit code.
+
+    0 after a clean end, 1 after a failure or a finding.
 
     SIGINT, SIGTERM and SIGHUP end it. ``report`` is given everything that a person should know, in
     order; an OSError from it means that nobody reads it any more, and ends the plan.
@@ -216,7 +221,7 @@ class _Supervisor:
         return self._exit_code
 
     def _prepare(self) -> None:
-        """While the guard checks whether an edge is taken, have as many publishers load Python as there are cores."""
+        """Preload Python in as many publishers as there are cores while the guard looks."""
         if self._state.clear is not None or self._state.stop:
             return
         own = [
@@ -245,7 +250,10 @@ class _Supervisor:
         return answer
 
     def _end(self, duration_s: float | None) -> float | None:
-        """Return when the time is up: it counts from the end of the observation before the start."""
+        """Return when the time is up.
+
+        It counts from the end of the observation before the start.
+        """
         state = self._state
         if duration_s is None or state.clear is None or state.stop:
             return None
@@ -366,7 +374,9 @@ class _Supervisor:
 
 @final
 class Signals:
-    """Catches what ends a plan, and SIGCHLD so that it wakes the loop; puts everything back afterwards.
+    """Catches what ends a plan, and SIGCHLD so that it wakes the loop.
+
+    Puts everything back afterwards.
 
     A SIGHUP that is ignored, as below ``nohup``, stays ignored. ``more`` are further signals to
     catch.

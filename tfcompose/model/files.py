@@ -28,7 +28,7 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where the files are written, relative to where the robot's paths begin, and how they address others.
+    """Where files are written, relative to the robot's paths, and how they address others.
 
     ``as-written`` keeps addresses; a relative path becomes relative to ``folder``, so that readers
     of the written URDF find the file. ``package`` writes ``package://``, ``file`` absolute
@@ -41,7 +41,7 @@ class Target:
     top: str = "/"
 
     def address(self, asset: Asset) -> str:
-        """Return the address; one that cannot be had in this form is kept (``unaddressed`` names those)."""
+        """Return the address; one impossible in this form is kept (see ``unaddressed``)."""
         if self.form == "package" and asset.package:
             return f"package://{asset.package}/{_quoted(asset.inside)}"
         if self.form == "file" and asset.path:
@@ -81,7 +81,10 @@ def assets(robot: Robot) -> Iterator[Asset]:
 
 
 def unaddressed(robot: Robot, form: Form) -> list[Asset]:
-    """Return the files that have no address of this form: in no package, or of unknown place; each once."""
+    """Return the files that have no address of this form: in no package, or of unknown place.
+
+    Each once.
+    """
     if form == "as-written":
         return []
     without = [
@@ -101,7 +104,7 @@ _RELATIVE = re.compile(
 
 
 def with_absolute_addresses(urdf: str, folder: Path) -> str:
-    """Return the URDF in which paths that begin in ``folder``, where it was built, are absolute ``file://`` addresses.
+    """Return the URDF with paths relative to ``folder`` as absolute ``file://`` addresses.
 
     Who reads the description from a topic does not know that folder. Only the machine that runs
     the plan does, so that what is built stays the same everywhere.

@@ -40,7 +40,10 @@ class Live:
 
 @dataclass(frozen=True, slots=True)
 class Silent:
-    """Edges, named by their children, that were live come no more; or, if that is ``over``, come again."""
+    """Edges, named by their children, that were live come no more.
+
+    Or, if that is ``over``, come again.
+    """
 
     children: tuple[str, ...]
     over: bool
@@ -73,7 +76,9 @@ class FindingShown:
 
 @dataclass(frozen=True, slots=True)
 class Unfenced:
-    """A process of a strict plan sends past the fence: it must be stopped, whatever else is only reported.
+    """A process of a strict plan sends past the fence.
+
+    It must be stopped, whatever else is only reported.
 
     Where its environment was cleared, ``pid`` says which process it is instead of ``process``.
     """
@@ -108,7 +113,10 @@ class GateShut:
 
 @dataclass(frozen=True, slots=True)
 class Remember:
-    """What the next guard must know, should this one die: the launcher keeps it by key and does not look into it."""
+    """What the next guard must know, should this one die.
+
+    The launcher keeps it by key and does not look into it.
+    """
 
     changed: dict[str, Any]
 
@@ -132,7 +140,10 @@ class NotLoaded:
 
 @dataclass(frozen=True, slots=True)
 class Unloaded:
-    """A component is not in its container any more, or the container does not answer: then ``why`` says so."""
+    """A component is not in its container any more, or the container does not answer.
+
+    Then ``why`` says so.
+    """
 
     process: str
     number: int
@@ -203,7 +214,9 @@ class Gate:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Have a container load a component, as the file says; it is answered by ``Loaded`` or ``NotLoaded``.
+    """Have a container load a component, as the file says.
+
+    It is answered by ``Loaded`` or ``NotLoaded``.
 
     The answer has the order's ``number``. ``again`` says that a guard before this one may have had
     it loaded.
@@ -217,7 +230,10 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Unload:
-    """Have a container unload a component, as the file says; it is answered by ``Unloaded``, with ``number``."""
+    """Have a container unload a component, as the file says.
+
+    It is answered by ``Unloaded``, with ``number``.
+    """
 
     process: str
     number: int
@@ -249,7 +265,10 @@ class LogLine:
 
 @dataclass(frozen=True, slots=True)
 class ProcessState:
-    """A process went into this state. ``detail`` says why, where there is more to say: "exit code 3; again in 2 s"."""
+    """A process went into this state.
+
+    ``detail`` says why, where there is more to say: "exit code 3; again in 2 s".
+    """
 
     process: str
     state: StateName
@@ -259,7 +278,10 @@ class ProcessState:
 
 @dataclass(frozen=True, slots=True)
 class OwnerLive:
-    """All edges of an owner were received from it, ``seconds`` after the start; ``edges`` are their names."""
+    """All edges of an owner were received from it, ``seconds`` after the start.
+
+    ``edges`` are their names.
+    """
 
     owner: str
     node: str
@@ -269,7 +291,10 @@ class OwnerLive:
 
 @dataclass(frozen=True, slots=True)
 class ProcessReady:
-    """A process that waited for something of its own is ready, ``seconds`` after the start; ``seen`` says by what."""
+    """A process that waited for something of its own is ready, ``seconds`` after the start.
+
+    ``seen`` says by what.
+    """
 
     process: str
     seen: str
@@ -278,7 +303,10 @@ class ProcessReady:
 
 @dataclass(frozen=True, slots=True)
 class AllStarted:
-    """Whatever can be started was; ``waiting`` are processes that wait for others to be ready, or done."""
+    """Whatever can be started was.
+
+    ``waiting`` are processes that wait for others to be ready, or done.
+    """
 
     started: int
     waiting: tuple[str, ...]
@@ -296,7 +324,10 @@ class StartRow:
 
 @dataclass(frozen=True, slots=True)
 class AllReady:
-    """Every process is ready and every edge live, ``seconds`` after the start; but for those that were given up."""
+    """Every process is ready and every edge live, ``seconds`` after the start.
+
+    But for those that were given up.
+    """
 
     rows: tuple[StartRow, ...]
     seconds: float
@@ -305,7 +336,10 @@ class AllReady:
 
 @dataclass(frozen=True, slots=True)
 class Replanned:
-    """A changed plan is followed from now on: the names of processes, and the frames that listeners will still hold."""
+    """A changed plan is followed from now on.
+
+    The names of processes, and the frames that listeners will still hold.
+    """
 
     changed: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
@@ -323,7 +357,7 @@ class TreeComplete:
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """The edges of one owner that nobody has published yet, in the plan's order, of ``owned`` ones."""
+    """The unpublished edges of one owner, in the plan's order, of ``owned`` ones."""
 
     owner: str
     node: str
@@ -348,7 +382,10 @@ class RecoveredShown:
 
 @dataclass(frozen=True, slots=True)
 class FilesRestored:
-    """The files of the run were removed; they are in ``folder`` again, or nowhere, for the reason ``why``."""
+    """The files of the run were removed.
+
+    They are in ``folder`` again, or nowhere, for the reason ``why``.
+    """
 
     folder: str
     why: str = ""
@@ -363,7 +400,10 @@ class Stopping:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """Nothing runs any more: the last notice. ``because`` is the failure that came first, and what was said last."""
+    """Nothing runs any more: the last notice.
+
+    ``because`` is the failure that came first, and what was said last.
+    """
 
     exit_code: int
     because: tuple[str, ...] = ()
@@ -390,7 +430,10 @@ NOTICES = TaggedUnion[Notice]("event", get_args(Notice))
 
 
 def notice_line(notice: Notice, at: float) -> str:
-    """Return the notice as one line of JSON, without its end; ``at`` is when, in seconds since 1970."""
+    """Return the notice as one line of JSON, without its end.
+
+    ``at`` is when, in seconds since 1970.
+    """
     return json.dumps(
         {"event": "", "at": round(at, 3)} | NOTICES.encode(notice), ensure_ascii=False
     )
@@ -443,7 +486,10 @@ class ProcessRequest:
 
 @dataclass(frozen=True, slots=True)
 class UpdateRequest:
-    """Follow another plan: its file, and the folder that it was built in. Answered by a ``PlanChange``."""
+    """Follow another plan: its file, and the folder that it was built in.
+
+    Answered by a ``PlanChange``.
+    """
 
     plan: str
     base: str
@@ -472,7 +518,9 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class PlanChange:
-    """What another plan changes: the processes that are different, new, and no more, and the fixed edges that vanish.
+    """What another plan changes.
+
+    The processes that are different, new, and no more, and the fixed edges that vanish.
 
     tf2 never forgets a fixed edge, so listeners hold those that vanish until they start anew.
     """
@@ -513,7 +561,10 @@ class ProcessStatus:
 
 @dataclass(frozen=True, slots=True)
 class RobotStatus:
-    """All that is known of a run; ``plan`` is the digest of what it was made from, ``uptime`` is in seconds."""
+    """All that is known of a run.
+
+    ``plan`` is the digest of what it was made from, ``uptime`` is in seconds.
+    """
 
     robot: str
     host: str | None

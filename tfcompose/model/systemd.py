@@ -13,7 +13,10 @@ SOURCING = 'until [ "$1" = -- ]; do . "$1"; shift; done; shift; exec "$@"'
 
 
 def sourced(setup: Sequence[str], argv: list[str]) -> list[str]:
-    """Return the command that sources the setup files and becomes ``argv``; that itself without setup files."""
+    """Return the command that sources the setup files and becomes ``argv``.
+
+    That itself without setup files.
+    """
     return ["/bin/bash", "-c", SOURCING, "bash", *setup, "--", *argv] if setup else argv
 
 

@@ -1,4 +1,4 @@
-"""The environment variables in which the launcher gives a process what it must know before it reads the plan."""
+"""Environment variables through which the launcher configures its processes."""
 
 #: Every process of a run carries its id, ROBOT@DOMAIN:ID, and so do its children.
 RUN_ID = "TFCOMPOSE_RUN"

@@ -1,4 +1,4 @@
-"""The live tree: ROS nodes and the graph, TF messages, observing topics and bags, and the buffer that stands in for tf2.
+"""The live tree: nodes, graph, TF messages, observers, bags, and the tf2 stand-in.
 
 Must not import ``spec``, ``compiler``, ``guard``, ``launcher``, ``cli``, ``tools``, ``pydantic``,
 ``yaml``.

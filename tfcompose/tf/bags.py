@@ -1,4 +1,4 @@
-"""Recorded TF: MCAP and rosbag2 SQLite, read with the library rosbags, which is loaded only here; no ROS is needed."""
+"""Recorded TF: MCAP and rosbag2 SQLite, read with rosbags, without ROS."""
 
 from __future__ import annotations
 
@@ -38,7 +38,10 @@ _NAMED_AT_MOST = 12
 
 
 class BagError(Exception):
-    """Raised when a bag cannot be read; the message is one sentence for the user, ``help`` what to do."""
+    """Raised when a bag cannot be read.
+
+    The message is one sentence for the user, ``help`` what to do.
+    """
 
     def __init__(self, message: str, advice: str = "") -> None:
         super().__init__(message)
@@ -47,7 +50,9 @@ class BagError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class RecordedMessage:
-    """One TFMessage of a bag, on one of the ``topics`` (moving, fixed); ``rows`` is None where it cannot be decoded.
+    """One TFMessage of a bag, on one of the ``topics`` (moving, fixed).
+
+    ``rows`` is None where it cannot be decoded.
 
     ``received_ns`` is when it was recorded, ``clock_ns`` the newest time on /clock then, None
     where none was recorded.
@@ -71,7 +76,9 @@ def missing_rosbags() -> str | None:
 
 
 class Recording:
-    """A bag: a folder, or a single .mcap or .db3 file; a folder without metadata.yaml is read file by file.
+    """A bag: a folder, or a single .mcap or .db3 file.
+
+    A folder without metadata.yaml is read file by file.
 
     ``end_ns`` is when the last message of any topic was recorded, 0 before it was read.
 
@@ -86,7 +93,7 @@ class Recording:
         self._clock_ns: int | None = None
 
     def messages(self, *pairs: Topics) -> Iterator[RecordedMessage]:
-        """Yield the messages of the pairs of topics (moving, fixed), in the order in which they were recorded.
+        """Yield the messages of the pairs of topics (moving, fixed) in recorded order.
 
         Raises:
             BagError: if it has none of the topics, is no bag, is damaged, or its messages are not
@@ -136,7 +143,7 @@ class Recording:
 
 
 def observe_bag(path: str, observers: Mapping[Topics, TreeObserver]) -> None:
-    """Feed the messages of a bag to the observers of these topics (moving, fixed), and note when it ends.
+    """Feed a bag's messages to the observers of these topics, and note when it ends.
 
     Raises:
         BagError: as ``Recording`` does; topics may be missing as long as some are there.
@@ -285,7 +292,9 @@ def _help_of(type_: str) -> str:
 
 
 def _files_at(path: Path) -> list[Path]:
-    """Return what is to be read, in this order: a folder with its metadata, a file, or the files of a folder.
+    """Return what is to be read, in this order.
+
+    A folder with its metadata, a file, or the files of a folder.
 
     Raises:
         BagError: if there is nothing there, or nothing that is a bag.

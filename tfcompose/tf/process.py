@@ -1,4 +1,6 @@
-"""What every process of tfcompose's own begins with: arguments, signals, the plan, the word to go on, and its output.
+"""What every process of tfcompose's own begins with.
+
+Arguments, signals, the plan, the word to go on, and its output.
 
 Publishers and the guard are such processes: ``tfcompose KIND PLAN_FILE PROCESS_NAME``. This
 module imports no ROS.
@@ -32,7 +34,10 @@ _CHECK_EVERY_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """One of the plan's processes, as it runs. ``given`` is what follows ``--ros-args`` on its command line."""
+    """One of the plan's processes, as it runs.
+
+    ``given`` is what follows ``--ros-args`` on its command line.
+    """
 
     plan: Plan
     process: PlanProcess
@@ -51,7 +56,10 @@ class Own:
 
     @property
     def ros_args(self) -> list[str]:
-        """The ROS arguments of its node: what is on the command line, which comes first, and the plan's remappings."""
+        """The ROS arguments of its node.
+
+        What is on the command line, which comes first, and the plan's remappings.
+        """
         return [
             *self.given,
             *(word for old, new in self.process.remap.items() for word in ("-r", f"{old}:={new}")),
@@ -138,7 +146,9 @@ def _unfit(message: str, file: str) -> RejectedError:
 
 
 def wait_for_go(stop: Stop) -> bool:
-    """Wait, where the launcher holds this process, until it is let go on; return whether it is, or is to end.
+    """Wait, where the launcher holds this process, until it is let go on.
+
+    Return whether it is, or is to end.
 
     ``up`` checks before the start whether an edge is published already; its publishers load Python
     and rclpy then, and join ROS only when the launcher says so.
@@ -156,7 +166,10 @@ def wait_for_go(stop: Stop) -> bool:
 
 
 def ready() -> None:
-    """Tell systemd that this process is ready, as sd_notify(3) does; without systemd do nothing."""
+    """Tell systemd that this process is ready, as sd_notify(3) does.
+
+    Without systemd do nothing.
+    """
     address = os.environ.get("NOTIFY_SOCKET", "")
     if address[:1] not in {"/", "@"}:
         return

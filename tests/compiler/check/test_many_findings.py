@@ -1,4 +1,7 @@
-"""A file in which everything is wrong takes no longer than others of its size; how many of a thing are too many."""
+"""A file in which everything is wrong takes no longer than others of its size.
+
+How many of a thing are too many.
+"""
 
 import time
 

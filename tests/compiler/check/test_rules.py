@@ -1,4 +1,4 @@
-"""Marked specs: each line that should give a finding says which, and the set of lines and codes must match exactly."""
+"""Marked specs: the set of lines and codes must match exactly."""
 
 import re
 from collections.abc import Iterator

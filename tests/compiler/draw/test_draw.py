@@ -1,4 +1,4 @@
-"""Pictures: everything is in them once, nothing lies on anything else, and other people's readers open them."""
+"""Pictures contain everything once, overlap nothing, and open in other readers."""
 
 import ctypes
 import io
@@ -46,7 +46,10 @@ ODD = (
 
 
 def tree(seed: int, frames: int, *, poses: bool = False, odd: bool = False) -> Graph:
-    """A tree that grows at random: deep where the seed is even, with sensors, of which some carry others."""
+    """A tree that grows at random.
+
+    Deep where the seed is even, with sensors, of which some carry others.
+    """
     rng = random.Random(seed)
     names = [f"frame_{index}_{'x' * rng.randrange(20)}" for index in range(frames)]
     if odd:

@@ -1,4 +1,4 @@
-"""Robots beside each other: prefixes, shared frames, topics below a namespace, names that processes are given."""
+"""Robots side by side: prefixes, shared frames, topics in a namespace, process names."""
 
 import xml.etree.ElementTree as ET
 

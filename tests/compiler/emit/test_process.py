@@ -1,4 +1,4 @@
-"""What is said of a process reaches the plan, and what cannot be meant is refused with its place."""
+"""Settings of a process reach the plan; impossible ones are refused with their place."""
 
 import json
 import os
@@ -272,7 +272,10 @@ processes:
 def built_at(
     tmp_path: Path, folder: str, text: str = FILES
 ) -> list[Finding] | tuple[str, PlanProcess]:
-    """Return the plan's text and its process, built to a folder beside the robot's; or what was found."""
+    """Return the plan's text and its process, built to a folder beside the robot's.
+
+    Or what was found.
+    """
     (tmp_path / "robots/maps").mkdir(parents=True, exist_ok=True)
     (tmp_path / "robots/maps/a.yaml").touch()
     file = tmp_path / "robots/r.yaml"

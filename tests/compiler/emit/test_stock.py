@@ -1,4 +1,7 @@
-"""``state_publisher: stock``: robot_state_publisher gets what is ours below base, and everybody else keeps theirs."""
+"""``state_publisher: stock``.
+
+Robot_state_publisher gets what is ours below base, and everybody else keeps theirs.
+"""
 
 import json
 import xml.etree.ElementTree as ET

@@ -1,4 +1,4 @@
-"""A driver that publishes as realsense2_camera does, started by ``tfcompose up`` as its preset says, and guarded."""
+"""A driver that publishes as realsense2_camera does, started by its preset, and guarded."""
 
 import json
 import os

@@ -1,4 +1,7 @@
-"""Every frame is where the vendor's package has it: figures read apart from the presets, to 1e-9."""
+"""Every frame is where the vendor's package has it.
+
+Figures read apart from the presets, to 1e-9.
+"""
 
 from collections.abc import Iterator
 from itertools import product
@@ -35,7 +38,10 @@ OPTICAL_HERE = {
 
 
 def variants(name: str) -> Iterator[dict[str, list[tuple[str, PresetFrame]]]]:
-    """Yield the frames with each choice that the preset has: the parents that they may have, and where they are."""
+    """Yield the frames with each choice that the preset has.
+
+    The parents that they may have, and where they are.
+    """
     choices = {
         key: option.variants
         for key, option in KNOWN.get(name).options.items()
@@ -52,7 +58,10 @@ def variants(name: str) -> Iterator[dict[str, list[tuple[str, PresetFrame]]]]:
 
 
 def is_there(frame: PresetFrame, fact: dict[str, Any], name: str, *, optical: bool) -> bool:
-    """Whether the frame is where the vendor has it; what nobody says is unknown in the preset, and no zero."""
+    """Whether the frame is where the vendor has it.
+
+    What nobody says is unknown in the preset, and no zero.
+    """
     if fact["xyz"] is None:
         return frame.xyz is None
     if (

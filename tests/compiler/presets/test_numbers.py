@@ -1,4 +1,6 @@
-"""Frame chains of the vendors, computed by hand from what they publish; no preset file is read for what is expected.
+"""Frame chains of the vendors, computed by hand from what they publish.
+
+No preset file is read for what is expected.
 
 Positions are metres in the mount frame, with the axes of the mount. A rotation is the frame's
 three axes there.
@@ -146,7 +148,10 @@ def test_a_frame_is_where_the_vendor_has_it(
 
 
 def test_a_calibrated_lens_is_placed_by_the_sum_of_the_table() -> None:
-    """The mount is solved so that the colour lens is where it was measured: its place in the mount, subtracted."""
+    """The mount is solved so that the colour lens is where it was measured.
+
+    Its place in the mount, subtracted.
+    """
     robot = robot_of(
         "realsense/d405",
         ALL,

@@ -1,4 +1,7 @@
-"""Every preset that comes with tfcompose, with every variant: one tree, right axes, a driver that can be told."""
+"""Every preset that comes with tfcompose, with every variant.
+
+One tree, right axes, a driver that can be told.
+"""
 
 import json
 import math
@@ -46,7 +49,7 @@ def spec(name: str, options: dict[str, Any], tf: str, frames: dict[str, Any]) ->
 
 @cache
 def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
-    """Return the robot with this sensor, all its frames, for each variant and each publisher that it can have."""
+    """Return the robot with this sensor, for each variant and each publisher it can have."""
     made = []
     driver = KNOWN.get(name).driver
     for variant in variants(name):

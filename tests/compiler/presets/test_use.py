@@ -1,4 +1,7 @@
-"""What a robot makes of presets: who publishes, what the driver is told, what is refused, and presets of one's own."""
+"""What a robot makes of presets.
+
+Who publishes, what the driver is told, what is refused, and presets of one's own.
+"""
 
 import json
 import re
@@ -49,7 +52,7 @@ def driver_of(robot: Robot) -> Process:
 
 
 def driver_parameters(robot: Robot) -> dict[str, Any]:
-    """Return what the driver is told, as its parameter file or its command line has it after a build."""
+    """Return the driver's settings from its parameter file or command line after a build."""
     files = {file.path: file.text for file in emit(robot)}
     plan = json.loads(files["plan.json"])
     process = next(process for process in plan["processes"] if process["name"] == "s")

@@ -1,4 +1,4 @@
-"""Rays against bodies: trimesh is the oracle for primitives, and they are the oracle for meshes."""
+"""Rays against bodies: trimesh is the oracle for primitives, primitives for meshes."""
 
 import math
 import subprocess

@@ -1,4 +1,4 @@
-"""Masses and moments of inertia, against integrals by scipy, triangles by trimesh and bodies by pinocchio."""
+"""Masses and moments of inertia, against scipy, trimesh and pinocchio."""
 
 import json
 import math
@@ -43,7 +43,10 @@ def matrix(inertial: Inertial) -> Any:
 def revolved(
     radius: Callable[[float], float], low: float, high: float, breaks: list[float]
 ) -> tuple[float, Any]:
-    """Return volume and principal moments about the origin of a solid of revolution about z, by its slices."""
+    """Return volume and principal moments about the origin of a solid of revolution.
+
+    The axis is z; the solid is integrated by its slices.
+    """
 
     def integral(of: Callable[[float], float]) -> float:
         return float(quad(of, low, high, points=breaks, epsabs=1e-14, epsrel=1e-12, limit=400)[0])
@@ -146,7 +149,10 @@ def test_a_mesh_has_the_inertia_of_the_box_that_it_shows(
 def test_a_body_in_a_mesh_that_faces_inwards_is_turned_and_a_cavity_is_none(
     tmp_path: Path, *, inwards: bool
 ) -> None:
-    """In the hole of a ring it stands apart, though it is within the ring's bounds; in the box it is a hole."""
+    """In the hole of a ring it stands apart, though it is within the ring's bounds.
+
+    In the box it is a hole.
+    """
     ring = trimesh.creation.annulus(r_min=0.3, r_max=0.5, height=0.4, sections=64)
     box, apart, cavity = (trimesh.creation.box([side] * 3) for side in (0.6, 0.2, 0.4))
     box.apply_translation([2, 0, 0])

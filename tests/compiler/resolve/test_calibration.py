@@ -218,7 +218,10 @@ KALIBR = (
 def test_kalibr_takes_points_from_the_imu_to_the_camera_and_so_gives_the_imu_in_the_camera() -> (
     None
 ):
-    """A point at p in the IMU is at T_cam_imu p in the camera; the camera's pose in the IMU is the inverse."""
+    """A point at p in the IMU is at T_cam_imu p in the camera.
+
+    The camera's pose in the IMU is the inverse.
+    """
     robot = CAMERA % f"place: {OPTICAL}, calibration: {{file: c.yaml, parent: imu0, child: cam0}}"
     result = compiled(
         robot.replace("parent: base_link", "parent: imu") + "frames: {imu: {parent: base_link}}\n",
@@ -458,7 +461,10 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
 def test_a_calibration_is_outside_of_what_a_capsule_or_a_mesh_fills(
     tmp_path: Path, kind: str, length_m: float, found: set[str]
 ) -> None:
-    """The middle of a rod is 1 m up; the lens is 65 cm below the origin, off a short rod, and the way back is on it."""
+    """The middle of a rod is 1 m up.
+
+    The lens is 65 cm below the origin, off a short rod, and the way back is on it.
+    """
     rod = f"capsule: {{radius: 0.1, length: {length_m - 0.2}}}"
     if kind == "mesh":
         trimesh.creation.capsule(radius=100, height=1000 * length_m - 200).export(

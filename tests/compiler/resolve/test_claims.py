@@ -1,4 +1,4 @@
-"""What nodes publish by themselves is switched off, told under the tree's names, or a finding with the switch."""
+"""Claims of nodes are switched off, renamed as in the tree, or reported."""
 
 from typing import Any
 

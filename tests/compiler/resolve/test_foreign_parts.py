@@ -236,7 +236,7 @@ def test_a_block_of_a_macro_is_a_pose_as_everywhere(cell: Any) -> None:
 
 
 def test_a_macro_takes_its_parent_and_its_origin_from_the_part(cell: Any) -> None:
-    """Also one that has a parameter for the parent by another name, and defaults with spaces in them."""
+    """Also one whose parent parameter has another name, and defaults with spaces."""
     pose = "parent: table, xyz: [10 cm, 0, 2], look: {down: 30 deg}"
     robot = sound(
         cell(

@@ -1,4 +1,7 @@
-"""What a robot's sensors see: the preset's values, the user's over them, and where each is from."""
+"""What a robot's sensors see.
+
+The preset's values, the user's over them, and where each is from.
+"""
 
 import math
 

@@ -1,4 +1,7 @@
-"""Parameter files that processes name: which parameters are taken, under which name, and how they are written."""
+"""Parameter files that processes name.
+
+Which parameters are taken, under which name, and how they are written.
+"""
 
 import contextlib
 import json

@@ -1,4 +1,7 @@
-"""A robot file as a part of another one: names, poses, processes, and what is said when it does not fit."""
+"""A robot file as a part of another one.
+
+Names, poses, processes, and what is said when it does not fit.
+"""
 
 import xml.etree.ElementTree as ET
 from typing import Any
@@ -66,7 +69,10 @@ parts:
 
 
 def compiled(text: str, **files: str) -> Compiled:
-    """Compile the text as fleet.yaml, beside robots/rover.yaml, arm.yaml and further files: a_yaml is a.yaml."""
+    """Compile the text as fleet.yaml, beside robots/rover.yaml, arm.yaml and further files.
+
+    A_yaml is a.yaml.
+    """
     texts = {"robots/rover.yaml": ROVER, "arm.yaml": ARM}
     texts |= {name.replace("_", "."): text for name, text in files.items()}
 
@@ -267,7 +273,7 @@ def test_drivers_of_sensors_that_are_removed_are_removed_and_others_stay() -> No
 
 
 def test_a_parameter_that_names_a_frame_or_joint_goes_with_it_and_no_other_does() -> None:
-    """As in the raw block of a URDF part, so that an arm moves alike by its URDF and by what import made of it."""
+    """As in the raw block of a URDF part, so that both forms of an arm move alike."""
     shoulder = (
         "shoulder: {command: [position], state: {effort: {source: shoulder}}, params: {mimic:"
         " shoulder, k: 1}}"

@@ -393,7 +393,10 @@ def test_a_list_of_parents_has_different_names(parents: str) -> None:
 
 
 def test_a_frame_that_a_driver_sends_again_and_again_inside_a_sensor_can_be_placed() -> None:
-    """The inside of a sensor does not move, on whichever topic its driver sends it; what moves is refused."""
+    """The inside of a sensor does not move, on whichever topic its driver sends it.
+
+    What moves is refused.
+    """
     text = (
         "sensors: {z: {preset: zed/zed2i, parent: base_link, place: z_left_camera_frame, xyz: [1,"
         " 0, 0]}}\n"

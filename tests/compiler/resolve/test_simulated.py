@@ -70,7 +70,10 @@ def tuples(sweeps: dict[str, Sweep]) -> object:
 def test_every_joint_with_a_position_of_its_own_is_simulated_within_its_limits_and_its_speed(
     source_text: str, joints: dict[str, float], sweeps: dict[str, Sweep]
 ) -> None:
-    """A joint that mimics one is left out; where 0 is beyond the limits the middle counts, as elsewhere in ROS."""
+    """A joint that mimics one is left out.
+
+    Where 0 is beyond the limits the middle counts, as elsewhere in ROS.
+    """
     found = simulation(source_text)
     assert found
     assert found.joints == pytest.approx(joints)

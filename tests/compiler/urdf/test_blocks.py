@@ -1,4 +1,7 @@
-"""What stands beside links and joints: hardware as ros2_control reads it, raw blocks as they were written."""
+"""What stands beside links and joints.
+
+Hardware as ros2_control reads it, raw blocks as they were written.
+"""
 
 import xml.etree.ElementTree as ET
 

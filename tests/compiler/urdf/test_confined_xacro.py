@@ -1,4 +1,4 @@
-"""Xacro files of strangers: what their expressions do, what they read, what they print, and what they answer."""
+"""Strangers' xacro files: what they evaluate, read, print and answer."""
 
 import json
 import os

@@ -1,4 +1,7 @@
-"""xacro within bounds, in a process of its own: what stops it is found where it is written, and so is the rest."""
+"""xacro within bounds, in a process of its own.
+
+What stops it is found where it is written, and so is the rest.
+"""
 
 import os
 from pathlib import Path

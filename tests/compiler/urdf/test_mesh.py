@@ -1,4 +1,7 @@
-"""Mesh addresses: as they are written, and for a target; found by packages of the robot and of the workspace."""
+"""Mesh addresses: as they are written, and for a target.
+
+Found by packages of the robot and of the workspace.
+"""
 
 import os
 import re
@@ -127,7 +130,10 @@ def test_a_package_that_is_nowhere_is_reported_with_the_folders_searched(workspa
 def test_a_package_that_is_nowhere_else_is_the_one_around_the_file_that_asks(
     workspace: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So a checkout of a vendor's package is read before it is built and sourced, and what is sourced comes first."""
+    """A checkout of a vendor's package is read before it is built and sourced.
+
+    What is sourced comes first.
+    """
     source = workspace / "src/third party/named"
     (source / "package.xml").write_text("<package><name>named</name></package>")
     (source / "urdf").mkdir()
@@ -259,7 +265,7 @@ def test_a_mesh_that_is_yet_to_be_fetched_is_a_warning(workspace: Path) -> None:
 def test_a_mass_that_cannot_be_spread_is_a_finding(
     workspace: Path, hidden: str, content: str | tuple[Any, Any] | None, code: str, words: str
 ) -> None:
-    """Nothing is built of a mesh with a volume that is only a sum of its triangles, and no library warns aside."""
+    """A mesh whose volume is only a sum of its triangles builds nothing, without warnings."""
     robot = workspace / "src/robots/r.yaml"
     robot.write_text(ROBOT + "    inertial: {mass: 6 kg}\n")
     shown = workspace / "src/robots/meshes/a b.stl"

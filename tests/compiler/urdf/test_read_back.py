@@ -1,4 +1,4 @@
-"""``build --read-back``: a description that is not the robot is not written, whatever in it is other."""
+"""``build --read-back``: a description that differs from the robot is not written."""
 
 import json
 import re
@@ -65,7 +65,7 @@ def test_what_build_writes_reads_back(file: Path, tmp_path: Path) -> None:
 
 
 def changed(text: str, joints: set[str]) -> Iterator[tuple[str, str]]:
-    """Yield the text with one value of a link or joint changed, for each of them, and what was changed.
+    """Yield the text with one value of a link or joint changed, and what was changed.
 
     ``joints`` are the names that joints have in the robot file.
     """
@@ -141,7 +141,10 @@ UNSEEN = {
 
 @pytest.mark.parametrize("case", UNSEEN)
 def test_what_yourdfpy_does_not_read_is_not_claimed(case: str) -> None:
-    """The option's help and the README leave these out; where a new yourdfpy sees more, they can say so."""
+    """The option's help and the README leave these out.
+
+    Where a new yourdfpy sees more, they can say so.
+    """
     robot = robot_of(MORE)
     complete = texts(robot)["robot.full.urdf"]
     changed_text = complete.replace(*UNSEEN[case], 1)

@@ -1,4 +1,4 @@
-"""Other people's programs read the URDF and find every frame, mass and tensor where tfcompose has it.
+"""Other people's programs read the same frames, masses and tensors from the URDF.
 
 What a reader cannot read is in ``CANNOT``, with the reason, and is tried all the same where it can
 be: the day that it can, the entry is wrong.
@@ -99,7 +99,10 @@ class Own:
         )
 
     def positions(self, chance: random.Random) -> dict[str, float]:
-        """Return a position for each joint: random, and what follows from it for those that mimic one."""
+        """Return a position for each joint.
+
+        Random, and what follows from it for those that mimic one.
+        """
         found = {
             edge.joint.name: chance.uniform(-2, 2)
             for edge in self.moving

@@ -1,4 +1,4 @@
-"""The URDF, read by somebody else's reader, says what the robot says and what the tutorial says."""
+"""Another reader finds in the URDF what the robot and the tutorial say."""
 
 import io
 import json

@@ -1,4 +1,7 @@
-"""The macro, expanded by real xacro: the robot itself, and as many others of it as somebody asks for."""
+"""The macro, expanded by real xacro.
+
+The robot itself, and as many others of it as somebody asks for.
+"""
 
 import json
 import xml.etree.ElementTree as ET
@@ -40,7 +43,10 @@ def expanded(file: Path, arguments: Mapping[str, str] | None = None) -> ET.Eleme
 
 
 def tree(element: ET.Element) -> tuple[Any, ...]:
-    """Return the element as values that compare: tag, attributes, words, and the same of what is in it."""
+    """Return the element as values that compare.
+
+    Tag, attributes, words, and the same of what is in it.
+    """
     words = tuple(" ".join(text.split()) for text in (element.text or "", element.tail or ""))
     return (element.tag, sorted(element.attrib.items()), words, [tree(child) for child in element])
 

@@ -1,4 +1,7 @@
-"""Observers beside a node that sends 10,000 new frames at 20 Hz: what they take is bounded, and the node is named."""
+"""Observers beside a node that sends 10,000 new frames at 20 Hz.
+
+What they take is bounded, and the node is named.
+"""
 
 from __future__ import annotations
 

@@ -189,7 +189,7 @@ def test_a_name_that_is_no_text_hides_nothing_of_its_message(
 def test_who_joins_the_fence_on_purpose_is_held_back(
     robot: Robot, rogue: Callable[..., subprocess.Popen[str]]
 ) -> None:
-    """A node with the run's profile file, or on a topic of its process's own, and a program of another DDS."""
+    """A node with the run's profile or on its process's topic, and a plain DDS program."""
     after = robot.lines()
     fences = list(robot.folder.rglob("fence/slam.xml"))
     env = {"TOPIC": "/_tfcompose/liars/slam/tf"} if robot.guard == "remap" else {}

@@ -1,4 +1,7 @@
-"""Children of a robot that try to slip out of its guard's sight: who is named, who is stopped, what everybody hears."""
+"""Children of a robot that try to slip out of its guard's sight.
+
+Who is named, who is stopped, what everybody hears.
+"""
 
 from __future__ import annotations
 

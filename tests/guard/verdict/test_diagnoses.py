@@ -1,4 +1,7 @@
-"""The doctor's diagnoses over histories: what is found, and when nothing is. How it is worded: tests/golden/scenes."""
+"""The doctor's diagnoses over histories: what is found, and when nothing is.
+
+How it is worded: tests/golden/scenes.
+"""
 
 from dataclasses import replace
 
@@ -389,7 +392,10 @@ def test_where_some_are_dropped_it_is_not_reported_that_the_frame_is_missing() -
 
 
 def test_edges_of_a_publisher_that_replaced_another_have_one_publisher() -> None:
-    """It was started anew, and the graph shows the killed one for some seconds still; fixed edges hold on."""
+    """It was started anew, and the graph shows the killed one for some seconds still.
+
+    Fixed edges hold on.
+    """
     history = TreeHistory().moving("odom base_link", until_s=2.0).fixed("base_link laser")
     for tick in range(100):
         now = BEGUN_NS + 3 * SECOND_NS + tick * SECOND_NS // 50

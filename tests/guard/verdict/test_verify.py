@@ -1,4 +1,7 @@
-"""Expected against seen, replayed: each thing that can be wrong with an edge, and nothing where all is right."""
+"""Expected against seen, replayed.
+
+Each thing that can be wrong with an edge, and nothing where all is right.
+"""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,7 @@
-"""Joint states in, TF messages out, as bytes and without ROS; scipy computes the poses a second time."""
+"""Joint states in, TF messages out, as bytes and without ROS.
+
+Scipy computes the poses a second time.
+"""
 
 import math
 from collections.abc import Callable, Mapping

@@ -73,7 +73,7 @@ def listeners(domain: object) -> Iterator[Listeners]:
 
 @pytest.fixture
 def rover(edge: Callable[..., Any], write: Callable[..., Any]) -> Any:
-    """A robot with two wheels, a mimic of the left one, and a gripper whose second finger mimics that mimic."""
+    """A robot with two wheels, a mimic of the left one, and a gripper with a mimic of that."""
     axle = Pose((0.1, 0.2, 0.0), quat_from_rpy(0.3, 0.0, 0.0))
     moving = [
         edge(

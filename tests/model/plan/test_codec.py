@@ -1,4 +1,4 @@
-"""What a plan or a message holds is written and read alike, and what is of another type is refused."""
+"""Plans and messages survive writing and reading; wrong types are refused."""
 
 import json
 from dataclasses import dataclass, field

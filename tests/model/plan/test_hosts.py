@@ -152,7 +152,10 @@ def test_a_guard_with_a_host_judges_there_only() -> None:
 
 
 def test_what_only_the_own_launcher_sees_is_not_waited_for_from_elsewhere() -> None:
-    """A line of output and a code are not seen from another machine; a lifecycle state is, and is driven there."""
+    """A line of output and a code are not seen from another machine.
+
+    A lifecycle state is, and is driven there.
+    """
     plan = compiled_plan(ON_TWO_HOSTS)
     cases: list[tuple[dict[str, Any], Ready | None]] = [
         ({"ready": Ready("log", "up")}, None),

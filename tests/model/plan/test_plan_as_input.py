@@ -1,4 +1,7 @@
-"""A plan is input, as a robot file is: what no build writes is refused, and a review shows what is there."""
+"""A plan is input, as a robot file is.
+
+What no build writes is refused, and a review shows what is there.
+"""
 
 import json
 import os

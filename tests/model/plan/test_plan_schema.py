@@ -1,4 +1,4 @@
-"""The schema of plan.json takes what build writes, and refuses what ``up`` would refuse to read."""
+"""The schema of plan.json accepts what build writes and refuses what ``up`` refuses."""
 
 import copy
 import json
@@ -61,7 +61,10 @@ def test_without_one_key_both_refuse_or_both_take_it(file: Path) -> None:
 
 
 def test_what_the_reader_refuses_for_its_kind_the_schema_refuses_too() -> None:
-    """The reader is stricter about values, such as the length of a quaternion; it is laxer about none."""
+    """The reader is stricter about values, such as the length of a quaternion.
+
+    It is laxer about none.
+    """
     full = json.loads((GOLDEN / "two_rovers" / "plan.json").read_text("utf-8"))
     observed, mistaken = 0, []
     for path in places(full):

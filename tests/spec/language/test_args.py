@@ -1,4 +1,7 @@
-"""``args``, ``when``, ``for`` and ``env``: what a robot is built with, and which entries it then has."""
+"""``args``, ``when``, ``for`` and ``env``.
+
+What a robot is built with, and which entries it then has.
+"""
 
 from __future__ import annotations
 

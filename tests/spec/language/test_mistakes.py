@@ -1,4 +1,7 @@
-"""What people write by mistake or by habit: each is found at its place, with help that names what to write."""
+"""What people write by mistake or by habit.
+
+Each is found at its place, with help that names what to write.
+"""
 
 from pathlib import Path
 

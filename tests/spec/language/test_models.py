@@ -1,4 +1,7 @@
-"""Every model of the language: its errors have words of ours, and its keys tell an editor what they are."""
+"""Every model of the language.
+
+Its errors have words of ours, and its keys tell an editor what they are.
+"""
 
 from collections.abc import Iterator
 from typing import Any, get_args

@@ -1,4 +1,7 @@
-"""Ages end at the last look: an observer that is kept from looking knows nothing since then, and blames nobody."""
+"""Ages end at the last look.
+
+An observer that is kept from looking knows nothing since then, and blames nobody.
+"""
 
 from __future__ import annotations
 

@@ -308,7 +308,10 @@ def test_what_ended_before_the_recording_did_is_silent(tmp_path: Path) -> None:
 
 
 def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path) -> None:
-    """Messages are read one after the other; of MCAP a chunk at a time, and this writer makes one chunk of all."""
+    """Messages are read one after the other.
+
+    Of MCAP a chunk at a time, and this writer makes one chunk of all.
+    """
 
     def most_kib(seconds: float) -> int:
         bag = write_bag(tmp_path / f"bag_{seconds}", drive(seconds, 500.0), mcap=False)

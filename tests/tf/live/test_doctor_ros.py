@@ -105,7 +105,10 @@ def wrong_times(nodes: FakeNodes) -> None:
 
 
 def wrong_data(nodes: FakeNodes) -> None:
-    """The scan is stamped as it is measured, and odometry a second late; of the joints one is misspelt."""
+    """The scan is stamped as it is measured, and odometry a second late.
+
+    Of the joints one is misspelt.
+    """
     node = nodes.node("drive")
     nodes.moving(node, "odom base_link", stamp=lambda now: now - SECOND_NS)
     nodes.fixed(node, "base_link laser")
@@ -259,7 +262,10 @@ def test_what_is_wrong_is_found_with_the_nodes_and_the_numbers(
 
 
 def in_a_pause(found: dict[str, Any]) -> bool:
-    """Return whether it is that the observation ended while /paused paused, which it does half of the time."""
+    """Return whether the observation ended during /paused's pause.
+
+    It pauses half of the time.
+    """
     return found["code"] == "TF804" and str(found["message"]).startswith("/paused ")
 
 
@@ -278,7 +284,10 @@ def odometry(now: int) -> Odometry:
 
 
 def missed(name: str, *, static: bool, seconds: float) -> str:
-    """Let a node come, be heard and named, and leave while the doctor looks; return what it says of that."""
+    """Let a node come, be heard and named, and leave while the doctor looks.
+
+    Return what it says of that.
+    """
     data = [
         message(0 if static else time.time_ns(), (f"base_link {name}",))
         for _ in range(1 if static else 40)
@@ -359,7 +368,9 @@ with open_node("far", ""):
 
 @pytest.mark.slow
 def test_a_robot_in_another_domain_is_observed_by_its_process(domain: Any) -> None:
-    """It runs on this machine, and it cannot be heard: the process says in which domain it was started.
+    """It runs on this machine, and it cannot be heard.
+
+    The process says in which domain it was started.
 
     It is slow so that it runs alone: of many such processes on a machine doctor names the first
     few.
@@ -550,7 +561,10 @@ with open(sys.argv[1], "rb") as file:
 
 
 def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
-    """ROS's wheels bring one middleware, and a node that asks for another ends: what has rcl mapped stands for it."""
+    """ROS's wheels bring one middleware, and a node that asks for another ends.
+
+    What has rcl mapped stands for it.
+    """
     rcl = next(
         path
         for folder in os.environ["LD_LIBRARY_PATH"].split(":")

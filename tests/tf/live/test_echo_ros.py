@@ -39,7 +39,7 @@ DOWN_15 = Pose((0.2, 0.0, 0.1), quat_from_rpy(0, math.radians(15), 0))
 def rover(
     write: Callable[..., Path], start: Callable[..., Started], edge: Callable[..., PlanEdge]
 ) -> None:
-    """A base that stands at x = 2 in odom, with a camera that looks down 15 degrees, and a tree of its own beside."""
+    """A base at x = 2 in odom, a camera that looks down 15 degrees, and a separate tree."""
     edges = [
         edge("odom base_link", "drive"),
         edge("base_link camera", pose=DOWN_15),
@@ -247,7 +247,10 @@ def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as
 
 @pytest.fixture
 def messages_of(running: Callable[..., subprocess.Popen[str]]) -> Callable[..., str]:
-    """Let echo hear (x, stamp in seconds, w of the quaternion) of base_link in odom; return why it ends."""
+    """Let echo hear (x, stamp in seconds, w of the quaternion) of base_link in odom.
+
+    Return why it ends.
+    """
 
     def run(samples: Sequence[tuple[float, int, float]], why: str, *arguments: str) -> str:
         with open_node("talks", "") as node:

@@ -159,7 +159,10 @@ def test_stamps_are_compared_with_the_clock_that_is_given() -> None:
 
 
 def test_one_who_floods_the_tree_leaves_room_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What one message holds is kept while there is room: robots of thousands of fixed edges send them at once."""
+    """What one message holds is kept while there is room.
+
+    Robots of thousands of fixed edges send them at once.
+    """
     monkeypatch.setattr(module, "MOST_OF_ONE", 10)
     observer = TreeObserver()
     rows: Any = [row(f"base part_{number}") for number in range(20)]

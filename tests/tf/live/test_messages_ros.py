@@ -1,4 +1,4 @@
-"""Messages read by their layout say what a plain decoder says, however publishers change what they send."""
+"""Reading messages by their layout agrees with a plain decoder, whatever changes."""
 
 import pytest
 from geometry_msgs.msg import TransformStamped

@@ -1,4 +1,7 @@
-"""Real nodes that do otherwise than the plan says: the doctor and verify find it, by one code and in the same words."""
+"""Real nodes that do otherwise than the plan says.
+
+The doctor and verify find it, by one code and in the same words.
+"""
 
 from __future__ import annotations
 
@@ -90,7 +93,7 @@ def two_of_them(rover: Rover) -> None:
 
 
 def twice(rover: Rover) -> None:
-    """The owner runs twice, its frame has a second parent, and what is fixed comes on the wrong topic."""
+    """The owner runs twice, a frame has two parents, a fixed edge is on the wrong topic."""
     rover.all_but("mount").drive()
     rover.nodes.moving(rover.nodes.node("slam"), "map base_link")
     publisher = rover.nodes.keep(TFPublisher(rover.nodes.node("mount"), static=False))

@@ -1,4 +1,7 @@
-"""sensor_msgs/JointState as bytes, without ROS; what ROS itself writes and reads is in the file with _ros."""
+"""sensor_msgs/JointState as bytes, without ROS.
+
+What ROS itself writes and reads is in the file with _ros.
+"""
 
 import struct
 import tracemalloc

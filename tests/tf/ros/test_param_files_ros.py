@@ -1,4 +1,4 @@
-"""What rcl reads from the built file is what it reads from the user's own, value by value and type by type."""
+"""rcl reads from the built file what it reads from the user's own, value by value."""
 
 import json
 import sys

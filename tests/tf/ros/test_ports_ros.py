@@ -1,4 +1,7 @@
-"""Which ports of Fast DDS's shared memory a process reads: who first writes to an idle one may wait for 333 ms."""
+"""Which ports of Fast DDS's shared memory a process reads.
+
+Who first writes to an idle one may wait for 333 ms.
+"""
 
 import os
 import sys
@@ -52,7 +55,10 @@ with open_node("one", "/") as node:
 
 
 def test_what_everybody_sends_has_a_port_of_its_own_at_a_strict_guard(domain: object) -> None:
-    """What does not fit into a port's buffer is thrown away: a flood would take what is fenced off with it."""
+    """What does not fit into a port's buffer is thrown away.
+
+    A flood would take what is fenced off with it.
+    """
     assert domain
     env = child_environment(os.environ, RosSettings(discovery="localhost"), own=True)
     assert processes.run([sys.executable, "-c", APART], env=env, check=True).stdout == "1\n"

@@ -1,4 +1,7 @@
-"""Who publishes on rmw_zenoh: tokens and attachments, of peers that speak its format over a real router."""
+"""Who publishes on rmw_zenoh.
+
+Tokens and attachments, of peers that speak its format over a real router.
+"""
 
 import json
 import os

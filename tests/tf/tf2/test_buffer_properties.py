@@ -30,7 +30,7 @@ stamps = st.integers(20 * S, 29 * S)
 
 @st.composite
 def trees(draw: st.DrawFn) -> Buffer:
-    """A tree of up to eight frames f0, f1, … below f0, some moving, which all know the time from 20 s to 29 s."""
+    """A tree of up to eight frames below f0, some moving, known from 20 s to 29 s."""
     buffer = Buffer()
     for index in range(1, draw(st.integers(2, 8))):
         parent = f"f{draw(st.integers(0, index - 1))}"
@@ -174,7 +174,10 @@ OPERATIONS = st.lists(
 def test_what_is_remembered_of_chains_changes_no_answer(
     operations: list[tuple[int, int, bool, int, Pose]], data: st.DataObject
 ) -> None:
-    """Loops, new parents and kinds, all at once: a buffer that was asked in between answers as one that was not."""
+    """Loops, new parents and kinds, all at once.
+
+    A buffer that was asked in between answers as one that was not.
+    """
     requested, fresh = Buffer(), Buffer()
     questions = st.tuples(st.integers(0, 4), st.integers(0, 4), st.integers(0, 30 * S))
     for parent, child, static, stamp, pose in operations:
@@ -198,7 +201,10 @@ def _answer(buffer: Buffer, a: str, b: str, stamp: int) -> object:
 @given(st.data())
 @settings(max_examples=200)
 def test_whatever_bytes_come_the_buffer_goes_on_answering(data: st.DataObject) -> None:
-    """Broken messages are an error and change nothing; messages with broken content are taken or refused."""
+    """Broken messages are an error and change nothing.
+
+    Messages with broken content are taken or refused.
+    """
     buffer, decoder = Buffer(), Decoder()
     sound = encode([Transform(S, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))] * 3)
     for _ in range(6):

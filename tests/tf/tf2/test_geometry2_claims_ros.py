@@ -1,4 +1,4 @@
-"""What geometry2's own Python tests claim of tf2_py, tf2_ros, tf2_geometry_msgs and tf2_sensor_msgs.
+"""Claims of geometry2's own Python tests about the tf2 packages.
 
 What their tests say of an exception's text is not repeated: the texts here
 are others.

@@ -1,4 +1,4 @@
-"""The listener with rclpy's futures, clocks, profiles and threads, as tf2_ros's users have them."""
+"""The listener with rclpy's futures, clocks, profiles and threads."""
 
 import subprocess
 import sys
@@ -118,7 +118,10 @@ def test_a_listener_of_its_own_follows_the_simulated_clock_and_says_when_it_goes
 
 
 def test_a_node_with_use_sim_time_clears_the_buffer_that_it_was_given_to_once(domain: Any) -> None:
-    """Both the buffer and the listener are told the node, as tf2_ros's programs do; its parameter does the rest."""
+    """Both the buffer and the listener are told the node, as tf2_ros's programs do.
+
+    Its parameter does the rest.
+    """
     code = """
 import rclpy, sys
 from rclpy.time import Time

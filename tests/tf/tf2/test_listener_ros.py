@@ -1,4 +1,7 @@
-"""Programs written for tf2_ros run with this package's classes, and the listener takes what tf2's would."""
+"""Programs written for tf2_ros run with this package's classes.
+
+The listener takes what tf2's would.
+"""
 
 import re
 import signal
@@ -101,7 +104,7 @@ def running(changed: Callable[[str], Path]) -> Callable[..., None]:
 
 @pytest.mark.usefixtures("rover")
 def test_a_listener_program_runs_after_changing_its_imports(program: Callable[..., str]) -> None:
-    """Its wait for the next sample is in a timer's callback, which keeps the executor from hearing it."""
+    """Its wait for the next sample is in a timer callback, which blocks the executor."""
     output = [
         line
         for line in program("listener").splitlines()
@@ -117,7 +120,10 @@ def test_a_listener_program_runs_after_changing_its_imports(program: Callable[..
 
 @pytest.mark.usefixtures("rover")
 def test_a_program_awaits_transforms_in_its_callbacks(program: Callable[..., str]) -> None:
-    """One of its waits is for a time that has not come yet; the module keeps the name that the program gives it."""
+    """One of its waits is for a time that has not come yet.
+
+    The module keeps the name that the program gives it.
+    """
     output = program("awaiting").splitlines()
     assert sorted(output[:-1]) == [
         "LookupException", "now laser_link is at 2.000", "then laser_link is at 2.000 in odom"

@@ -18,7 +18,7 @@ S = 1_000_000_000
 
 
 def drive(rotation: float = 0.1) -> Buffer:
-    """A base that drives 1 m and turns ``rotation`` radians a second for 9 s, with a laser on it."""
+    """A base that drives 1 m and turns ``rotation`` rad/s for 9 s, with a laser on it."""
     buffer = Buffer()
     for step in range(91):
         pose = Pose((step / 10, 0, 0), quat_from_rpy(0, 0, rotation * step / 10))

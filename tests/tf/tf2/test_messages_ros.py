@@ -1,4 +1,7 @@
-"""ROS's own messages are moved by their registered functions and are still ROS's messages; scipy says where to."""
+"""ROS's own messages are moved by their registered functions and are still ROS's messages.
+
+Scipy says where to.
+"""
 
 from collections.abc import Iterable
 from typing import Any

@@ -1,4 +1,4 @@
-"""Every name of tf2_ros's and tf2_py's buffer is there, is called as theirs, and does what it says; without ROS."""
+"""Every name of tf2_ros's and tf2_py's buffer exists and behaves as theirs, without ROS."""
 
 import asyncio
 import inspect

@@ -1,4 +1,6 @@
-"""The buffer against tf2 itself, where it is installed: the same random history, the same questions, the same answers.
+"""The buffer against tf2 itself, where it is installed.
+
+The same random history, the same questions, the same answers.
 
 PyPI has no tf2; with a ROS installation on the path (``tf2_py``) this runs.
 """

@@ -1,4 +1,4 @@
-"""The buffer gives the answers that tf2's BufferCore (geometry2 for Jazzy) gave to the same histories and questions.
+"""The buffer answers as tf2's BufferCore did to the same histories and questions.
 
 ``tf2_answers.jsonl`` holds them, a step a line, since PyPI has no tf2. Where ``tf2_py`` is
 installed, ``python tests/tf/tf2/test_tf2_recorded.py`` asks it anew.

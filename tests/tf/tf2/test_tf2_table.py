@@ -1,4 +1,7 @@
-"""What tf2's BufferCore does (geometry2 for Jazzy), line by line: what it takes, and what it answers when."""
+"""What tf2's BufferCore does (geometry2 for Jazzy), line by line.
+
+What it takes, and what it answers when.
+"""
 
 import math
 from collections.abc import Sequence
@@ -99,7 +102,7 @@ def test_data_older_than_the_cache_is_refused_and_the_rest_of_the_message_is_tak
 
 
 def test_samples_are_dropped_by_the_newest_before_the_one_that_comes() -> None:
-    """tf2 prunes first and inserts then, so that a gap in the data leaves what was before it for one more sample."""
+    """tf2 prunes before it inserts, so a gap keeps older data for one more sample."""
     buffer = moving(
         ("odom", "base", 0.0, 1.0), ("odom", "base", 1.0, 2.0), ("odom", "base", 2.0, 50.0)
     )

@@ -1,4 +1,7 @@
-"""Points, vectors, poses and clouds are moved; scipy and numpy's structured arrays say where to."""
+"""Points, vectors, poses and clouds are moved.
+
+Scipy and numpy's structured arrays say where to.
+"""
 
 import random
 import struct

@@ -1,4 +1,4 @@
-"""What a release holds: what was built, and the files that it names, where they find each other."""
+"""Contents of a release: what was built, and the files it names."""
 
 import io
 import re

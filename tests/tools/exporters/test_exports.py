@@ -153,7 +153,10 @@ def test_systemd_finds_nothing_wrong_with_the_units(
 
 
 def test_a_value_stays_what_it_is_whatever_systemd_makes_of_its_characters() -> None:
-    """A unit's ``%h`` is a folder, and ``$HOME`` in a command a variable; doubled they are themselves."""
+    """A unit's ``%h`` is a folder, and ``$HOME`` in a command a variable.
+
+    Doubled they are themselves.
+    """
     machine = Machine(
         "/opt/100%h", "/usr/bin/python3", ("/opt/$HOME/my setup.bash",), {"A": '%h "b" \\ $C'}
     )
@@ -363,7 +366,10 @@ def launched(
 
 
 def sent(actions: list[Recorded]) -> dict[tuple[str, str], list[float] | None]:
-    """Return the edges that stock nodes send, by what these are told; poses of static_transform_publishers alone."""
+    """Return the edges that stock nodes send, by what these are told.
+
+    Poses of static_transform_publishers alone.
+    """
     edges: dict[tuple[str, str], list[float] | None] = {}
     for action in actions:
         if getattr(action, "executable", "") == "robot_state_publisher":

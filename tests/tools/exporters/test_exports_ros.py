@@ -1,4 +1,6 @@
-"""Exports on the real thing: what their files say is started, and the live tree compared with the plan.
+"""Exports on the real thing.
+
+What their files say is started, and the live tree compared with the plan.
 
 A stand-in does what systemd does with a unit, or docker compose with a service: order,
 environment, notification, health checks. The processes are real.
@@ -162,7 +164,7 @@ def units(folder: Path) -> dict[str, Service]:
 
 
 def services(folder: Path) -> dict[str, Service]:
-    """Read a compose file as docker compose does, with the image's Python and folder being this machine's."""
+    """Read a compose file as docker compose does, with this machine's Python and folder."""
     made = yaml.safe_load((folder / "compose.yaml").read_text("utf-8"))
     image = {name: os.environ[name] for name in ("PATH", "PYTHONPATH") if name in os.environ} | {
         "HOME": str(folder)
@@ -223,7 +225,10 @@ def exported(
 
 
 def verified(folder: Path, wrong: str = "") -> str:
-    """Compare the live tree with the plan, and return what is wrong, if a line of it fits; else nothing."""
+    """Compare the live tree with the plan, and return what is wrong, if a line of it fits.
+
+    Else nothing.
+    """
     command = [
         sys.executable,
         "-m",
@@ -328,7 +333,10 @@ class Action(SimpleNamespace):
 
 
 def actions_of(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Action]:
-    """Return what a launch file starts, where there is no launch: it is read with stand-ins for what it imports."""
+    """Return what a launch file starts, where there is no launch.
+
+    It is read with stand-ins for what it imports.
+    """
 
     def kind(name: str) -> Any:
         return lambda *words, **given: Action(kind=name, words=words, **given)
@@ -345,7 +353,10 @@ def actions_of(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Action]:
 
 
 def run_actions(actions: list[Action], folder: Path) -> None:
-    """Start what launch would, with stand-ins for stock nodes; a launch file's variables hold from then on."""
+    """Start what launch would, with stand-ins for stock nodes.
+
+    A launch file's variables hold from then on.
+    """
     stock = folder / "stock"
     stock.write_text(STOCK.format(python=sys.executable), "utf-8")
     for number, action in enumerate(actions):

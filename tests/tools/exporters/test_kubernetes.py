@@ -1,4 +1,4 @@
-"""The plan for Kubernetes: valid objects, at most one publisher of each edge, and what a new plan restarts."""
+"""The plan for Kubernetes: valid objects, one publisher an edge, targeted restarts."""
 
 import json
 import os
@@ -40,7 +40,10 @@ processes:
 def manifests(
     text: str, cluster: Cluster | None = None, **changes: str
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the objects of a robot by their files, and what is not kept; ``changes`` replace files' texts."""
+    """Return the objects of a robot by their files, and what is not kept.
+
+    ``changes`` replace files' texts.
+    """
     files = built(text) | changes
     plan = read_plan(files["plan.json"], "plan.json")
     paths = {path for process in plan.started for path in files_of(plan, process)}
@@ -239,7 +242,10 @@ def test_a_new_plan_restarts_what_it_changes_and_tfcomposes_own() -> None:
 
 
 def test_a_word_that_kubernetes_would_fill_in_stays_as_it_is() -> None:
-    """The arguments name the process alone; the plan has its words. Names of processes are the user's."""
+    """The arguments name the process alone; the plan has its words.
+
+    Names of processes are the user's.
+    """
     plan = compiled_plan(HOSTED)
     named = replace(
         plan,

@@ -1,4 +1,4 @@
-"""A fleet on loopback: simulated robots with Zenoh routers, poses between them, links that break."""
+"""A fleet on loopback: robots with Zenoh routers, poses between them, broken links."""
 
 import json
 import sys
@@ -108,7 +108,10 @@ def test_no_pose_is_given_over_a_broken_link_and_new_ones_after(
     given: list[tuple[float, float]] = []
 
     def pose() -> bool:
-        """Look the pose up as often as it can be; whether it was given, and how old it was then."""
+        """Look the pose up as often as it can be.
+
+        Whether it was given, and how old it was then.
+        """
         try:
             _, stamp_ns = observer.pose("r1/base_link", "r2/base_link")
         except (StaleError, TransformException):

@@ -1,4 +1,7 @@
-"""``tfcompose up`` of a robot of a fleet: what it shares reaches others, and is shared again after its process died."""
+"""``tfcompose up`` of a robot of a fleet.
+
+What it shares reaches others, and is shared again after its process died.
+"""
 
 import json
 import os

@@ -55,7 +55,10 @@ def test_calibrations_of_autoware_are_frames(
 
 
 def individual_params(folder: Path, **kits: dict[str, str]) -> Path:
-    """Write a package of individual parameters: by vehicle, the kits with their calibrations below the kit's base."""
+    """Write a package of individual parameters.
+
+    By vehicle, the kits with their calibrations below the kit's base.
+    """
     for vehicle, several in kits.items():
         for kit, text in several.items():
             inner = folder / "individual_params/config" / vehicle / kit

@@ -1142,7 +1142,7 @@ def test_ctrl_c_ends_an_import_without_a_traceback(tmp_path: Path) -> None:
 def test_no_launch_file_makes_a_traceback(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What is left of a file after parts of it were taken out or doubled is imported, or refused."""
+    """What remains of a file with parts removed or doubled is imported or refused."""
     chance = random.Random(18)
     for name, text in (
         ("a.launch.py", PYTHON),
@@ -1256,7 +1256,10 @@ COMPOSED_XML = """<launch>
 
 
 def test_records_tell_containers_apart_though_the_earlier_ones_are_gone() -> None:
-    """Python gives the ``id`` of an object that is gone to another one: components were in a wrong container then."""
+    """Python gives the ``id`` of an object that is gone to another one.
+
+    Components were in a wrong container then.
+    """
     context = Context()
     for count in range(50):
         inside = [actions.ComposableNode(package="p", plugin="p::C", name=f"in_{count}")]

@@ -46,7 +46,10 @@ SOUND_YAML = YAML.replace("- bogus: {}\n", "").replace("respawn: true", 'respawn
 
 
 def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
-    """Return what launch starts, by the node's name, or by the command: words, names, remappings, parameters."""
+    """Return what launch starts, by the node's name, or by the command.
+
+    Words, names, remappings, parameters.
+    """
     out = file.with_name("started.json")
     environment = {**os.environ, "ROS_LOG_DIR": str(file.parent)}
     if can_build():

@@ -77,7 +77,10 @@ BODY = '<visual><geometry><sphere radius="1"/></geometry></visual>'
 
 @pytest.mark.parametrize("body", ["", BODY], ids=["frame", "link"])
 def test_a_fixed_joint_keeps_its_name(body: str, tmp_path: Path) -> None:
-    """Where it is not the one that build gives; what is fixed stands at its child, with a body and without."""
+    """Where it is not the one that build gives.
+
+    What is fixed stands at its child, with a body and without.
+    """
     names = ("mast_fix", "base_link_to_top")
     masts = "".join(
         fixed(child, name=name) for child, name in zip(("mast", "top"), names, strict=True)
@@ -352,7 +355,10 @@ def words(text: str) -> str:
 
 
 def test_a_sensor_is_recognised_under_other_names_if_its_model_is_named(tmp_path: Path) -> None:
-    """As in Clearpath's descriptions: the frames are lidar3d_0_link and lidar3d_0_laser, the mesh is VLP16_base_1."""
+    """As in Clearpath's descriptions.
+
+    The frames are lidar3d_0_link and lidar3d_0_laser, the mesh is VLP16_base_1.
+    """
     lidar = fixed("lidar3d_0_link") + fixed(
         "lidar3d_0_laser", "lidar3d_0_link", 'xyz="0 0 0.0377"'
     )
@@ -383,7 +389,7 @@ def test_a_mesh_of_another_model_makes_it_a_question(tmp_path: Path) -> None:
 
 
 def test_a_sensor_of_which_there_is_no_more_than_a_name_is_one_question(tmp_path: Path) -> None:
-    """At the frame that is named most exactly, and at none above or below it, nor around a sensor that is known."""
+    """At the frame named most exactly, at none above or below, nor at a known sensor."""
     bracket = (
         fixed("oakd_bracket")
         + fixed("oakd_link", "oakd_bracket")

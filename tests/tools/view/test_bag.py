@@ -1,4 +1,7 @@
-"""A recording at any of its times, forward and back: moving frames, latched ones, and what is wrong."""
+"""A recording at any of its times, forward and back.
+
+Moving frames, latched ones, and what is wrong.
+"""
 
 import math
 from collections.abc import Iterator
@@ -23,7 +26,7 @@ SECONDS = 10
 
 
 def sent(mast_m: float = 0.5) -> Iterator[Sent]:
-    """A base that drives 1 m a second, a wheel that comes after 2 s, and latched frames that come late, at 1 s."""
+    """A base at 1 m/s, a wheel that comes after 2 s, and latched frames after 1 s."""
     for tick in range(SECONDS * 20):
         at_s = tick / 20
         yield "/tf", at_s, "odom", "base_link", at_s, (at_s, 0.0, 0.0), UP

@@ -20,7 +20,10 @@ pytestmark = pytest.mark.xdist_group("browser")
 
 
 def enter(page: Page, label: str, value: str) -> None:
-    """Type a value into the control of that label, and leave it; of a slider it is the number beside it."""
+    """Type a value into the control of that label, and leave it.
+
+    Of a slider it is the number beside it.
+    """
     control = "xpath=ancestor::div[1]/following-sibling::div"
     field = (
         page.locator("label")
@@ -111,7 +114,10 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
 
 
 def pixel(client: viser.ClientHandle, pose: Pose, left: float) -> tuple[float, float]:
-    """Return where a client's camera has the origin of a frame in its page, whose scene begins at ``left``."""
+    """Return where a client's camera sees the origin of a frame on its page.
+
+    The scene begins at ``left``.
+    """
     camera = client.camera
     w, x, y, z = (float(one) for one in camera.wxyz)
     px, py, pz = (float(one) for one in camera.position)

@@ -42,7 +42,10 @@ def red_pixels(page: Page) -> int:
 
 
 def steady_red_pixels(page: Page) -> int:
-    """Return how much of the scene is red once it is drawn, and fades in no more: that of the axes."""
+    """Return how much of the scene is red once it is drawn, and fades in no more.
+
+    That of the axes.
+    """
     counts = [0]
 
     def is_steady() -> bool:

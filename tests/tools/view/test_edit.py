@@ -1,4 +1,7 @@
-"""A new pose of a mount becomes edits of the robot file: the pose is the requested one, and other bytes stay."""
+"""A new pose of a mount becomes edits of the robot file.
+
+The pose is the requested one, and other bytes stay.
+"""
 
 import difflib
 import math

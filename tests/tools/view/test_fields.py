@@ -1,4 +1,4 @@
-"""Fields of view are drawn where the placement rules look, and what is blocked is what those rules say."""
+"""Fields of view are drawn as the placement rules compute them, blocked parts too."""
 
 import re
 

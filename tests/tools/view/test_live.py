@@ -1,4 +1,7 @@
-"""What is shown of a tree that runs, as data: where frames are, ghosts, what is red, and what is said of an edge."""
+"""What is shown of a tree that runs, as data.
+
+Where frames are, ghosts, what is red, and what is said of an edge.
+"""
 
 import math
 import random
@@ -77,7 +80,7 @@ class Live:
         )
 
     def run(self, until_s: float = 4.0, **wrong: Pose) -> None:
-        """Send all that the robot says, those frames that are named elsewhere, from 0 s to ``until_s``."""
+        """Send all of the robot's edges from 0 s to ``until_s``, except those named elsewhere."""
         fixed = {"mast": ("base_link", Pose((0, 0, 0.5))), "lidar": ("mast", Pose((0.1, 0, 0.3)))}
         rows = [(parent, child, wrong.get(child, pose)) for child, (parent, pose) in fixed.items()]
         self.send(STATIC, 0.0, *rows, static=True)
@@ -303,7 +306,7 @@ def test_poses_in_roots_are_those_of_the_tree_walked_edge_by_edge() -> None:
 
 
 def test_the_plan_is_judged_of_which_the_robot_is_another_version() -> None:
-    """Frames of the plan that the robot shown does not have are shown like those that nobody declared."""
+    """Frames of the plan that the shown robot lacks are shown like undeclared ones."""
     live = Live()
     smaller = replace(
         live.robot,

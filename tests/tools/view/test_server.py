@@ -1,4 +1,4 @@
-"""The server of the view lets in who has its token, and nothing that a stranger sends ends in a traceback."""
+"""The view's server admits holders of its token, without tracebacks for others."""
 
 import http
 import socket

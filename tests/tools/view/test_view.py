@@ -1,4 +1,4 @@
-"""The view: joints and mounts move, saving changes one line, one HTML file holds the scene, and the server ends."""
+"""The view: moving joints and mounts, saving one line, one HTML file, a clean end."""
 
 import json
 import math

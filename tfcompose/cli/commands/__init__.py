@@ -1,1 +1,1 @@
-"""The commands: each module is one, with ``arguments`` and ``run``, and its docstring is the help."""
+"""Commands: each module is one, with ``arguments`` and ``run``; its docstring is the help."""

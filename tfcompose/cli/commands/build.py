@@ -31,7 +31,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Build; exit code 0, 1 with errors in the robot, 2 where something cannot be read or written."""
+    """Build; exit code 0, 1 with errors in the robot, 2 if something is unreadable."""
     from tfcompose.cli.writing import build
 
     folder, names, _ = build(arguments)

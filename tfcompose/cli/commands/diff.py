@@ -41,7 +41,7 @@ def run(arguments: Namespace) -> int:
 
 
 def differences(old: Robot, new: Robot) -> list[str]:
-    """Return a line for each frame that is not as it was, in the order of the new robot, what went at the end."""
+    """Return a line for each changed frame, in the new robot's order, removed ones last."""
     before = {edge.child: edge for edge in old.edges}
     lines = [
         f"root   {frame} is new"

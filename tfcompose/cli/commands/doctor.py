@@ -45,7 +45,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Look and print the findings; exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use."""
+    """Look and print the findings.
+
+    Exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use.
+    """
     from tfcompose.foundation.findings import finding
     from tfcompose.foundation.signals import Stop
     from tfcompose.model.plan import RosSettings
@@ -114,7 +117,7 @@ def _summary(found: list[Finding]) -> str:
 
 
 def _plan(arguments: Namespace) -> Plan | None:
-    """Return the plan of the robot or the plan's file that was given, else of the robot that runs here, if one does.
+    """Return the given robot's plan, else the plan of the robot that runs here, if any.
 
     Raises:
         SystemExit: after saying what is wrong.

@@ -25,7 +25,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print events until the robot ends; exit code 0, 1 where none runs, or the connection is lost before it ends."""
+    """Print events until the robot ends.
+
+    Exit code 0, 1 where none runs, or the connection is lost before it ends.
+    """
     from tfcompose.cli.console import Console
     from tfcompose.cli.runs import chosen_run, notices
     from tfcompose.model.messages import Ended, notice_line
@@ -60,7 +63,10 @@ def run(arguments: Namespace) -> int:
 
 
 def _is_held(place: RuntimeDir) -> bool:
-    """Return whether the robot still runs; one that ends hangs up a moment before it gives its lock back."""
+    """Return whether the robot still runs.
+
+    One that ends hangs up a moment before it gives its lock back.
+    """
     for _ in range(40):
         if place.holder() is None:
             return False

@@ -75,7 +75,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Draw; exit code 0, 1 with errors in the robot, 2 for another ending or what cannot be read or written."""
+    """Draw; exit code 0, 1 with errors in the robot, 2 for an unknown ending.
+
+    Also 2 for what cannot be read or written.
+    """
     path = Path(arguments.output)
     _check_output(path)
     settle_duration(arguments, 3.0)

@@ -197,7 +197,10 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
 
 
 def _watch(arguments: Namespace) -> int:
-    """Lint again whenever a file changes that was read, or one comes to a folder; Ctrl-C ends it."""
+    """Lint again whenever a file changes that was read, or one comes to a folder.
+
+    Ctrl-C ends it.
+    """
     from tfcompose.cli.reading import forget_lines, read_text
 
     state: dict[str, _Stamp] = {}
@@ -281,7 +284,10 @@ def _lint_urdf(file: str, arguments: Namespace, read: Callable[[str], str]) -> l
 
 
 def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
-    """Fix the files, or print the difference, and return what remains in each; a file that cannot be written, alone."""
+    """Fix the files, or print the difference, and return what remains in each.
+
+    A file that cannot be written, alone.
+    """
     from tfcompose.foundation.findings import Span, finding
 
     found = {file: fixer.fix(file) for file in fixer.files}
@@ -429,7 +435,9 @@ def _files_of(
 def lint_file(
     file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]
 ) -> list[Finding]:
-    """Return the findings of one file: alone and with each of its profiles, or with what is asked for only.
+    """Return the findings of one file.
+
+    Alone and with each of its profiles, or with what is asked for only.
 
     Alone it is judged in each combination of its arguments' values.
     """
@@ -490,7 +498,7 @@ def _judged(
     given: Given,
     compiled: Callable[[Given, Sequence[str]], Compiled],
 ) -> tuple[list[Finding], list[Compiled]]:
-    """Return the findings in the combinations of the values that arguments can have, and what was compiled."""
+    """Return the findings for each combination of argument values, and what was compiled."""
     if "args" not in source.data and not overlays:
         alone = compiled(given, arguments.profiles)
         return list(alone.found), [alone]

@@ -73,7 +73,10 @@ def run(arguments: Namespace) -> int:
 
 
 def _place(robot: str | None, command: str) -> RuntimeDir:
-    """Return the robot that runs, or the one that has run last: of those that the name, or else this shell, means."""
+    """Return the robot that runs, or the one that has run last.
+
+    Of those that the name, or else this shell, means.
+    """
     from tfcompose.cli.runs import chosen_run, in_scope, is_meant
     from tfcompose.foundation.reading import is_folder
     from tfcompose.launcher.output import last_modified

@@ -47,7 +47,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Monitor until a signal comes; exit code 1 if no TF came, or no chain from A to B is there, 2 for a bad bag."""
+    """Monitor until a signal comes.
+
+    Exit code 1 if no TF came, or no chain from A to B is there, 2 for a bad bag.
+    """
     from tfcompose.cli.live import observe, read_bag
     from tfcompose.cli.tables import LiveLines
     from tfcompose.model.plan.topics import topics_below
@@ -81,7 +84,9 @@ def run(arguments: Namespace) -> int:
 
 
 def _namespace_here() -> str:
-    """Return the namespace of the TF topics of the robot that runs in this ROS domain; empty for the global ones.
+    """Return the namespace of the TF topics of the robot that runs in this ROS domain.
+
+    Empty for the global ones.
 
     Raises:
         SystemExit: after naming the namespaces, if it has several and none of them is global.

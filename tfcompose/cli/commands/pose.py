@@ -56,12 +56,15 @@ def run(arguments: Namespace) -> int:
 
 
 def _pose_in_top(chain: list[Edge]) -> Pose:
-    """Return the pose of the chain's first frame in its last edge's parent, nominal where it moves."""
+    """Return the pose of the chain's first frame in its last parent, nominal if it moves."""
     return reduce(lambda pose, edge: edge.pose @ pose, chain, Pose())
 
 
 def _moving(edges: list[Edge]) -> str:
-    """Return the line that says what moves on the way, and where it was taken; nothing if nothing does."""
+    """Return the line that says what moves on the way, and where it was taken.
+
+    Nothing if nothing does.
+    """
     joints = [edge.joint_name for edge in edges if edge.kind == "joint"]
     others = [edge.name for edge in edges if edge.kind == "dynamic"]
     parts = [f"{'joints' if joints[1:] else 'joint'} {', '.join(joints)} at 0"] if joints else []

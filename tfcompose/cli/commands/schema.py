@@ -1,8 +1,8 @@
 """Print the language as JSON Schema, or as a reference.
 
 Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors
-and nodes, of plan.json, or of a file that a tool reads, such as fleet.yaml. With --reference print every key of the language as
-Markdown instead.
+and nodes, of plan.json, or of a file that a tool reads, such as fleet.yaml. With --reference print
+every key of the language as Markdown instead.
 """
 
 from __future__ import annotations

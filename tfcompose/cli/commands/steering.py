@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 class ProcessCommand:
-    """A command that asks the launcher to start, stop or restart processes; ``help_text`` is its page."""
+    """A command that asks the launcher to start, stop or restart processes.
+
+    ``help_text`` is its page.
+    """
 
     def __init__(self, action: Verb, progress: str, help_text: str) -> None:
         self.__doc__ = help_text

@@ -52,7 +52,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the tree; exit code as for build; of a published one 1 if there is none, 2 if a bag cannot be read."""
+    """Print the tree; exit code as for build.
+
+    Of a published one 1 if there is none, 2 if a bag cannot be read.
+    """
     settle_duration(arguments, 3.0)
     if arguments.live or arguments.bag:
         _print_published(arguments)
@@ -72,7 +75,10 @@ def run(arguments: Namespace) -> int:
 
 
 def _fitted(text: str) -> str:
-    """Return the text with each line cut to the width of the terminal; into a file or a pipe it stays as it is."""
+    """Return the text with each line cut to the width of the terminal.
+
+    Into a file or a pipe it stays as it is.
+    """
     from tfcompose.cli.tables import shortened
 
     columns = table_width(sys.stdout)
@@ -82,7 +88,10 @@ def _fitted(text: str) -> str:
 
 
 def _planned_json(robot: Robot) -> str:
-    """Return one line of JSON, in the shape of --live: the trees with their roots, and what the robot says of edges."""
+    """Return one line of JSON, in the shape of --live.
+
+    The trees with their roots, and what the robot says of edges.
+    """
     from tfcompose.compiler.emit.plan import plan_of
     from tfcompose.tf.live.edges import forest
 
@@ -237,7 +246,10 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
 
 
 def _owner(branch: Branch, plan: Plan | None) -> str:
-    """Return who publishes the frame: the owner with its node where it is the owner, else the node."""
+    """Return who publishes the frame.
+
+    The owner with its node where it is the owner, else the node.
+    """
     from tfcompose.guard.verdict.ownership import may_be_owners, relays_of
 
     planned, one = branch.planned, branch.observed[0]

@@ -80,7 +80,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Start the plan and return the exit code: 0 after a clean end, 1 after a failure or a finding, 2 unreadable."""
+    """Start the plan and return the exit code.
+
+    0 after a clean end, 1 after a failure or a finding, 2 unreadable.
+    """
     from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
 
     arguments.file = in_folder(arguments.file)

@@ -90,7 +90,10 @@ def run(arguments: Namespace) -> int:
 
 
 def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
-    """Return the plan of the robot that runs in this ROS domain, without places; None if a file or a bag is given."""
+    """Return the plan of the robot that runs in this ROS domain, without places.
+
+    None if a file or a bag is given.
+    """
     from tfcompose.cli.runs import plan_of_domain
 
     changed = arguments.profiles or arguments.overlays or arguments.settings or arguments.given

@@ -81,7 +81,10 @@ def impossible_inertia(robot: Robot) -> Iterator[Finding]:
 def _principal(
     tensor: tuple[float, float, float, float, float, float],
 ) -> tuple[float, float, float]:
-    """Return the eigenvalues of the symmetric tensor xx, xy, xz, yy, yz, zz, smallest first (Smith, 1961)."""
+    """Return the eigenvalues of a symmetric tensor, smallest first (Smith, 1961).
+
+    The tensor is (xx, xy, xz, yy, yz, zz).
+    """
     scale = (
         max(map(abs, tensor)) or 1.0
     )  # squares of what a foreign file holds may leave the range of floats

@@ -104,7 +104,7 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
 
 
 def rules_of_tools(robot: Robot) -> tuple[list[Rule], list[Finding]]:
-    """Return the rules of the tools whose sections the robot's file has, and a finding for each that fails to load."""
+    """Return the rules of tools whose sections the file has, and load failures."""
     rules: list[Rule] = []
     found = []
     for key in keys_in(robot.sections):
@@ -138,7 +138,9 @@ def _of_part(found: Finding, robot: Robot) -> Finding:
 def silenced(
     found: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
 ) -> tuple[list[Finding], Used]:
-    """Return what neither a comment nor an entry of ``rules`` silences, and which comments silenced something.
+    """Return the findings not silenced, and the comments that silenced something.
+
+    A comment or an entry of ``rules`` silences a finding.
 
     ``rules`` holds for codes and names a severity, ``off``, or nothing, each with its place; an
     entry that is neither a code nor a name, or cannot be set, is a finding too.
@@ -151,7 +153,7 @@ def silenced(
 
 
 def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], Used]:
-    """Return the findings that are not allowed, and which comments silenced something, with the code."""
+    """Return the findings that are not allowed, and the used comments with codes."""
     kept: list[Finding] = []
     used: Used = set()
     for one in found:
@@ -164,7 +166,10 @@ def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Findi
 
 
 def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
-    """Return the findings with the severities that the robot's ``rules`` set; those that are ``off`` are left out."""
+    """Return the findings with the severities that the robot's ``rules`` set.
+
+    Those that are ``off`` are left out.
+    """
     levels = {
         code: level
         for word, level in rules.items()
@@ -181,7 +186,7 @@ def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list
 
 
 def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
-    """Return a finding for each entry of ``rules``, with its place, that is no code or cannot be set."""
+    """Return a finding for each entry of ``rules`` that is unknown or cannot be set."""
     found = []
     for word, at in rules.items():
         code = code_of(word)
@@ -210,7 +215,10 @@ def _covers(allow: Allow, found: Finding) -> bool:
 
 
 def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
-    """Return a finding for each comment that allows nothing, cannot allow what it names, or gives no reason."""
+    """Return a finding for each comment that allows nothing or gives no reason.
+
+    Or that cannot allow what it names.
+    """
     found = []
     for allow in allows:
         if not allow.codes:
@@ -244,7 +252,7 @@ _OF_AN_ENTRY = 2  # its section and its name
 
 
 def with_replaced(found: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
-    """Return the findings; one that is about a value which replaced another has a note with the other's place."""
+    """Return the findings, with notes about the values that theirs replaced."""
     overlaid = [source for source in sources if source.replaced]
     if not overlaid:
         return list(found)
@@ -259,7 +267,10 @@ def _with_notes(found: Finding, sources: Iterable[Source]) -> tuple[Note, ...]:
 
 
 def _notes(found: Finding, known: set[Span | None], source: Source) -> list[Note]:
-    """Return notes about the value at the finding's place; if none is there, about those of the entry as a whole."""
+    """Return notes about the value at the finding's place.
+
+    If none is there, about those of the entry as a whole.
+    """
     exact, around = [], []
     for path, (old, *_) in source.replaced.items():
         now = source.exactly_at(path)

@@ -88,7 +88,7 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
 
 
 def _is_optical_in_camera(edge: Edge, above: Mapping[str, Edge]) -> bool:
-    """Return whether the frame is optical in its parent, or in a frame of the same camera farther up.
+    """Return whether the frame is optical in its parent, or higher in its camera.
 
     Passed on the way are frames that are named after the camera, and those that are rotated like
     optical frames themselves.
@@ -112,7 +112,7 @@ def _is_optical_in_camera(edge: Edge, above: Mapping[str, Edge]) -> bool:
 
 
 def _is_wrong(edge: Edge, robot: Robot) -> bool:
-    """Return whether the rotation in the parent, which is not the optical one, can hardly be meant."""
+    """Return whether a rotation that is not optical is hardly intended."""
     quat_xyzw, parent = edge.pose.quat_xyzw, edge.parent.rpartition("/")[2]
     if _is_named_after(edge.child, edge.parent):
         return True
@@ -145,7 +145,10 @@ def _is_named_after(optical: str, frame: str) -> bool:
 
 
 def _stem(frame: str) -> str:
-    """Return what a frame and its optical frame have in common: camera_link, camera_optical_frame → camera."""
+    """Return what a frame and its optical frame have in common.
+
+    Camera_link, camera_optical_frame → camera.
+    """
     for ending in (*OPTICAL_ENDINGS, "_link", "_frame"):
         if frame.endswith(ending):
             return frame.removesuffix(ending)

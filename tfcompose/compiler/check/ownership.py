@@ -192,7 +192,7 @@ def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
 
 
 def _is_switched_on(process: Process, switch: dict[str, Any]) -> bool:
-    """Return whether a parameter or an argument has another value than the one that switches it off."""
+    """Return whether a parameter or argument fails to switch the driver off."""
     words = " ".join(process.argv).lower()
     others = [
         process.params[key] != value for key, value in switch.items() if key in process.params
@@ -298,7 +298,10 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
 
 
 def _most_hz(process: Process) -> float | None:
-    """Return the limit on the rate of the joint states that the process publishes, in Hz; None: no limit, or none."""
+    """Return the limit on the rate of the joint states that the process publishes, in Hz.
+
+    None: no limit, or none.
+    """
     stock = process.package == _STOCK
     most = process.params.get("publish_frequency", _STOCK_HZ if stock else None)
     ignores = process.params.get("ignore_timestamp") is True

@@ -1,4 +1,7 @@
-"""Rules about where sensors are: what their own robot hides from them, and what they have to see."""
+"""Rules about where sensors are.
+
+What their own robot hides from them, and what they have to see.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,10 @@ def _limit(robot: Robot, code: str) -> float:
 
 @dataclass(slots=True)
 class _Views:
-    """The views of the robot that was asked for last: several rules need them, one after the other."""
+    """The views of the robot that was asked for last.
+
+    Several rules need them, one after the other.
+    """
 
     robot: Robot | None = None
     of_sensors: dict[str, list[View]] = field(default_factory=dict)
@@ -148,7 +154,10 @@ def blind_sector(robot: Robot) -> Iterator[Finding]:
 
 
 def _largest_blind(view: View) -> tuple[float, float] | None:
-    """Return the largest sector in which every ray is blocked, or None; one may go on over the end of a turn."""
+    """Return the largest sector in which every ray is blocked, or None.
+
+    One may go on over the end of a turn.
+    """
     if view.optics.horizontal is None or not view.rays:
         return None
     start, end = view.optics.horizontal
@@ -218,7 +227,10 @@ def camera_sees_only_floor(robot: Robot) -> Iterator[Finding]:
 
 
 def _reach_on_floor(robot: Robot, view: View) -> float | None:
-    """Return the largest distance at which a free ray hits the floor; None if one misses it, or no floor is known."""
+    """Return the largest distance at which a free ray hits the floor.
+
+    None if one misses it, or no floor is known.
+    """
     if view.optics.kind != "camera" or not view.rays:
         return None
     poses = fixed_to(robot, view.optics.frame)
@@ -245,7 +257,7 @@ def _reach_on_floor(robot: Robot, view: View) -> float | None:
 
 
 def _lowest(robot: Robot, name: str, pose: Pose, up: Vector) -> float:
-    """Return how high the lowest point of a wheel is above the stream, which is less than 0 below it."""
+    """Return the height of a wheel's lowest point above the stream; < 0 below it."""
     link = robot.links.get(name)
     shapes = (link.collisions or link.visuals) if link else ()
     radii = [shape.size[0] for shape in shapes if shape.kind in {"cylinder", "sphere"}]
@@ -303,7 +315,7 @@ def _distance_in_sight(
     viewed: tuple[MountedSensor, Optics],
     poses: Mapping[str, Pose],
 ) -> float | None:
-    """Return how far the viewed stream's origin is, if the viewer looks at it and nothing is between; else None.
+    """Return the distance of the viewed stream's origin, None if it is not seen.
 
     ``poses`` are those of frames in the viewer's frame.
     """
@@ -368,7 +380,7 @@ _GRID = (10, 10, 4)
 
 
 def _covered(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
-    """Return the part of the zone's points that are seen, and the streams of which nothing is known."""
+    """Return the seen part of the zone's points, and streams without known optics."""
     points = [
         tuple(
             middle + extent * ((index + 0.5) / count - 0.5)
@@ -405,7 +417,10 @@ def _covered(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
 
 
 def _aim(optics: Optics, zone: Zone, point: Sequence[float], pose: Pose) -> Vector | None:
-    """Return the point in the stream's frame; for a scanner where its plane meets the zone below or above the point."""
+    """Return the point in the stream's frame.
+
+    For a scanner where its plane meets the zone below or above the point.
+    """
     x, y, z = point
     bx, by, bz = rotate(pose.quat_xyzw, (x, y, z))
     here = (pose.xyz[0] + bx, pose.xyz[1] + by, pose.xyz[2] + bz)
@@ -421,7 +436,10 @@ def _aim(optics: Optics, zone: Zone, point: Sequence[float], pose: Pose) -> Vect
 
 
 def _is_in_reach(optics: Optics, point: Vector) -> bool:
-    """Return whether the point is in the field of view and in range: of depth along z for a camera."""
+    """Return whether the point is in the field of view and in range.
+
+    Of depth along z for a camera.
+    """
     far = abs(point[2]) if optics.kind == "camera" else math.hypot(*point)
     return (
         far > 0

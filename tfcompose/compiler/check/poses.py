@@ -1,4 +1,7 @@
-"""Rules about poses: units, conventions of REP-103, and values that look mistyped; and where frames are in the base."""
+"""Rules about poses: units, conventions of REP-103, and values that look mistyped.
+
+And where frames are in the base.
+"""
 
 from __future__ import annotations
 
@@ -116,7 +119,7 @@ def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
 
 
 def _is_rounded(number: float) -> bool:
-    """Whether the number is a rounding, up or down, of a multiple of π/2, and not that multiple itself."""
+    """Whether the number is a rounded multiple of π/2, and not the multiple itself."""
     quarters = round(number / (math.pi / 2))
     exact = quarters * math.pi / 2
     if (
@@ -268,7 +271,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
 
 
 def _sizes(link: Link) -> list[float]:
-    """Return the largest size of each shape of the link but meshes, of which the file has only a scale."""
+    """Return the largest size of each shape of the link, but of meshes."""
     return [max(shape.size) for shape in (*link.visuals, *link.collisions) if shape.kind != "mesh"]
 
 
@@ -298,7 +301,10 @@ _MIRRORED_M = 0.001
 
 
 def placed(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
-    """Return the pose in the robot's base of each frame fixed to it; ``moving``: also through joints, at zero."""
+    """Return the pose in the robot's base of each frame fixed to it.
+
+    ``moving``: also through joints, at zero.
+    """
     poses = {robot.base: Pose()} if robot.base else {}
     children = robot.children() if poses else {}
     waiting = list(poses)
@@ -313,7 +319,10 @@ def placed(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
 
 
 def twins(frame: str) -> Iterator[str]:
-    """Yield the names that the frame has on the other side of the robot: left_wheel_link → right_wheel_link."""
+    """Yield the names that the frame has on the other side of the robot.
+
+    Left_wheel_link → right_wheel_link.
+    """
     words = frame.split("_")
     for index, word in enumerate(words):
         if word in _SIDES:
@@ -323,7 +332,7 @@ def twins(frame: str) -> Iterator[str]:
 
 
 def are_swapped(one: Edge, other: Edge) -> bool:
-    """Return whether the two are named after two sides of their parent and each stands, mirrored, on the other one."""
+    """Return whether two frames stand mirrored to the sides in their names."""
     axis, sign = side_of(one.child, other.child)
     here, there = one.pose.xyz, other.pose.xyz
     mirrored = list(there)
@@ -332,7 +341,7 @@ def are_swapped(one: Edge, other: Edge) -> bool:
 
 
 def side_of(frame: str, twin: str) -> tuple[int, int]:
-    """Return the axis on which the frame and its twin differ, and on which side of it the frame's name says it is."""
+    """Return the axis on which frame and twin differ, and the side in its name."""
     word = next(
         one for one, other in zip(frame.split("_"), twin.split("_"), strict=True) if one != other
     )
@@ -340,7 +349,7 @@ def side_of(frame: str, twin: str) -> tuple[int, int]:
 
 
 def are_mirrored(one: Edge, other: Edge) -> bool:
-    """Return whether the two are named after two sides of the robot and yet stand on the same one, at one place."""
+    """Return whether two frames named after two sides stand at one place."""
     if one.parent != other.parent or other.child not in twins(one.child):
         return False
     axis, _ = side_of(one.child, other.child)

@@ -1,4 +1,7 @@
-"""Rules about frame prefixes: nodes that look frames up need the names that frames have on the live tree."""
+"""Rules about frame prefixes.
+
+Nodes that look frames up need the names that frames have on the live tree.
+"""
 
 from __future__ import annotations
 

@@ -45,7 +45,10 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
 
 
 def _needed(robot: Robot) -> set[str]:
-    """Return the processes that own an edge, drive a sensor, publish TF by default, or are waited for."""
+    """Return the processes that matter to the tree, or are waited for.
+
+    They own an edge, drive a sensor, or publish TF by default.
+    """
     publishers = {claim.node for claim in robot.claims}
     return (
         {edge.owner for edge in robot.edges}

@@ -1,4 +1,7 @@
-"""Rules about stock publishers of TF among a robot's processes: what they publish is on their command lines."""
+"""Rules about stock publishers of TF among a robot's processes.
+
+What they publish is on their command lines.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +73,10 @@ def _own_arguments(process: Process) -> list[str]:
 
 
 def _frames_of(words: list[str]) -> tuple[str, str] | None:
-    """Return the parent and the child on the command line of a static_transform_publisher, old form or new."""
+    """Return parent and child from a static_transform_publisher's command line.
+
+    In its old form or the new.
+    """
     if "--frame-id" in words or any(word.startswith("--frame-id=") for word in words):
         parent, child = _option(words, "--frame-id"), _option(words, "--child-frame-id")
         return (_plain(parent), _plain(child)) if parent and child else None

@@ -35,7 +35,10 @@ FROM_LINE = 22.0  # from the line on the left of a column to its frames
 
 
 def arrange(graph: Graph, forest: Forest, direction: Direction = "auto") -> Layout:
-    """Return the position of everything, from (0, 0); ``auto`` goes to the right, unless it is too wide or too tall."""
+    """Return the position of everything, from (0, 0).
+
+    ``auto`` goes to the right, unless it is too wide or too tall.
+    """
     if direction == "down":
         return layout(graph, forest, is_down=True)
     flat = layout(graph, forest, is_down=False)
@@ -82,7 +85,10 @@ def in_columns(forest: Forest, flat: Layout) -> Layout:
 
 
 def _stem(forest: Forest) -> list[str]:
-    """Return the frames from the only root to the first with several children; empty where there are several roots."""
+    """Return the frames from the only root to the first with several children.
+
+    Empty where there are several roots.
+    """
     roots = [frame for frame in forest.order if frame not in forest.up]
     if len(roots) != 1 or forest.extra:
         return []
@@ -111,7 +117,7 @@ def _block(forest: Forest, flat: Layout, child: str) -> _Block:
 
 
 def _split(blocks: Sequence[_Block], count: int) -> list[list[_Block]]:
-    """Return the blocks in their order in at most so many columns, of which the tallest is as low as possible."""
+    """Return the blocks in order, in at most so many columns, the tallest as low as possible."""
     low, high = max(block.height for block in blocks), sum(block.height for block in blocks)
     while high - low > 1:
         middle = (low + high) / 2

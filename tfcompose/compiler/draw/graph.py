@@ -1,4 +1,4 @@
-"""What a picture shows: frames, edges, groups and owners, whether they were declared or observed."""
+"""Contents of a picture: frames, edges, groups and owners, declared or observed."""
 
 from __future__ import annotations
 
@@ -38,7 +38,9 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """A tree, or what is there instead: several roots, second parents and cycles are drawn as they are.
+    """A tree, or what is there instead.
+
+    Several roots, second parents and cycles are drawn as they are.
 
     Frames that edges name need not be in ``frames``. The order of frames and edges is that of the
     picture; ``owners`` are in the order of their colours. ``hidden`` are the edges to frames that
@@ -53,7 +55,7 @@ class Graph:
     hidden: tuple[Arrow, ...] = ()
 
     def all_frames(self) -> list[str]:
-        """Return every frame once: those that were given, then those that only edges and groups name."""
+        """Return every frame once: given ones, then those named only by edges and groups."""
         ends = (end for arrow in self.arrows for end in (arrow.parent, arrow.child))
         return list(
             dict.fromkeys(
@@ -67,7 +69,10 @@ class Graph:
 
 
 def collapsed(graph: Graph) -> Graph:
-    """Return the graph with each group as the frames that others need: where it begins, and what leads to others."""
+    """Return the graph with each group as the frames that others need.
+
+    Where it begins, and what leads to others.
+    """
     up = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
     inside = {frame: group for group in graph.groups for frame in group.frames}
     first = {
@@ -111,7 +116,7 @@ def collapsed(graph: Graph) -> Graph:
 
 @dataclass(frozen=True, slots=True)
 class Forest:
-    """A graph as trees: ``order`` holds the frames from top to bottom, each before its descendants.
+    """A graph as trees: ``order`` lists frames top to bottom, parents before descendants.
 
     ``up`` is the arrow from a frame's parent, ``extra`` are the others, ``group`` the index of a
     frame's group.
@@ -132,7 +137,9 @@ class Forest:
 
 
 def forest_of(graph: Graph) -> Forest:
-    """Return the graph as trees: a frame with several parents is below the first, and a cycle is broken once.
+    """Return the graph as trees.
+
+    A frame with several parents is below the first, and a cycle is broken once.
 
     Children of the same group as their parent come first, so that a group stays together.
     """
@@ -161,7 +168,10 @@ def forest_of(graph: Graph) -> Forest:
 def _walk(
     frames: Iterable[str], first: dict[str, Arrow], below: dict[str, list[str]]
 ) -> tuple[tuple[str, ...], dict[str, Arrow]]:
-    """Return the frames in the order of the picture, and the arrow from each one's parent; cycles come last."""
+    """Return the frames in the order of the picture, and the arrow from each one's parent.
+
+    Cycles come last.
+    """
     order: dict[str, None] = {}
     up: dict[str, Arrow] = {}
     for root in (*(frame for frame in frames if frame not in first), *frames):

@@ -1,4 +1,6 @@
-"""The position of each frame: a tree from left to right, a row for each leaf, a parent in the middle of its children.
+"""The position of each frame.
+
+A tree from left to right, a row for each leaf, a parent in the middle of its children.
 
 Or, downwards, a row for each frame, below its parent and a little to its right: what is long, such
 as an arm, then fits a page. The rows of two subtrees that do not contain one another are apart,
@@ -39,7 +41,10 @@ PAD = 8.0  # between a text and its box, and between a group and its frames
 
 @dataclass(slots=True)
 class Place:
-    """A frame's box: its left edge, the middle of its height, its width and height, in px from the top left corner."""
+    """A frame's box: left edge, middle of its height, width and height, in px.
+
+    From the top left corner.
+    """
 
     x: float
     y: float
@@ -59,7 +64,10 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """The rectangle of a group, with a strip for the label on top; ``frame`` is where the group begins."""
+    """The rectangle of a group, with a strip for the label on top.
+
+    ``frame`` is where the group begins.
+    """
 
     frame: str
     x: float
@@ -70,7 +78,10 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Trunk:
-    """The line from a frame to its children in columns: its y above them, and by child the x where it goes down."""
+    """The line from a frame to its children in columns.
+
+    Its y above them, and by child the x where it goes down.
+    """
 
     frame: str
     y: float
@@ -79,7 +90,7 @@ class Trunk:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """All places, the groups' areas (outer ones first), the size of it all, and whether it goes down, or in columns."""
+    """All positions, the groups' areas (outer first), the total size, and the direction."""
 
     places: dict[str, Place]
     areas: tuple[Area, ...]
@@ -114,7 +125,10 @@ def _box(forest: Forest, frame: str) -> Place:
 def _rows(
     forest: Forest, places: dict[str, Place], *, is_down: bool
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Give each frame its y; return the top and bottom of each group, by the frame where it begins, and the height."""
+    """Give each frame its y; return each group's top and bottom, and the height.
+
+    Groups are keyed by the frame where they begin.
+    """
     bands: dict[str, tuple[float, float]] = {}
     row = max((place.height for place in places.values()), default=0.0)
     y = 0.0
@@ -201,7 +215,7 @@ def _areas(
 def _own(
     forest: Forest, places: dict[str, Place], begin: str, below: Sequence[str], label: float
 ) -> tuple[float, float] | None:
-    """Return the right and lower edge around the group's own frames, or None if other frames are in the way.
+    """Return the right and lower edge around a group's frames, None if others are in the way.
 
     ``label`` is where the group's label ends.
     """

@@ -18,7 +18,10 @@ _DOT_LINES = {"static": "solid", "joint": "dashed", "dynamic": "dashed", "altern
 
 
 def dot(graph: Graph, *, is_down: bool = False) -> str:
-    """Return the graph in the DOT language: frames by their names, groups as clusters, owners as colours."""
+    """Return the graph in the DOT language.
+
+    Frames by their names, groups as clusters, owners as colours.
+    """
     return "".join(f"{line}\n" for line in _dot_lines(graph, "TB" if is_down else "LR"))
 
 
@@ -76,7 +79,10 @@ _MERMAID_MEANT = re.compile(r"[^\w ,.:/+()°·→-]")
 
 
 def mermaid(graph: Graph, *, is_down: bool = False) -> str:
-    """Return the graph as a Mermaid flowchart: moving edges are dotted, groups are subgraphs, owners have colours."""
+    """Return the graph as a Mermaid flowchart.
+
+    Moving edges are dotted, groups are subgraphs, owners have colours.
+    """
     return "".join(f"{line}\n" for line in _mermaid_lines(graph, "TD" if is_down else "LR"))
 
 
@@ -119,5 +125,8 @@ def _mermaid_colours(graph: Graph, owners: dict[str, int]) -> Iterator[str]:
 
 
 def _mermaid_text(text: str) -> str:
-    """Return the text as Mermaid's quotes hold it: what could be a sign of the language is an entity."""
+    """Return the text as Mermaid's quotes hold it.
+
+    What could be a sign of the language is an entity.
+    """
     return _MERMAID_MEANT.sub(lambda found: f"#{ord(found[0])};", visible(text))

@@ -1,4 +1,4 @@
-"""A drawing as PDF 1.4 (ISO 32000-1), on one page of its size, in Helvetica, which each reader has.
+"""A drawing as PDF 1.4 (ISO 32000-1), one page of its size, in Helvetica.
 
 Written here, because svglib with reportlab draws our SVG alike but takes 20 times as long, gives
 other bytes each time and loses characters beyond Latin-1, and CairoSVG takes whatever font and
@@ -25,7 +25,9 @@ ROUND = 0.5523  # where the control points of a quarter of a circle are, in radi
 
 
 def pdf(drawing: Drawing) -> bytes:
-    """Return the drawing as a PDF of one page; a very long one is made smaller. The same drawing gives the same bytes.
+    """Return the drawing as a PDF of one page; a very long one is made smaller.
+
+    The same drawing gives the same bytes.
 
     Characters that Helvetica in the encoding of Windows does not have are written as escapes.
     """

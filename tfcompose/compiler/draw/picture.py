@@ -1,4 +1,4 @@
-"""A graph as a drawing: boxes, curves and texts, with a legend, which any format can be written from.
+"""A graph as a drawing: boxes, curves, texts and a legend, for any format.
 
 Lengths are in px from the top left corner, y down.
 """
@@ -86,7 +86,7 @@ def _falling(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
 
 
 def _along(*corners: Point) -> tuple[Point, ...]:
-    """Return the curves along level and upright lines, with rounded corners between the first and the last point."""
+    """Return curves along horizontal and vertical lines, with rounded corners."""
     points = [corners[0]]
     for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
         into, out = _towards(corner, before), _towards(corner, after)
@@ -109,7 +109,7 @@ def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
 
 @dataclass(slots=True)
 class Text:
-    """A line of text: the beginning, or the middle, of its base line, and the width that it may take."""
+    """A line of text: start or middle of its base line, and the width it may take."""
 
     x: float
     y: float
@@ -133,7 +133,10 @@ class Drawing:
 
 
 def draw(graph: Graph, direction: Direction = "auto") -> Drawing:
-    """Return the drawing of the graph: groups at the back, then edges, then frames, and the legend on top."""
+    """Return the drawing of the graph.
+
+    Groups at the back, then edges, then frames, and the legend on top.
+    """
     forest = forest_of(graph)
     places = arrange(graph, forest, direction)
     owners = {name: index for index, name in enumerate(graph.all_owners())}
@@ -171,7 +174,10 @@ class _Pen:
         )
 
     def extras(self) -> list[Curve]:
-        """Return the edges that are not of the trees: forward as all others, and back from below to below."""
+        """Return the edges that are not of the trees.
+
+        Forward as all others, and back from below to below.
+        """
         curves = []
         for arrow in self.forest.extra:
             parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
@@ -287,7 +293,7 @@ def _facts(arrow: Arrow) -> list[str]:
 def _legend(
     graph: Graph, owners: dict[str, int], width: float, margin: float
 ) -> tuple[list[Shape], float, float]:
-    """Return the title and the legend, the width of everything without margins, and the y where the tree begins."""
+    """Return the title and legend, the total width without margins, and the tree's y."""
     edges = Counter(
         arrow.owner for arrow in (*graph.arrows, *graph.hidden) if not arrow.alternative
     )
@@ -341,7 +347,10 @@ def _line_items(graph: Graph) -> list[_Item]:
 def _wrapped(
     items: list[_Item], margin: float, y: float, width: float
 ) -> tuple[list[Shape], float, float]:
-    """Return the items in lines that fit ``width``, the y of the next line, and the width, if one alone is wider."""
+    """Return the items in lines that fit ``width``, the next line's y, and the width.
+
+    It is larger if one item alone is wider.
+    """
     shapes: list[Shape] = []
     x = margin
     for item in items:

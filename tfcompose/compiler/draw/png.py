@@ -1,4 +1,4 @@
-"""A drawing as PNG: the PDF, rendered by PDFium, which the package ``pypdfium2`` contains with its fonts."""
+"""A drawing as PNG: the PDF rendered by PDFium from the package ``pypdfium2``."""
 
 from __future__ import annotations
 

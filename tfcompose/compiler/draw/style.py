@@ -1,4 +1,4 @@
-"""Colours, lines and fonts in one table, from which SVG takes its style sheet and PDF its operators; widths of text.
+"""Colours, lines and fonts in one table for SVG and PDF, and widths of text.
 
 The colours of owners are those of Okabe and Ito, which people with any kind of colour blindness
 tell apart; each owner has a number as well, for print without colour and for robots with more
@@ -49,7 +49,10 @@ _OWNERS = (
 
 
 def colour_of(owner: int) -> int:
-    """Return the number of the owner's colour, from 0: the first has grey to itself, the others share the rest."""
+    """Return the number of the owner's colour, from 0.
+
+    The first has grey to itself, the others share the rest.
+    """
     return 1 + (owner - 1) % (len(_OWNERS) - 1) if owner else 0
 
 
@@ -82,7 +85,10 @@ STYLES: dict[str, Style] = {
 
 
 def style_of(names: str) -> Style:
-    """Return the style of one or two names: width and dash of the second count, where it has them."""
+    """Return the style of one or two names.
+
+    Width and dash of the second count, where it has them.
+    """
     first, _, second = names.partition(" ")
     style = STYLES[first]
     if not second:
@@ -126,7 +132,10 @@ def width_of(text: str, size: float, *, bold: bool = False) -> float:
 
 
 def shortened(text: str) -> str:
-    """Return the text as it is drawn: invisible characters as escapes, and of a long one its beginning and end."""
+    """Return the text as it is drawn.
+
+    Invisible characters as escapes, and of a long one its beginning and end.
+    """
     text = visible(text)
     if len(text) <= _MAX_CHARACTERS:
         return text

@@ -1,4 +1,4 @@
-"""A drawing as SVG: with a style sheet of its own, light and dark, and fonts that every system has."""
+"""A drawing as SVG with its own style sheet, light and dark, and common fonts."""
 
 from __future__ import annotations
 

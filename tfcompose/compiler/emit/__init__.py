@@ -1,4 +1,6 @@
-"""Turns a ``Robot`` without errors into files, as text: plan.json, URDF, xacro, parameters and pictures.
+"""Turns a ``Robot`` without errors into files, as text.
+
+Plan.json, URDF, xacro, parameters and pictures.
 
 The same robot gives the same bytes.
 """

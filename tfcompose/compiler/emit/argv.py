@@ -1,4 +1,4 @@
-"""The words that start a process, with the ROS arguments of nodes, and the nodes' parameter files."""
+"""Command lines of processes with the ROS arguments of nodes, and parameter files."""
 
 from __future__ import annotations
 
@@ -53,7 +53,9 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
 
 
 def _is_node(process: Process, *, owns: bool) -> bool:
-    """Whether a plain command is surely a ROS node: it owns an edge, or has settings that only nodes have.
+    """Whether a plain command is surely a ROS node.
+
+    It owns an edge, or has settings that only nodes have.
 
     What follows a text that a shell reads, or a launch file, does not reach the program.
     """
@@ -87,7 +89,10 @@ def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[
 
 
 def _own_params(process: Process) -> list[tuple[str, Any]]:
-    """Return the parameters of one of tfcompose's own processes; a number is a double, as its parameter is."""
+    """Return the parameters of one of tfcompose's own processes.
+
+    A number is a double, as its parameter is.
+    """
     return [
         (name, value if isinstance(value, bool) else float(value))
         for name, value in sorted(process.params.items())
@@ -104,7 +109,9 @@ def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tup
 
 
 def _names(process: Process, robot: Robot) -> list[str]:
-    """Return what gives the node its name and namespace; those that are listed as several have names of their own.
+    """Return what gives the node its name and namespace.
+
+    Those that are listed as several have names of their own.
 
     A name on the command line would rename every node of the process, also those that are not
     listed.
@@ -123,7 +130,10 @@ _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
 def file_params(process: Process) -> dict[str, dict[str, Any]]:
-    """Return what the process's parameter file holds, by node: all but the paths that only the launcher knows."""
+    """Return what the process's parameter file holds, by node.
+
+    All but the paths that only the launcher knows.
+    """
     if process.kind != "run":
         return {}
     nodes = {node.name: _known(node.params) for node in process.ros_nodes}
@@ -172,7 +182,7 @@ def _known(params: dict[str, Any]) -> dict[str, Any]:
 
 
 def params_file(nodes: dict[str, dict[str, Any]]) -> str:
-    """Return the file's text. Texts are always quoted, so that ROS cannot take one for a number or a bool."""
+    """Return the file's text. Texts are quoted, so that ROS takes none for a number."""
     lines = []
     for node, params in nodes.items():
         lines += [f"{_text(node)}:", "  ros__parameters:", *_mapping(params, "    ")]
@@ -195,7 +205,10 @@ _PLAIN = re.compile(r"[A-Za-z0-9_.+-]+")
 
 
 def _text(value: Any) -> str:
-    """Return the value as JSON that is YAML as well; a word of a parameter file as it was there."""
+    """Return the value as JSON that is YAML as well.
+
+    A word of a parameter file as it was there.
+    """
     if isinstance(value, AsInFile) and _PLAIN.fullmatch(value):
         return str(value)
     if isinstance(value, list):

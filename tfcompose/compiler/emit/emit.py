@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 
 def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
-    """Return the robot's files; the same robot gives the same bytes. There must be no errors in it.
+    """Return the robot's files; the same robot gives the same bytes.
+
+    There must be no errors in it.
 
     ``target`` says where they are written and how they address meshes.
     """
@@ -46,12 +48,18 @@ def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
 
 
 def described(robot: Robot) -> list[tuple[str, Robot]]:
-    """Return what has a description of its own: the robot, and each part that is a robot, by its name."""
+    """Return what has a description of its own.
+
+    The robot, and each part that is a robot, by its name.
+    """
     return [("", robot), *((part.name, part.robot) for part in robot.parts)]
 
 
 def _params(process: Process, nodes: dict[str, dict[str, Any]], stock: dict[str, str]) -> File:
-    """Return the process's parameters; a stock publisher's with the description that is meant for it."""
+    """Return the process's parameters.
+
+    A stock publisher's with the description that is meant for it.
+    """
     if process.describes:
         nodes = {
             node: params | {"robot_description": stock[process.part]}
@@ -61,7 +69,7 @@ def _params(process: Process, nodes: dict[str, dict[str, Any]], stock: dict[str,
 
 
 def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, ...]:
-    """Return what describes the robot, or a part that is a robot of its own, in a folder of its own."""
+    """Return the descriptions of the robot, or of a part with its own, in its folder."""
     target = replace(target, folder=posixpath.join(target.folder, folder))
     full, stock = urdf(robot, target)
     return (

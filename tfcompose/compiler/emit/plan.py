@@ -73,7 +73,9 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
 
 
 def _needed(robot: Robot) -> list[Process]:
-    """Return the processes that have something to do: ``joints`` where joints move, else ``static`` at least.
+    """Return the processes that have something to do.
+
+    ``joints`` where joints move, else ``static`` at least.
 
     That holds for the robot, and for each part that is a robot of its own.
     """
@@ -98,7 +100,10 @@ def _below(part: str, name: str) -> str:
 
 
 def _digest(robot: Robot) -> str:
-    """Return the digest of what was written: it changes when a key or value does, and not with layout or comments."""
+    """Return the digest of what was written.
+
+    It changes when a key or value does, and not with layout or comments.
+    """
     text = json.dumps(robot.source_data, sort_keys=True, ensure_ascii=False)
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
@@ -119,7 +124,10 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
 
 
 def _relative(file: str, to: str) -> str:
-    """Return where ``file`` is, seen from the robot's file: the same wherever the robot's folder is."""
+    """Return where ``file`` is, seen from the robot's file.
+
+    The same wherever the robot's folder is.
+    """
     return posixpath.relpath(file, posixpath.dirname(to) or ".")
 
 
@@ -174,14 +182,17 @@ def _at(target: Target, process: PlanProcess) -> PlanProcess:
 
 
 def _on(main: str | None, process: PlanProcess) -> PlanProcess:
-    """Return the process on its host: what names none runs where ``static`` does. The guard runs everywhere."""
+    """Return the process on its host: what names none runs where ``static`` does.
+
+    The guard runs everywhere.
+    """
     if process.host or process.kind in ("external", "guard"):
         return process
     return replace(process, host=main)
 
 
 def driven_of(process: Process, robot: Robot) -> tuple[Driven, ...]:
-    """Return the sensors that the process drives, where their driver publishes anything unless it is kept from it."""
+    """Return the sensors that the process drives and whose driver publishes by default."""
     return tuple(_driven(sensor, robot) for sensor in _sensors(process, robot))
 
 

@@ -52,7 +52,7 @@ def fixed_to(robot: Robot, frame: str, *, only_static: bool = False) -> dict[str
 
 
 def sphere_around(shape: Shape) -> tuple[Vector, float] | None:
-    """Return the middle, in the shape's frame, and the radius of a sphere around the shape, in metres.
+    """Return the centre, in the shape's frame, and radius of its bounding sphere, in m.
 
     None: a mesh that cannot be read, because trimesh is not installed or the file is no mesh.
     """
@@ -71,7 +71,9 @@ def sphere_around(shape: Shape) -> tuple[Vector, float] | None:
 def bodies_around(
     robot: Robot, sensor: MountedSensor, poses: Mapping[str, Pose]
 ) -> Iterator[Body]:
-    """Yield the shapes of the links at ``poses`` that are not the sensor's own: for collision, else those seen.
+    """Yield the shapes of the links at ``poses`` that are not the sensor's own.
+
+    For collision, else those seen.
 
     A link in whose origin the sensor stands is its housing.
     """

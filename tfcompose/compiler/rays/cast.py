@@ -23,7 +23,10 @@ _FAR_M = 1e3
 
 @dataclass(frozen=True, slots=True)
 class Ray:
-    """A ray in the stream's frame: a unit vector, and the metres to the first body, a link; endless if it is free."""
+    """A ray in the stream's frame: a unit vector, and the metres to the first body, a link.
+
+    Endless if it is free.
+    """
 
     direction: Vector
     distance: float = math.inf
@@ -105,7 +108,10 @@ Hits = list[tuple[int, float]]
 
 
 def _read_hits(body: Body, into: Sequence[Vector]) -> tuple[float | None, Hits]:
-    """Return how deep the origin is in the body, None if its mesh cannot be read, and where rays hit it."""
+    """Return how deep the origin is in the body, and where rays hit it.
+
+    The depth is None if its mesh cannot be read.
+    """
     to_shape = body.pose.inverse()
     if body.shape.kind != "mesh":
         depth = depth_in(body.shape, to_shape.xyz)

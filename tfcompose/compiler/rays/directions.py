@@ -46,7 +46,9 @@ def is_plane(optics: Optics) -> bool:
 
 
 def directions(optics: Optics) -> tuple[Vector, ...]:
-    """Return unit vectors in the stream's frame, spread evenly over its image or its sector; none if that is unknown.
+    """Return unit vectors in the stream's frame, spread evenly over its image or its sector.
+
+    None if that is unknown.
 
     A plane is sampled a degree apart and in order, from its first angle to its last.
     """
@@ -62,7 +64,7 @@ def directions(optics: Optics) -> tuple[Vector, ...]:
 
 
 def contains(optics: Optics, point: Vector) -> bool:
-    """Return whether the point, in the stream's frame, is in its image or sector, at any distance."""
+    """Return whether the point, in the stream's frame, is in its image or sector."""
     if optics.kind == "camera":
         x, y, z = point
         forward, left, up = (-z, -x, y) if optics.backward else (z, -x, -y)
@@ -121,7 +123,7 @@ def _image(
 
 
 def _disc(optics: Optics) -> tuple[Vector, ...]:
-    """Return the directions of pixels, evenly over the image circle of an equidistant fisheye (Vogel's spiral)."""
+    """Return the directions of pixels, evenly over an equidistant fisheye (Vogel's spiral)."""
     if optics.diagonal is None:
         return ()
     made = []

@@ -23,7 +23,9 @@ _read = lru_cache(maxsize=32)(read_mesh)
 def distances(
     path: str, scale: Vector, origin: Vector, directions: Sequence[Vector]
 ) -> list[float]:
-    """Return how far along each ray the mesh begins, endless where it is missed; all in the mesh's frame, in metres.
+    """Return how far along each ray the mesh begins, endless where it is missed.
+
+    All in the mesh's frame, in metres.
 
     Raises:
         Exception: whatever a reader raises for a file that is no mesh.
@@ -40,7 +42,7 @@ def distances(
 
 
 def sphere_around(path: str, scale: Vector) -> tuple[Vector, float]:
-    """Return the middle of the mesh's box, in the mesh's frame, and the radius of the sphere around that box.
+    """Return the centre of the mesh's box, in its frame, and the radius around that box.
 
     Raises:
         Exception: whatever a reader raises for a file that is no mesh.
@@ -51,7 +53,9 @@ def sphere_around(path: str, scale: Vector) -> tuple[Vector, float]:
 
 
 def depth_in(path: str, scale: Vector, point: Vector) -> float:
-    """Return how deep the point is in the mesh, in metres; negative outside, and in a mesh that is not closed.
+    """Return how deep the point is in the mesh, in metres.
+
+    Negative outside, and in a mesh that is not closed.
 
     Raises:
         Exception: whatever a reader raises for a file that is no mesh.

@@ -1,4 +1,4 @@
-"""Rays against primitives in their own frames (URDF's: the middle at the origin, cylinders along z)."""
+"""Rays against primitives in their own frames (URDF: centred, cylinders along z)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ _TINY = 1e-12
 
 
 def depth_in(shape: Shape, point: Vector) -> float:
-    """Return how deep the point, in the shape's frame, is in it, in metres; negative outside. Not for meshes."""
+    """Return how deep the point, in the shape's frame, is in it, in metres; negative outside.
+
+    Not for meshes.
+    """
     x, y, z = point
     size = shape.size
     match shape.kind:
@@ -27,7 +30,10 @@ def depth_in(shape: Shape, point: Vector) -> float:
 
 
 def distance(shape: Shape, origin: Vector, direction: Vector) -> float:
-    """Return how far along the ray the shape begins, from outside; endless if it is missed. Not for meshes."""
+    """Return how far along the ray the shape begins, from outside; endless if it is missed.
+
+    Not for meshes.
+    """
     size = shape.size
     match shape.kind:
         case "sphere":

@@ -1,1 +1,4 @@
-"""Makes text of what commands print: findings for people and programs, a robot's tree, and poses."""
+"""Makes text of what commands print.
+
+Findings for people and programs, a robot's tree, and poses.
+"""

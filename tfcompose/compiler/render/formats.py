@@ -163,7 +163,9 @@ def render_junit(
     failing: frozenset[str],
     seconds: float,
 ) -> str:
-    """Return a test suite of cases (group, name, findings); one fails if a finding has a ``failing`` severity.
+    """Return a test suite of cases (group, name, findings).
+
+    One fails if a finding has a ``failing`` severity.
 
     The other findings are in its output.
     """

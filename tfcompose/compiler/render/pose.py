@@ -11,7 +11,9 @@ if TYPE_CHECKING:
 
 
 def pose_text(parent: str, child: str, pose: Pose, when: str = "", decimals: int = 4) -> str:
-    """Return the pose of ``child`` in ``parent``: metres, quaternion x y z w, fixed-axis angles in both units.
+    """Return the pose of ``child`` in ``parent``.
+
+    Metres, quaternion x y z w, fixed-axis angles in both units.
 
     Degrees have two decimals fewer.
     """

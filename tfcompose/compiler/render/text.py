@@ -28,7 +28,10 @@ _LONGEST_MESSAGE = 1000
 def render_text(
     found: Sequence[Finding], line_of: Callable[[str, int], str | None], *, colour: bool
 ) -> str:
-    """Return the findings as text; ``line_of`` returns a line of a file (from 1), or None if it cannot be read."""
+    """Return the findings as text.
+
+    ``line_of`` returns a line of a file (from 1), or None if it cannot be read.
+    """
     return "".join(_one(one, line_of, _Paint(colour=colour)) for one in found)
 
 
@@ -85,7 +88,7 @@ def _excerpt(
 
 
 def summary(found: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
-    """Return the last line: the number of findings and of files, and why warnings alone exit 0, if they do."""
+    """Return the last line: counts of findings and files, and why warnings exit 0."""
     errors = sum(one.severity == "error" for one in found)
     warnings = len(found) - errors
     where = f"in {counted(files, 'file')}"

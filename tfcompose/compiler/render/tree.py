@@ -1,4 +1,7 @@
-"""A robot's tree as text, and as a graph to be drawn: frames, and at each edge its kind, owner, rate and pose."""
+"""A robot's tree as text, and as a graph to be drawn.
+
+Frames, and at each edge its kind, owner, rate and pose.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,9 @@ GAP = "  "
 
 
 def tree(robot: Robot, columns: int | None = None) -> str:
-    """Return the tree, one frame a line: kind, owner, rate; position in metres and rpy in degrees where not zero.
+    """Return the tree, one frame a line: kind, owner, rate.
+
+    Position in metres and rpy in degrees where not zero.
 
     Where that is wider than ``columns``, the facts follow each name at once, without the kinds
     that owners imply; then without ``static`` where somebody else is the owner; and at last they
@@ -78,7 +83,7 @@ def _fitted(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[
 
 
 def wrapped(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> list[list[str]]:
-    """Return lines of at most so many columns for each row of a drawing, where names are no longer than that.
+    """Return each row of a drawing as lines of at most this many columns.
 
     A row is the lines that lead to a name, the name, and facts; those for which there is no room
     follow below. Where names have no room either, a level takes two columns.
@@ -93,7 +98,10 @@ def wrapped(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> lis
 
 
 def _facts(edge: Edge | None, kinds: Collection[str]) -> list[str]:
-    """Return what is said of an edge; its kind if it is among these, and its owner does not say as much."""
+    """Return what is said of an edge.
+
+    Its kind if it is among these, and its owner does not say as much.
+    """
     if edge is None:
         return []
     kind = edge.kind if edge.kind in kinds and edge.owner not in {STATIC, JOINTS} else ""
@@ -153,7 +161,10 @@ def short_pose(pose: Pose) -> str:
 
 
 def graph_of(robot: Robot, *, poses: bool = False) -> Graph:
-    """Return the tree of a robot with final names: sensors are groups, owners are in the order of the tree."""
+    """Return the tree of a robot with final names.
+
+    Sensors are groups, owners are in the order of the tree.
+    """
     presets = {sensor.name: sensor.preset for sensor in robot.sensors}
     groups: dict[str, list[str]] = {}
     for edge in robot.edges:

@@ -1,4 +1,6 @@
-"""Turns a ``RobotSpec`` into a ``Robot``: presets expanded, parts included, poses solved, owners given.
+"""Turns a ``RobotSpec`` into a ``Robot``.
+
+Presets expanded, parts included, poses solved, owners given.
 
 What cannot be resolved is a finding, and the robot goes on without it.
 """

@@ -1,4 +1,6 @@
-"""``ros2_control`` and ``xml``: what a URDF holds next to links and joints, checked against the robot.
+"""``ros2_control`` and ``xml``.
+
+What a URDF holds next to links and joints, checked against the robot.
 
 The places of a raw block are lines of the robot file.
 """
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Known(Collection[str]):
-    """Names, which count as known too where ``excuses`` says that they may be missing only for a refused entry."""
+    """Names, with ``excuses`` for those that may be missing because of a refused entry."""
 
     names: Sequence[str]
     excuses: Callable[[str], bool]
@@ -92,7 +94,10 @@ def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component
 def _blocks_of(
     texts: dict[str, str], source: Source, frames: Collection[str], joints: Collection[str]
 ) -> tuple[tuple[Block, ...], list[Finding]]:
-    """Return the raw blocks, and what is wrong with them. ``joints`` are the names of all joints of the robot."""
+    """Return the raw blocks, and what is wrong with them.
+
+    ``joints`` are the names of all joints of the robot.
+    """
     found: list[Finding] = []
     blocks = []
     for name, text in texts.items():
@@ -111,7 +116,7 @@ def _blocks_of(
 
 
 def _in_file(span: Span | None, text: str, source: Source, at: Path) -> Span:
-    """Return the place in the robot file of a place in the block, in which its text begins at line 2.
+    """Return the place in the robot file of a place in the block, whose text starts at line 2.
 
     Only in a literal block (``|``) are the lines those of the file; elsewhere it is the whole
     value.

@@ -32,7 +32,10 @@ FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 @dataclass(slots=True)
 class Bodies:
-    """Makes links of what is written; ``found`` holds what is wrong with the files of meshes and textures."""
+    """Makes links of what is written.
+
+    ``found`` holds what is wrong with the files of meshes and textures.
+    """
 
     source: Source
     packages: Packages = field(default_factory=Packages)
@@ -103,7 +106,10 @@ class Bodies:
         return tuple(made)
 
     def _material(self, given: specs.Material, at: Path) -> Material:
-        """Return the colour with its name; one without is named after its parts, so that URDF keeps them apart."""
+        """Return the colour with its name.
+
+        One without is named after its parts, so that URDF keeps them apart.
+        """
         texture = None
         if given.texture is not None:
             texture, wrong = self.packages.asset(given.texture, self.source.at((*at, "texture")))
@@ -144,7 +150,10 @@ class Bodies:
         return replace(computed, pose=Pose(given.xyz)) if given.xyz else computed
 
     def moments(self, shapes: tuple[Shape, ...], at: Span) -> Moments | None:
-        """Return the moments of the shapes at density 1 in the link's axes, or None after saying why there are none."""
+        """Return the moments of the shapes at density 1 in the link's axes, None if unknown.
+
+        The reason is then a finding.
+        """
         parts: list[Moments] = []
         for shape in shapes:
             if shape.mesh is None:
@@ -175,7 +184,7 @@ class Bodies:
 
 
 def with_colours(links: dict[str, Link]) -> dict[str, Link]:
-    """Return the links in which a material that is a name alone has the colour of the first one by that name.
+    """Return the links with plain material names given the colour of their first use.
 
     Where no other has one, it may be the name of a colour.
     """

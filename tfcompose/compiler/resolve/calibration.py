@@ -46,7 +46,7 @@ def calibrated(
     source: Source,
     read: Reader | None,
 ) -> tuple[list[Draft], list[Finding]]:
-    """Return the drafts, those with a calibration measured, and what is wrong with the calibrations."""
+    """Return the drafts with measured calibrations, and what is wrong with calibrations."""
     work = _Work(_Files(read), frozenset(frames), spec, source)
     for draft in drafts:
         if draft.group:
@@ -104,7 +104,10 @@ class _Match:
 def _matches(
     entries: Sequence[Entry], parents: Collection[str], children: Collection[str]
 ) -> list[_Match]:
-    """Return the entries of a child in a parent; those the other way round only if there is none."""
+    """Return the entries of a child in a parent.
+
+    Those the other way round only if there is none.
+    """
     straight = [
         _Match(one, inverted=False)
         for one in entries
@@ -139,7 +142,7 @@ class _Work:
         return self._measured(draft, match, file, declared, at) if match else draft
 
     def _around(self, draft: Draft) -> tuple[set[str], set[str]]:
-        """Return the names of the frames that the edge's parent and child can have in its entry."""
+        """Return the frame names that the edge's parent and child can have in its entry."""
         inside = self.inside[draft.group] if draft.group else {draft.edge.child}
         return {draft.edge.parent, draft.relative_to or draft.edge.parent}, inside
 
@@ -239,7 +242,10 @@ class _Work:
         return replace(draft, measured=calibration, has_nominal=_has_pose(draft, self.spec))
 
     def apply(self, named: str, at: Span, drafts: list[Draft]) -> list[Draft]:
-        """Return the drafts with every entry of a file applied; one that nothing takes is a finding."""
+        """Return the drafts with every entry of a file applied.
+
+        One that nothing takes is a finding.
+        """
         file = self.files.get(named, at)
         result = []
         for draft in drafts:
@@ -304,7 +310,7 @@ def _declared(draft: Draft, spec: RobotSpec) -> CalibrationSpec | None:
 
 
 def _alias(name: str) -> set[str]:
-    """Return the name, and how Kalibr's result files call the IMU that its own input calls imu0."""
+    """Return the name, and what Kalibr's results call the IMU that its input calls imu0."""
     return {name, "imu"} if name == "imu0" else {name}
 
 

@@ -1,4 +1,6 @@
-"""What nodes publish by themselves: switched off where another process owns the edge, under the names of its frames.
+"""What nodes publish by themselves.
+
+Switched off where another process owns the edge, under the names of its frames.
 
 A claim that cannot be settled by parameters of a process that tfcompose starts is a finding, with
 the exact switch.
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
-    """Return the robot whose nodes have the parameters that settle what they publish, and what cannot be settled."""
+    """Return the robot with claims settled by parameters, and claims that cannot be settled."""
     work = _Work(robot, spec, source)
     processes = tuple(work.process(process) for process in robot.processes)
     edges = tuple(work.edge(edge) for edge in robot.edges)
@@ -61,7 +63,10 @@ class _Work:
         return replace(process, ros_nodes=tuple(nodes))
 
     def edge(self, edge: Edge) -> Edge:
-        """Return the edge with its publisher; an owner of whose nodes none is known to publish it is a finding."""
+        """Return the edge with its publisher.
+
+        An owner of whose nodes none is known to publish it is a finding.
+        """
         node = self.publishers.get((edge.owner, edge.child))
         if node is not None:
             return replace(edge, node=node)
@@ -132,7 +137,10 @@ class _Work:
         return None
 
     def _of_one(self, claimant: Claimant) -> tuple[ClaimSpec, ...]:
-        """Return the claim that a node makes which makes one out of several: its own, or the one that is chosen."""
+        """Return the claim that a node makes which makes one out of several.
+
+        Its own, or the one that is chosen.
+        """
         for claim in claimant.claims:
             if self._is_own(claimant, claim):
                 return (claim,)
@@ -145,7 +153,7 @@ class _Work:
         return claimant.claims[:1]
 
     def _set_names(self, claimant: Claimant) -> None:
-        """Write the parameters that hold frames' names, and those without which they would mean something else."""
+        """Write the parameters that hold frame names, and those that give them their meaning."""
         preset = claimant.preset
         if preset is None:
             return
@@ -308,7 +316,10 @@ class _Work:
 
 @dataclass(slots=True)
 class Claimant:
-    """One node that may publish TF: what is known of it, the parameters a user gave it, and those tfcompose adds."""
+    """One node that may publish TF.
+
+    What is known of it, the parameters a user gave it, and those tfcompose adds.
+    """
 
     process: Process
     node: Node
@@ -338,7 +349,10 @@ class Claimant:
 
     @property
     def takes_parameters(self) -> bool:
-        """Return whether parameters that tfcompose writes reach the node: launch files and shells have to pass them."""
+        """Return whether parameters that tfcompose writes reach the node.
+
+        Launch files and shells have to pass them.
+        """
         process = self.process
         if process.kind != "run":
             return process.component is not None
@@ -414,7 +428,10 @@ class Roles:
                 self._bound.setdefault(hole[1], frame)
 
     def _fit(self, edge: Edge, claim: ClaimSpec) -> int:
-        """Return how well an edge fits a claim: by its ends' names, and by what hangs below; negative if not at all."""
+        """Return how well an edge fits a claim: by its ends' names, and by what hangs below.
+
+        Negative if not at all.
+        """
         score = 0
         for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
             hole = _HOLE.fullmatch(template)

@@ -1,4 +1,6 @@
-"""Containers and the components in them: programs of rclcpp_components, and the nodes that they load.
+"""Containers and the components in them.
+
+Programs of rclcpp_components, and the nodes that they load.
 
 Facts of rclcpp_components (ROS 2 Jazzy): ``component_container`` has one executor with one thread
 for all components, ``component_container_mt`` one with several threads;
@@ -62,7 +64,10 @@ def container_process(name: str, declared: ContainerSpec, validated: Validated) 
 
 
 def component_process(process: Process, declared: Started, spec: RobotSpec) -> Process:
-    """Return the process as a component of the container that it names: it runs where, and is as needed as, that is."""
+    """Return the process as a component of the container that it names.
+
+    It runs where, and is as needed as, that is.
+    """
     package, _, plugin = (declared.component or "").partition("/")
     loaded: dict[str, StartCondition] = {declared.container or "": "ready"}
     name = declared.container or ""
@@ -79,7 +84,10 @@ def component_process(process: Process, declared: Started, spec: RobotSpec) -> P
 
 
 def component_findings(path: Path, process: Process, validated: Validated) -> Iterator[Finding]:
-    """Yield what is wrong with a component, whose keys are at the path: no such container, and what it cannot have."""
+    """Yield what is wrong with a component, whose keys are at the path.
+
+    No such container, and what it cannot have.
+    """
     spec, source = validated.spec, validated.source
     component = process.component
     if component is None:

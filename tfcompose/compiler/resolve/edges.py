@@ -94,7 +94,7 @@ class Drafts:
             )
 
     def add_part(self, part: Joined) -> bool:
-        """Take a part: its frames, edges and bodies under the names that they have here, and its mount edge.
+        """Take a part: its frames, edges and bodies under their new names, and its mount edge.
 
         Return False, and take nothing, if it brings names that are there already.
         """
@@ -221,7 +221,10 @@ class Drafts:
         )
 
     def named_joint(self, name: str, at: Path) -> Span:
-        """Take the name of the joint that an entry is, or whose key ``joint`` it is; return its place."""
+        """Take the name of the joint that an entry is, or whose key ``joint`` it is.
+
+        Return its place.
+        """
         place = self.source.at_key(at) if at[0] == "joints" else self.source.at((*at, "joint"))
         if name in self.joints:
             notes = [Note("the other one", self.joints[name])]
@@ -368,7 +371,7 @@ _OPTICAL_IN = ("frames", "links", "joints")
 
 
 def optical_edits(path: Path, keys: EdgeKeys, source: Source) -> tuple[Edit, ...]:
-    """Return the edits that turn the frame of the entry at ``path``, or none where that would change something else."""
+    """Return edits that rotate the frame of the entry at ``path``, none if others would move."""
     if path[0] not in _OPTICAL_IN or source.at(path).file != source.at((*path, "parent")).file:
         return ()
     rotations = [key for key in _OPTICAL if source.has_key((*path, key))]
@@ -398,7 +401,10 @@ def _insertion(path: Path, source: Source) -> Edit:
 
 
 def _replaced(old: Any, new: Any, path: Path, source: Source) -> list[Edit]:
-    """Return the edits that put each scalar of ``new`` in the place of that of ``old``; none where the forms differ."""
+    """Return the edits that put each scalar of ``new`` in the place of that of ``old``.
+
+    None where the forms differ.
+    """
     if isinstance(new, dict):
         return [
             edit

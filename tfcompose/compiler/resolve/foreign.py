@@ -120,7 +120,7 @@ def _expanded(
 
 
 def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
-    """Return a value with the absolute path of each ``${file(PATH)}``, which is relative to the robot file."""
+    """Return a value with each ``${file(PATH)}`` made absolute from the robot file's folder."""
     at = part.source.at(path)
 
     def absolute(call: re.Match[str]) -> str:
@@ -145,7 +145,9 @@ _PARAMETER = re.compile(r"(\*{0,2}[A-Za-z_]\w*)(?:\s*:?=\s*('[^']*'|\S+))?")
 
 
 def _bolted(part: PartEntry, text: str) -> dict[str, str]:
-    """Return what a macro is given that takes a parent, and perhaps an origin, where ``parent`` stands at the part.
+    """Return the arguments of a macro that takes a parent, and perhaps an origin.
+
+    The part's key ``parent`` gives it.
 
     The origin is none: the part's own keys say where it is.
     """
@@ -159,7 +161,9 @@ def _bolted(part: PartEntry, text: str) -> dict[str, str]:
 
 
 def _loose(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
-    """Return what a macro made without the joint by which it hangs on its parent: the part's mount edge is that.
+    """Return what a macro made without the joint by which it hangs on its parent.
+
+    The part's mount edge is that.
 
     Raises:
         RejectedError: if there are several such joints, or one that moves or is somewhere else.

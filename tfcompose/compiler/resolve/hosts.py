@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 
 def hosts_of(spec: RobotSpec, source: Source) -> dict[str, Host]:
-    """Return the computers that the file declares, by name; ssh finds one by its name if nothing else is said."""
+    """Return the computers that the file declares, by name.
+
+    Ssh finds one by its name if nothing else is said.
+    """
     return {
         name: Host(
             one.ssh or name,
@@ -29,7 +32,10 @@ def hosts_of(spec: RobotSpec, source: Source) -> dict[str, Host]:
 
 
 def with_host_place(process: Process, source: Source) -> Process:
-    """Return the process with the place of its host; a component that runs where its container does has none."""
+    """Return the process with the place of its host.
+
+    A component that runs where its container does has none.
+    """
     for path in (
         ("processes", process.name),
         ("containers", process.name),

@@ -1,4 +1,4 @@
-"""Robots beside each other: frame prefixes, topics below a namespace, and names that processes are given.
+"""Robots side by side: frame prefixes, namespaced topics, and names of processes.
 
 A prefix is written in front of every frame that is not shared, as it is (robot_state_publisher's
 ``frame_prefix`` does the same). Topics are isolated as Clearpath does it: /tf and /tf_static,
@@ -37,7 +37,10 @@ def settings_of(ros: RosSpec) -> RosSettings:
 
 
 def topics_below(namespace: str, isolate: str) -> dict[str, str]:
-    """Return where the TF topics are moved: below the namespace, if they are isolated and it is one."""
+    """Return where the TF topics are moved.
+
+    Below the namespace, if they are isolated and it is one.
+    """
     moves = isolate in {"topics", "both"} and namespace
     return {topic: f"/{namespace}{topic}" for topic in TF_TOPICS} if moves else {}
 
@@ -45,7 +48,10 @@ def topics_below(namespace: str, isolate: str) -> dict[str, str]:
 def isolate(
     robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None = None
 ) -> tuple[Robot, list[Finding]]:
-    """Return the robot with its processes' topics moved, and frames and files in them named; and what is wrong."""
+    """Return the robot with its processes' topics moved, and frames and files in them named.
+
+    And what is wrong.
+    """
     found = _wrong(robot, spec, source)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
     processes = []
@@ -154,7 +160,10 @@ class _Filler:
         return f"${{file:{place}}}"
 
     def _folder(self, cwd: str | None, path: Path) -> str | None:
-        """Return the folder that a process runs in: a relative one is beside the file that names it."""
+        """Return the folder that a process runs in.
+
+        A relative one is beside the file that names it.
+        """
         if cwd is None or cwd.startswith(("/", "${")):
             return self._fill(cwd, path)  # type: ignore[no-any-return]
         at = self.source.at(path)
@@ -167,7 +176,7 @@ class _Filler:
         return f"${{file:{place}}}"
 
     def _check_paths(self, process: Process, node: Node) -> None:
-        """Find parameters with a path that only the launcher knows, where it has no way to tell the node."""
+        """Find parameters with a launch-time path where the launcher cannot name the node."""
         can = process.component or (
             process.kind == "run" and process.package is not None and len(process.nodes) == 1
         )

@@ -1,4 +1,7 @@
-"""The middleware that the robot names: Zenoh's router among its processes, and what cannot work with it."""
+"""The middleware that the robot names.
+
+Zenoh's router among its processes, and what cannot work with it.
+"""
 
 from __future__ import annotations
 
@@ -33,12 +36,15 @@ _PROGRAM = ("rmw_zenoh_cpp", "rmw_zenohd")
 
 
 def is_own_router(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> bool:
-    """Return whether a process is the router that nobody has to declare: what stands under its name adds to it."""
+    """Return whether a process is the router that nobody has to declare.
+
+    What stands under its name adds to it.
+    """
     return spec.ros.rmw == "zenoh" and name == ROUTER and not says_how(declared)
 
 
 def own_router(spec: RobotSpec, source: Source) -> list[Process]:
-    """Return the process of Zenoh's router, unless the robot has one of its own, or its middleware needs none."""
+    """Return the Zenoh router's process, unless the robot has one or needs none."""
     declared = spec.processes.get(ROUTER)
     runs_it = any(
         one.run and (one.run.package, one.run.executable) == _PROGRAM
@@ -60,7 +66,10 @@ def own_router(spec: RobotSpec, source: Source) -> list[Process]:
 
 
 def with_router(robot: Robot) -> Robot:
-    """Return the robot whose processes start once Zenoh's router listens; the router knows where."""
+    """Return the robot whose processes start once Zenoh's router listens.
+
+    The router knows where.
+    """
     routers = _routers(robot)
     if robot.ros.rmw != "zenoh" or not routers:
         return robot
@@ -91,7 +100,7 @@ def _routers(robot: Robot) -> list[Process]:
 
 
 def wrong_middleware(robot: Robot, spec: RobotSpec, source: Source) -> Iterator[Finding]:
-    """Yield what the middleware cannot do, what names another, and computers that do not reach the router."""
+    """Yield what the middleware cannot do, conflicts, and hosts that do not reach the router."""
     ros = robot.ros
     if spec.ros.router and ros.rmw != "zenoh":
         advice = "ros: {rmw: zenoh}, or remove router"
@@ -125,7 +134,10 @@ def _not_supported(robot: Robot, source: Source) -> Iterator[Finding]:
 
 
 def _disagreeing(robot: Robot, source: Source) -> Iterator[Finding]:
-    """Yield a finding for each process that is given another middleware: it finds none of the others."""
+    """Yield a finding for each process that is given another middleware.
+
+    It finds none of the others.
+    """
     wanted = IMPLEMENTATIONS[robot.ros.rmw] if robot.ros.rmw else ""
     for process in robot.processes:
         own = process.env.get(_RMW)

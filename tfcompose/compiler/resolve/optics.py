@@ -39,7 +39,7 @@ _REPLACES = {"elevations": ("channels", "vertical"), "channels": ("elevations",)
 def optics_of(
     sensor: Sensor, frames: Collection[str], renamed: Callable[[str], str], source: Source
 ) -> tuple[tuple[Optics, ...], list[Finding]]:
-    """Return what the sensor's streams see, of those whose frame is one of ``frames``, and what is wrong with it.
+    """Return the optics of the sensor's streams in ``frames``, and what is wrong with them.
 
     ``frames`` are the sensor's, its mount among them, before any renaming.
     """

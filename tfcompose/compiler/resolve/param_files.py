@@ -1,4 +1,7 @@
-"""Parameter files that a process names: what they say to its nodes, with the inline parameters laid over it."""
+"""Parameter files that a process names.
+
+What they say to its nodes, with the inline parameters laid over it.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ def with_param_files(
     read: Callable[[str], str] | None,
     packages: Packages,
 ) -> tuple[Robot, list[Finding]]:
-    """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these.
+    """Return the robot with parameters read from files, and what is wrong with the files.
 
     ``own`` are the processes of the source; those of parts have theirs. A file may be in a
     package.
@@ -106,7 +109,10 @@ class _Work:
     def _params_in(
         self, file: str, at: Span, node: Node, process: Process, without: list[Finding]
     ) -> dict[str, Any]:
-        """Return what a file says to the node, in words; ``without`` gets a finding if it says nothing to it."""
+        """Return what a file says to the node, in words.
+
+        ``without`` gets a finding if it says nothing to it.
+        """
         call = OF_FILES.fullmatch(file)
         try:
             path = self.packages.path_of(call[2] if call else file, at)
@@ -160,7 +166,10 @@ def _nothing(
 
 
 def matches(pattern: str, name: str) -> bool:
-    """Return whether a pattern of a parameter file means the node: * is one part of a name, ** any number of them."""
+    """Return whether a pattern of a parameter file means the node.
+
+    * is one part of a name, ** any number of them.
+    """
     return _matches(pattern.strip("/").split("/"), name.strip("/").split("/"))
 
 

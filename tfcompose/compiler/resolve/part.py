@@ -1,4 +1,4 @@
-"""One part: its entry in the holder's file, and what the holder gets of it, under the names that it has there."""
+"""One part: its entry in the holder's file, and what it brings, under its names there."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ _PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """A part as its holder sees it. ``root`` is the frame that is bolted on, None if there is no single one.
+    """A part as its holder sees it.
+
+    ``root`` is the frame that is bolted on, None if there is no single one.
 
     ``shared`` are those of its frames that are the holder's too.
     """
@@ -62,7 +64,10 @@ class PartEntry:
 
     @property
     def prefix(self) -> str:
-        """What is written in front of its frames: what is said, or the namespace where frames are isolated by it."""
+        """What is written in front of its frames.
+
+        What is said, or the namespace where frames are isolated by it.
+        """
         if self.declared.prefix is not None:
             return self.declared.prefix
         namespace = (self.declared.namespace or "").strip("/")
@@ -80,7 +85,7 @@ class PartEntry:
 
     @property
     def settings(self) -> RosSettings:
-        """What its processes share: the holder's, below its own namespace and with its own prefix."""
+        """Settings for the part's processes: the holder's, in its own namespace and prefix."""
         ros = self.spec.ros
         parts = (ros.namespace, self.declared.namespace or "")
         namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
@@ -113,7 +118,10 @@ class PartEntry:
         return source
 
     def joined(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
-        """Return the part under the names that it has in the holder; ``implied`` are frames that only that has."""
+        """Return the part under the names that it has in the holder.
+
+        ``implied`` are frames that only that has.
+        """
         if not _PREFIX.fullmatch(self.prefix):
             at, advice = (
                 self.source.at((*self.at, "prefix")),
@@ -148,7 +156,10 @@ class PartEntry:
         return subtree(robot, root)
 
     def _root(self, robot: Robot, names: Names) -> str | None:
-        """Return the frame that the holder bolts on; to have none, or several, is wrong only if it has to be one."""
+        """Return the frame that the holder bolts on.
+
+        To have none, or several, is wrong only if it has to be one.
+        """
         roots = [name for name in robot.roots() if name not in names.shared]
         if self.declared.parent is None or len(roots) == 1:
             return names.frame(roots[0]) if len(roots) == 1 else None
@@ -167,7 +178,7 @@ class PartEntry:
 
 
 def _owned(edge: Edge, owner: str, at: Span) -> Edge:
-    """Return the edge of another owner, who sends what is fixed on /tf_static and what moves on /tf."""
+    """Return the edge as another owner sends it: fixed on /tf_static, moving on /tf."""
     return replace(
         edge, owner=owner, owner_at=at, kind="static" if edge.kind == "static" else "dynamic"
     )

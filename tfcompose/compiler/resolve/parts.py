@@ -1,4 +1,4 @@
-"""Parts: another robot file, a URDF or a xacro file as a subtree, or as a robot beside others on one map.
+"""Parts: a robot file, URDF or xacro as a subtree, or as a robot beside others.
 
 A robot file as a part is resolved like any robot, with what the holder says laid over it: values
 of variables, the prefix, the namespace, the shared frames and the isolation. Then a part gets the
@@ -35,7 +35,9 @@ MOST_PARTS = 100
 
 @dataclass(slots=True)
 class Parts:
-    """Resolves the parts of one robot file, and theirs. ``resolve`` is what resolves a robot within these ``files``.
+    """Resolves the parts of one robot file, and theirs.
+
+    ``resolve`` is what resolves a robot within these ``files``.
 
     ``environment`` is what their files may read of it.
     """
@@ -51,7 +53,10 @@ class Parts:
     missing: list[tuple[str, str]] = field(default_factory=list)
 
     def join(self, validated: Validated, prefix: str, packages: Packages) -> list[Joined]:
-        """Return the parts of a robot whose own frames have the prefix; those that cannot be had are findings."""
+        """Return the parts of a robot whose own frames have the prefix.
+
+        Those that cannot be had are findings.
+        """
         spec, source, joined = validated.spec, validated.source, []
         for name, declared in spec.parts.items():
             part = PartEntry(
@@ -71,7 +76,7 @@ class Parts:
         return joined
 
     def _robot(self, part: PartEntry, packages: Packages) -> tuple[Robot, frozenset[str]]:
-        """Return the part under its own names, and the frames of its holder that it hangs on by itself."""
+        """Return the part under its own names, and the frames of its holder it attaches to."""
         self.collected.count += 1
         if self.read is None or self.collected.count > MOST_PARTS:
             message = f"more than {MOST_PARTS} parts" if self.read else "files cannot be read here"
@@ -123,7 +128,7 @@ def _note(part: PartEntry) -> Note:
 
 
 def _useless(part: PartEntry, file: str, validated: Validated) -> list[Finding]:
-    """Return a finding for each variable that the part is given, does not have, and does not use."""
+    """Return a finding for each variable given to the part that it neither has nor uses."""
     given, replaced = part.declared.vars, validated.source.replaced
     known = [
         name for name in validated.spec.vars if name not in given or ("vars", name) in replaced

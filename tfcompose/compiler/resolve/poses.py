@@ -32,7 +32,10 @@ def pose_of(posed: Posed, child: str = "") -> Pose:
 
 
 def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, float] | None:
-    """Return the rotation that is written, or None if there is none; ``look`` of an optical frame is where z points."""
+    """Return the rotation that is written, or None if there is none.
+
+    ``look`` of an optical frame is where z points.
+    """
     rotation = turned.rotation
     if rotation is not None and turned.look is not None and is_optical(child):
         return multiply(rotation, OPTICAL_XYZW)
@@ -41,7 +44,9 @@ def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, 
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """An edge whose pose may still have to be solved. Its ``pose`` is that of ``place``, in ``relative_to``.
+    """An edge whose pose may still have to be solved.
+
+    Its ``pose`` is that of ``place``, in ``relative_to``.
 
     ``at`` is where it is written. With ``measured`` the pose is that of a calibration, and the one
     that is written is the nominal one, if ``has_nominal``. An edge into or inside a ``part``
@@ -60,7 +65,10 @@ class Draft:
 
     @property
     def group(self) -> tuple[str, str] | None:
-        """The part or the sensor whose mount the edge is, or in which it is; None for any other edge."""
+        """The part or the sensor whose mount the edge is, or in which it is.
+
+        None for any other edge.
+        """
         if self.part is not None:
             return ("parts", self.part)
         return ("sensors", self.edge.sensor) if self.edge.sensor else None
@@ -72,7 +80,10 @@ _DEEPEST = 50
 
 
 class _DeeperError(Exception):
-    """The edge of this index must be solved first; following the chain further would end the interpreter."""
+    """The edge of this index must be solved first.
+
+    Following the chain further would end the interpreter.
+    """
 
     def __init__(self, index: int) -> None:
         self.index = index
@@ -80,7 +91,7 @@ class _DeeperError(Exception):
 
 
 class _UnsolvableError(Exception):
-    """A pose cannot be solved; ``found`` is None where that follows from an entry that was refused."""
+    """A pose cannot be solved; ``found`` is None if that follows from a refused entry."""
 
     def __init__(self, found: Finding | None) -> None:
         self.found = found
@@ -107,7 +118,10 @@ class Solver:
     _above: dict[str, int] = field(default_factory=dict)
 
     def solve(self) -> tuple[Edge, ...]:
-        """Return the edges in the order of the drafts; one that cannot be solved keeps the pose as written."""
+        """Return the edges in the order of the drafts.
+
+        One that cannot be solved keeps the pose as written.
+        """
         for index, draft in enumerate(self.drafts):
             self._above.setdefault(draft.edge.child, index)
         for index in range(len(self.drafts)):
@@ -166,7 +180,7 @@ class Solver:
         return pose
 
     def _measured(self, draft: Draft, measured: Calibration) -> Edge:
-        """Return the edge with the pose that follows from its calibration, and with what that would be nominally."""
+        """Return the edge with its calibrated pose and its nominal one."""
         edge, at = draft.edge, measured.named_at
         above = below = Pose()
         if measured.parent != edge.parent:
@@ -185,7 +199,7 @@ class Solver:
         return [one.edge.child for one in self.drafts if one.group == draft.group]
 
     def _known(self, frame: str, at: Span, inside: list[str] | None = None) -> str:
-        """Return the frame; ``inside`` are those that it has to be one of, and nobody else brings."""
+        """Return the frame, which must be one of ``inside``, those that nobody else brings."""
         if frame in self.frames:
             return frame
         if self.excuses(frame) and not inside:
@@ -197,7 +211,7 @@ class Solver:
         raise _UnsolvableError(finding("TF203", f"unknown frame {frame}", at, help=advice))
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
-        """Return the frame and its ancestors, each with the index of the edge to its parent (the root: −1)."""
+        """Return the frame and its ancestors, each with the index of its edge (the root: −1)."""
         chain: dict[str, int] = {}
         while frame in self._above and frame not in chain:
             chain[frame] = self._above[frame]

@@ -1,4 +1,4 @@
-"""Presets: where they are, what one says with all that it extends, and what one sensor makes of it.
+"""Presets: where they are, what each says with all it extends, and what a sensor uses.
 
 A preset is found when it is used; folders are listed only where a name is wrong, or where all are
 asked for. Presets of nodes are a part of the program, beside its code.
@@ -33,7 +33,10 @@ DRIVER, TFCOMPOSE = "driver", "tfcompose"
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A sensor with its preset, and its options decided. ``tf`` is who publishes the frames that a driver can."""
+    """A sensor with its preset, and its options decided.
+
+    ``tf`` is who publishes the frames that a driver can.
+    """
 
     name: str
     spec: SensorSpec
@@ -58,7 +61,10 @@ class Sensor:
         }
 
     def parent_of(self, name: str, frame: PresetFrame) -> str:
-        """Return the frame's parent before any renaming: as the user says, or where its publisher hangs it."""
+        """Return the frame's parent before any renaming.
+
+        As the user says, or where its publisher hangs it.
+        """
         own = self.spec.frames.get(name)
         if own and own.parent:
             return own.parent
@@ -79,7 +85,10 @@ def filled(pattern: str, name: str, words: dict[str, str]) -> str:
 
 
 def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
-    """Return whether every option has, or holds, the value that the condition names; ``tf`` counts as one."""
+    """Return whether every option has, or holds, the value that the condition names.
+
+    ``tf`` counts as one.
+    """
     for option, wanted in condition.items():
         value = tf if option == "tf" else options.get(option)
         every = wanted if isinstance(wanted, list) else [wanted]
@@ -142,7 +151,10 @@ def _no_preset(name: str, library: Library, span: Span) -> Finding:
 
 
 def _publisher(sensor: Sensor) -> str:
-    """Return who publishes the frames that a driver can: as said, or as the vendor's driver does by default."""
+    """Return who publishes the frames that a driver can.
+
+    As said, or as the vendor's driver does by default.
+    """
     driver, own = sensor.preset.driver, sensor.spec.driver
     if driver is None or (own and own.process == "none"):
         return TFCOMPOSE
@@ -154,7 +166,7 @@ def _publisher(sensor: Sensor) -> str:
 def decided(
     preset: PresetSpec, spec: SensorSpec, at: Path, source: Source
 ) -> tuple[dict[str, Any], list[Finding]]:
-    """Return the value of each of the preset's options, and what is wrong with those that are given."""
+    """Return the values of the preset's options, and what is wrong with those given."""
     options = {key: option.default for key, option in preset.options.items()}
     found = []
     for key, value in spec.options.items():
@@ -232,7 +244,10 @@ class Storage(Protocol):
         """Return the names, vendor/model, of the presets in the folder."""
 
     def packages(self) -> list[str]:
-        """Return the folders that installed Python packages bring; this is looked up late, as it takes long."""
+        """Return the folders that installed Python packages bring.
+
+        This is looked up late, as it takes long.
+        """
 
 
 @dataclass(slots=True)
@@ -263,7 +278,7 @@ class Library:
         return self._files[name]
 
     def hides(self, name: str) -> str | None:
-        """Return the file of tfcompose's own preset that another one of this name stands before, or None."""
+        """Return the built-in preset's file that another one of this name shadows, or None."""
         mine = self._find(name, (self.own,)) if self.own else None
         return mine if mine and self.file(name) != mine else None
 

@@ -1,4 +1,4 @@
-"""Processes: what is started, simulated or expected to run, under which names, and how it is kept alive and ended.
+"""Processes: what is started, simulated or expected, its names, and how it ends.
 
 tfcompose's own processes are here as well: ``static``, ``joints`` and ``guard``.
 """
@@ -175,7 +175,7 @@ def unknown_names(
     known: Collection[str],
     broken: Collection[tuple[str, str]],
 ) -> list[Finding]:
-    """Return a finding for each name under ``after`` that is no process, and for each end that never comes.
+    """Return a finding for each unknown name under ``after`` and each end that never comes.
 
     ``known`` are the names of all processes; an entry among the ``broken`` ones may have brought
     another.
@@ -220,7 +220,7 @@ def unnamed_nodes(
     spec: RobotSpec,
     broken: Collection[tuple[str, str]],
 ) -> Iterator[Finding]:
-    """Yield a finding for each owner that is a launch file, if no node in it is named, nor refused in ``broken``."""
+    """Yield a finding for each owner that is a launch file without named nodes."""
     owned = {edge.owner: edge for edge in reversed(edges)}
     for process in processes:
         edge, declared = owned.get(process.name), spec.processes.get(process.name)
@@ -262,7 +262,10 @@ def how(declared: Started | ContainerSpec, namespace: str, way: Way = "run") -> 
 
 
 def program(run: Run, *, shell: bool) -> dict[str, Any]:
-    """Return what is started: a package's program, a launch file, or a command; a shell's command is one text."""
+    """Return what is started: a package's program, a launch file, or a command.
+
+    A shell's command is one text.
+    """
     if shell and run.argv:
         return {"argv": (*SHELL, *run.argv)}
     return _of_ros2(run.argv) or {
@@ -332,14 +335,20 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
 
 
 def says_how(declared: ProcessSpec | None) -> bool:
-    """Return whether it is said how a process runs: else what stands under its name adds to one of tfcompose's own."""
+    """Return whether it is said how a process runs.
+
+    Else what stands under its name adds to one of tfcompose's own.
+    """
     return declared is not None and bool(
         declared.run or declared.external or declared.simulate or declared.component
     )
 
 
 def added(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
-    """Return a process that tfcompose adds, with what stands under its name; it runs where ``static`` does."""
+    """Return a process that tfcompose adds, with what stands under its name.
+
+    It runs where ``static`` does.
+    """
     if declared:
         stated = how(declared, spec.ros.namespace, "built-in")
         process = replace(
@@ -409,7 +418,7 @@ def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
 
 
 def _idle_of_containers(spec: RobotSpec, source: Source) -> Iterator[Finding]:
-    """Yield a finding for each key of a container that is started elsewhere, and has no effect therefore."""
+    """Yield a finding for each key of an external container, where it has no effect."""
     for name, container in spec.containers.items():
         works = keys_of("external") | {"external"}
         for key in container.model_fields_set - works if container.external else ():
@@ -471,7 +480,7 @@ _WORDS = {
 
 
 def unreached(process: Process, source: Source) -> list[Finding]:
-    """Return findings about a parameter file without parameters, and about keys that reach no node."""
+    """Return findings about files without parameters and keys that reach no node."""
     at: Path = ("processes", process.name)
     names_params_file = any("${params_file}" in text for text in process.texts)
     if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
@@ -489,7 +498,7 @@ def unreached(process: Process, source: Source) -> list[Finding]:
 
 
 def _not_reached(key: str, process: Process, at: Span) -> Finding:
-    """Return a warning about a key that becomes ROS arguments, which neither a shell nor ``ros2 launch`` passes on."""
+    """Return a warning about a key for ROS arguments that a shell or launch file drops."""
     advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
     message = f"{key} does not reach {process.name}, which a shell reads"
     if process.argv[:2] == ROS2_LAUNCH:
@@ -506,14 +515,20 @@ FILE_KEY = "file"
 
 
 def full_name(namespace: str, name: str) -> str:
-    """Return a node's, topic's or service's full name: below the namespace unless it begins with a slash."""
+    """Return a node's, topic's or service's full name.
+
+    Below the namespace unless it begins with a slash.
+    """
     if name.startswith("/"):
         return name
     return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
 
 
 def namespace_of(declared: Started | ContainerSpec | None, namespace: str) -> str:
-    """Return the namespace of a process's nodes, without a leading slash: its own, or the robot's ``namespace``."""
+    """Return the namespace of a process's nodes, without a leading slash.
+
+    Its own, or the robot's ``namespace``.
+    """
     if declared is None or declared.namespace is None:
         return namespace
     return full_name(namespace, declared.namespace).strip("/")
@@ -590,7 +605,7 @@ PERIOD_S = 6.0
 
 
 def with_positions(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
-    """Return the robot whose stand-ins for joint states say where every joint is that has a position of its own.
+    """Return the robot whose simulated joint states cover every independent joint.
 
     A joint that mimics another is left out: it follows, and the process computes it. Where nothing
     is said a joint is at 0, or in the middle between its limits if 0 is not between them, as
@@ -675,7 +690,9 @@ def _rest(joint: Joint) -> float:
 
 
 def _sweep(joint: Joint) -> Sweep | None:
-    """Return the sweep between the joint's limits, no faster than it may move; None for a slide without limits.
+    """Return the sweep between the joint's limits, no faster than it may move.
+
+    None for a slide without limits.
 
     Of two limits a missing one is 0, as URDF's readers have it.
     """

@@ -102,7 +102,10 @@ def _link(link: Link, names: Names) -> Link:
 
 
 def _shape(shape: Shape, names: Names) -> Shape:
-    """Return the shape with its material's name, which in URDF is one for the whole robot; colours name themselves."""
+    """Return the shape with its material's name, which in URDF is one for the whole robot.
+
+    Colours name themselves.
+    """
     material = shape.material
     if material is None or material.name.startswith("rgba"):
         return shape
@@ -133,7 +136,7 @@ def _joint(joint: Joint, names: Names) -> Joint:
 
 
 def _hardware(hardware: Hardware, names: Names, again: dict[str, str]) -> Hardware:
-    """Return the hardware, its sensors and gpios under names that no other part has, as a raw block would have them."""
+    """Return the hardware with sensors and gpios under names that no other part has."""
     inside = (
         replace(one, name=names.joint(one.name), params=_params(one.params, again))
         for one in hardware.components
@@ -145,7 +148,7 @@ def _hardware(hardware: Hardware, names: Names, again: dict[str, str]) -> Hardwa
 
 
 def _params(params: dict[str, str], again: dict[str, str]) -> dict[str, str]:
-    """Return the parameters, of which one that is the name of a frame or joint, such as mimic, goes with it."""
+    """Return the parameters; those that name a frame or joint, such as mimic, are renamed."""
     return {key: again.get(value, value) for key, value in params.items()}
 
 
@@ -213,7 +216,10 @@ def _zone(zone: Zone, robot: Robot, names: Names) -> Zone:
 
 
 def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
-    """Return the policy with its patterns renamed where they name a frame; other patterns are as they were."""
+    """Return the policy with its patterns renamed where they name a frame.
+
+    Other patterns are as they were.
+    """
 
     def final(pattern: str) -> str:
         return names.frame(pattern) if pattern in robot.frames else pattern

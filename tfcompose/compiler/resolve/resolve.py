@@ -275,7 +275,10 @@ class _Work:
         return measured
 
     def _base(self, robot: Robot) -> str | None:
-        """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it; else the only root."""
+        """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it.
+
+        Else the only root.
+        """
         base = self.spec.base
         if base is not None:
             if base in robot.frames:
@@ -358,7 +361,10 @@ class _Work:
 
 
 def _blocks(parts: list[Robot]) -> tuple[Block, ...]:
-    """Return the parts' raw blocks, and once what names nothing of its part: the plugin of a simulator."""
+    """Return the parts' raw blocks, and once what names nothing of its part.
+
+    The plugin of a simulator.
+    """
     blocks: list[Block] = []
     for part in parts:
         there = {block.text for block in blocks}

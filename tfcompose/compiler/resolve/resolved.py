@@ -1,4 +1,7 @@
-"""What comes of resolving a robot file: the robot, what was found, and what its parts brought along."""
+"""What comes of resolving a robot file.
+
+The robot, what was found, and what its parts brought along.
+"""
 
 from __future__ import annotations
 

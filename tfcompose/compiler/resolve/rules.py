@@ -1,4 +1,7 @@
-"""What a robot file sets about rules: the limits of codes, and the zones that sensors have to see."""
+"""What a robot file sets about rules.
+
+The limits of codes, and the zones that sensors have to see.
+"""
 
 from __future__ import annotations
 

@@ -101,7 +101,10 @@ class _Mounting:
     def pose_of(
         self, name: str, frame: PresetFrame, own: FrameOverride | None
     ) -> tuple[Pose, list[str]]:
-        """Return the frame's pose in its parent, and what is missing of it: then it is the identity."""
+        """Return the frame's pose in its parent, and what is missing of it.
+
+        Then it is the identity.
+        """
         at, rotation = frame.xyz, rotation_of(frame, name)
         if frame.by_driver and self.sensor.tf == DRIVER:
             at, rotation = (
@@ -130,7 +133,10 @@ class _Mounting:
             self.drafts.found.append(finding("TF605", message, self.place("preset"), help=advice))
 
     def publisher(self) -> str:
-        """Return who publishes the frames inside the sensor that a driver can publish; note what cannot be."""
+        """Return who publishes the frames inside the sensor that a driver can publish.
+
+        Note what cannot be.
+        """
         sensor, declared, driver = self.sensor, self.sensor.spec, self.sensor.preset.driver
         named = declared.driver.process if declared.driver else None
         process, found = driver_process(sensor, self.drafts.validated)
@@ -257,7 +263,7 @@ PARAMS_FILE = "${params_file}"
 
 
 def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None, list[Finding]]:
-    """Return the process of a sensor's driver, with the parameters that make it do what the spec says.
+    """Return the process of a sensor's driver with the parameters that the spec implies.
 
     It is the preset's with the user's keys over it, the user's alone where the preset has none, or
     None.
@@ -323,7 +329,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
 
 
 def _says_not_how(name: str, validated: Validated) -> list[Finding]:
-    """Return a finding about a driver that does not say how it runs, unless what says it was refused."""
+    """Return a finding about a driver that does not say how it runs, unless refused."""
     at: Path = ("sensors", name, "driver")
     if {(*at, "component"), (*at, "container")} & validated.refused:
         return []
@@ -333,7 +339,7 @@ def _says_not_how(name: str, validated: Validated) -> list[Finding]:
 
 
 def further_processes(sensor: Sensor, validated: Validated) -> Iterator[Process]:
-    """Yield the further processes of a sensor's driver, where that is started as its preset says."""
+    """Yield the additional processes of a sensor's driver, if its preset starts it."""
     driver, declared = sensor.preset.driver, sensor.spec.driver
     spec, source = validated.spec, validated.source
     if driver is None or (
@@ -382,7 +388,7 @@ def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
 
 
 def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
-    """Return the parameters, or the arguments of a launch file, that make the driver do what the spec says."""
+    """Return the driver's parameters or launch arguments that implement the spec."""
     driver = sensor.preset.driver
     if driver is None:
         return {}
@@ -398,7 +404,7 @@ def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
 
 
 def claims_of(sensor: Sensor) -> tuple[DriverClaim, ...]:
-    """Return the edges outside the sensor that its driver publishes by default, unless it owns the mount's."""
+    """Return the outside edges that the driver publishes by default, without its mount."""
     driver, declared = sensor.preset.driver, sensor.spec
     own = {sensor.name, declared.driver.process if declared.driver else None}
     return () if driver is None or (declared.owner and declared.owner in own) else driver.claims
@@ -407,7 +413,10 @@ def claims_of(sensor: Sensor) -> tuple[DriverClaim, ...]:
 def _node_parameters(
     sensor: Sensor, computed: dict[str, Any], *, launched: bool
 ) -> dict[str, Any]:
-    """Return the node's own parameters; a launch file takes arguments, and may pass a file of parameters on."""
+    """Return the node's own parameters.
+
+    A launch file takes arguments, and may pass a file of parameters on.
+    """
     driver = sensor.preset.driver
     if driver is None or not driver.launch:
         return computed
@@ -415,7 +424,7 @@ def _node_parameters(
 
 
 def _frame_names(sensor: Sensor, driver: PresetDriver) -> dict[str, str]:
-    """Return the parameters that give frames their names, as ``${frame(…)}``, for the frames that the sensor has."""
+    """Return the parameters that name frames, as ``${frame(…)}``, for frames that exist."""
     inside = {sensor.named(sensor.preset.mount), *sensor.frames()}
     frames = {key: sensor.named(frame) for key, frame in driver.naming.items()}
     renamed = {name: own.name for name, own in sensor.spec.frames.items() if own.name}
@@ -459,7 +468,7 @@ def _plain(value: Any) -> str:
 
 
 def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]:
-    """Return findings about names that the driver makes itself, and that the spec wants otherwise."""
+    """Return findings about names that the driver makes itself, against the spec."""
     driver, declared = sensor.preset.driver, sensor.spec
     if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
         return []
@@ -515,7 +524,10 @@ OFF = frozenset({"off", "Off", "OFF", "no", "No", "NO", "null", "None", "NONE", 
 
 
 def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Finding]:
-    """Return findings about a driver that is the name of a process: it must be one, and has its own keys."""
+    """Return findings about a driver that is the name of a process.
+
+    It must be one, and has its own keys.
+    """
     at: Path = ("sensors", sensor.name, "driver")
     spec, source = validated.spec, validated.source
     broken = (entry for section, entry in validated.broken if section in {"processes", "sensors"})

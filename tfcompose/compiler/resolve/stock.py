@@ -1,4 +1,6 @@
-"""A stock robot_state_publisher in the place of tfcompose's own: it publishes what its URDF holds as fixed or jointed.
+"""A stock robot_state_publisher in the place of tfcompose's own.
+
+It publishes what its URDF holds as fixed or jointed.
 
 Facts of robot_state_publisher 3.3 (ROS 2 Jazzy): fixed joints go to /tf_static, moving ones follow
 ``joint_states``, floating ones are skipped; ``frame_prefix`` is written in front of every frame;
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
-    """Return the robot in which ``joints`` is a stock publisher that owns what is ours below base; and what it cannot.
+    """Return the robot with a stock publisher as ``joints``, and what that cannot do.
 
     Fixed edges elsewhere stay with ``static``, which then sends the description too.
     """
@@ -64,7 +66,7 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
 
 
 def _stock(joints: Process, robot: Robot) -> Process:
-    """Return the process: its description is its own, and the topic on which it would send that is moved away."""
+    """Return the process with its own description; the topic for it is remapped away."""
     params = {"publish_frequency": MOST_HZ} | joints.params
     params["publish_frequency"] = min(float(params["publish_frequency"]), MOST_HZ)
     prefix = {"frame_prefix": robot.ros.frame_prefix} if robot.ros.frame_prefix else {}

@@ -1,4 +1,7 @@
-"""Hooks of tools whose sections a robot file has: the processes that they add, and what they check."""
+"""Hooks of tools whose sections a robot file has.
+
+The processes that they add, and what they check.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +28,9 @@ if TYPE_CHECKING:
 class ToolSection:
     """A tool's section of a robot file, as the tool's hooks get it.
 
-    ``value`` is what it says, validated by the key's model; ``spec`` and ``source`` are those of the
-    whole file. ``read`` returns the text of a file or raises RejectedError; None where no file can be
-    read.
+    ``value`` is what it says, validated by the key's model; ``spec`` and ``source`` are those of
+    the whole file. ``read`` returns the text of a file or raises RejectedError; None where no file
+    can be read.
     """
 
     key: Key
@@ -66,7 +69,7 @@ def as_sections(sections: Iterable[ToolSection]) -> dict[str, Section]:
 
 
 def processes_of(sections: Iterable[ToolSection], found: list[Finding]) -> list[Process]:
-    """Return the processes that tools add, with the keys that stand under their names in ``processes``.
+    """Return the processes that tools add, with their keys from ``processes``.
 
     One whose name has an entry that says how it runs is not added: the entry takes its place.
     """
@@ -92,7 +95,10 @@ def check_sections(sections: Iterable[ToolSection], robot: Robot) -> list[Findin
 
 
 def _hook(section: ToolSection, reference: str, found: list[Finding], *more: Any) -> list[Any]:
-    """Return what a tool's function returns; nothing where it has none, and a finding where it crashes."""
+    """Return what a tool's function returns.
+
+    Nothing where it has none, and a finding where it crashes.
+    """
     if not reference:
         return []
     try:

@@ -1,4 +1,4 @@
-"""Raw blocks: elements next to links and joints that are kept verbatim, and what of the robot they name.
+"""Raw blocks: elements kept verbatim, and the parts of the robot that they name.
 
 A block is read as the content of a ``<robot>`` that has the first line to itself: places are those
 in that document. A ``<ros2_control>`` element becomes a hardware component where that can say all
@@ -42,7 +42,10 @@ _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 
 
 def read_block(text: str, file: str, *, with_text: bool = False) -> Element:
-    """Return the ``<robot>`` with the elements of the block; arguments and exceptions are those of ``read_xml``."""
+    """Return the ``<robot>`` with the elements of the block.
+
+    Arguments and exceptions are those of ``read_xml``.
+    """
     return read_xml(f"<robot>\n{text}\n</robot>", file, with_text=with_text)
 
 
@@ -74,7 +77,10 @@ def faults_of(
 
 
 def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
-    """Yield a finding for each prefix that no element around it declares: xacro, and other readers, stop there."""
+    """Yield a finding for each prefix that no element around it declares.
+
+    Xacro, and other readers, stop there.
+    """
     waiting = [(top, frozenset({"xml", "xmlns"}))]
     while waiting:
         element, known = waiting.pop()
@@ -93,7 +99,7 @@ def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
 
 
 def unexpanded(text: str, file: str) -> Iterator[Finding]:
-    """Yield a finding for each substitution of xacro's or a launch file's in the text of a block."""
+    """Yield a finding for each substitution of xacro or launch in the text of a block."""
     for found in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
         before = text[: found.start()]
         line, column = before.count("\n") + 2, found.start() - before.rfind("\n")
@@ -113,7 +119,7 @@ def _blank(comment: re.Match[str]) -> str:
 def unknown_references(
     element: Element, frames: Collection[str], joints: Collection[str]
 ) -> Iterator[Finding]:
-    """Yield a finding for each link or joint that an element of a block names and the robot does not have."""
+    """Yield a finding for each link or joint that a block names and the robot lacks."""
     reference = element.attributes.get("reference")
     if (
         element.tag == "gazebo"
@@ -143,7 +149,7 @@ def unknown_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
 
 
 def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
-    """Yield a finding for each joint of the hardware that is none of these, the robot's moving joints."""
+    """Yield a finding for each hardware joint that is no moving joint of the robot."""
     for one in hardware:
         for component in one.components:
             if component.kind == "joint" and component.name not in joints:
@@ -153,7 +159,7 @@ def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> I
 def within(
     block: Block, robot: Robot, frames: Collection[str], joints: Collection[str]
 ) -> Block | None:
-    """Return the block of a robot without those of its elements that are about others than these frames and joints.
+    """Return the block of a robot without elements about other frames and joints.
 
     What is about neither the robot's frames nor its joints stays. None is returned where no
     element is left.
@@ -172,7 +178,10 @@ def within(
 
 
 def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
-    """Return the hardware with these of its joints only; None where it had some, and none is left."""
+    """Return the hardware with these of its joints only.
+
+    None where it had some, and none is left.
+    """
     left = tuple(one for one in hardware.components if one.kind != "joint" or one.name in joints)
     had_joints = any(one.kind == "joint" for one in hardware.components)
     return (
@@ -196,7 +205,7 @@ class _UnsupportedError(Exception):
 
 
 def with_hardware(robot: Robot) -> Robot:
-    """Return the robot of a URDF with its ros2_control blocks as hardware, where that keeps all of them."""
+    """Return the robot of a URDF with ros2_control blocks as hardware, if nothing is lost."""
     hardware: dict[str, Hardware] = {}
     blocks = []
     for block in robot.blocks:
@@ -216,7 +225,7 @@ def with_hardware(robot: Robot) -> Robot:
 
 
 def _hardware_of(element: Element, block: Block) -> Hardware | None:
-    """Return the hardware component that the element describes, or None where it cannot say all of it."""
+    """Return the hardware component that the element describes, or None if it says more."""
     try:
         return _hardware(element, block)
     except (_UnsupportedError, ValueError):

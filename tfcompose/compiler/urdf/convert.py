@@ -1,4 +1,7 @@
-"""From the elements of a URDF to a robot, with the places of that file; whatever is wrong with it is a finding."""
+"""From the elements of a URDF to a robot, with the places of that file.
+
+Whatever is wrong with it is a finding.
+"""
 
 from __future__ import annotations
 
@@ -286,7 +289,10 @@ def _safety(name: str, element: Element | None, values: Values) -> SafetyControl
 
 
 def _numbers(cls: type[T], element: Element | None, values: Values, **defaults: float) -> T | None:
-    """Return the object whose fields are the element's attributes; those that are missing have their defaults."""
+    """Return the object whose fields are the element's attributes.
+
+    Those that are missing have their defaults.
+    """
     if element is None:
         return None
     read = values.bound if cls in _BOUNDS else values.number
@@ -382,7 +388,10 @@ class _Bodies:
         return asset
 
     def _material(self, element: Element) -> Material | None:
-        """Return the colour or texture of a visual; one that is only named is described elsewhere in the document."""
+        """Return the colour or texture of a visual.
+
+        One that is only named is described elsewhere in the document.
+        """
         material = element.first("material")
         if material is None:
             return None

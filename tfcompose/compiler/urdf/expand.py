@@ -68,7 +68,10 @@ _LONGEST = 4000
 
 @dataclass(frozen=True, slots=True)
 class Sandbox:
-    """How xacro is run: what it may read; and who is told what it prints and what does not hold it."""
+    """How xacro is run: what it may read.
+
+    And who is told what it prints and what does not hold it.
+    """
 
     reach: Reach = field(default_factory=Reach)
     print_output: Callable[[str, str], None] = lambda _file, _text: None
@@ -238,7 +241,7 @@ def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
 
 
 def _where_used(found: Finding, use: Use | None) -> Finding:
-    """Return a finding in a xacro file as one at the place in the robot file that names it, if one does."""
+    """Return a finding in a xacro file at the place in the robot file that names it."""
     if use is None or found.span is None:
         return found
     exact = () if found.span == Span(found.span.file) else (Note("reported here", found.span),)
@@ -251,7 +254,7 @@ def _where_used(found: Finding, use: Use | None) -> Finding:
 
 
 def _in_call(found: Finding, file: str, use: Use) -> Finding:
-    """Return what xacro says about the call of a macro, at the parameter that it names, with what the macro takes."""
+    """Return what xacro says about a macro call, at its parameter, with what it takes."""
     named = [word for word in _WORD.findall(found.message) if word in use.places]
     macros, at = macros_in(Path(file).read_text("utf-8", "replace")), use.at
     if use.macro in macros:
@@ -339,7 +342,7 @@ def _at_words(found: Finding, pattern: str, begins: list[tuple[str, int]]) -> Fi
 
 
 def _placed(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Finding:
-    """Return the finding at the words that it is about, with notes about the macros that were expanded then.
+    """Return the finding at its words, with notes about the macros being expanded.
 
     Where the words are not to be found it is at the element that xacro was busy with. Places are
     in the files as xacro names them.
@@ -433,7 +436,7 @@ def _position(text: str, index: int) -> tuple[int, int]:
 
 
 def _relative_to(file: str, found: Finding) -> Finding:
-    """Return the finding with its places in files as seen from the working folder, and ``file`` as it is named."""
+    """Return the finding with places relative to the working folder, ``file`` as named."""
 
     def shown(span: Span | None) -> Span | None:
         return span._replace(file=_shown(span.file, file)) if span else None

@@ -1,4 +1,4 @@
-"""Volumes, centres and moments of inertia of solids of density 1, their sum, and what follows at another density.
+"""Volumes, centres and moments of inertia of solids, their sums, and other densities.
 
 Moments about the centre of mass, V the volume: box V/12 (b² + c²); cylinder along z V/12 (3r² +
 l²) and V r²/2; sphere 2/5 V r². A capsule is a cylinder C and two half spheres S whose centres of
@@ -38,7 +38,10 @@ class UnmeasurableError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Moments:
-    """Volume in m³, centre in m, and the tensor about it (xx, xy, xz, yy, yz, zz) in m⁵: kg m² at 1 kg/m³."""
+    """Volume in m³, centre in m, and the tensor about it (xx, xy, xz, yy, yz, zz) in m⁵.
+
+    Kg m² at 1 kg/m³.
+    """
 
     volume: float
     centre: Vector
@@ -99,7 +102,7 @@ def joined(parts: Sequence[Moments]) -> Moments:
 
 
 def of_primitive(shape: Shape) -> Moments:
-    """Return the moments of a box, cylinder, sphere or capsule in the axes that its pose is given in.
+    """Return the moments of a primitive in the axes that its pose is given in.
 
     Raises:
         ValueError: for a mesh, whose file would have to be read.
@@ -128,7 +131,7 @@ def inertial(moments: Moments, density: float, mass: float | None = None) -> Ine
 
 
 def of_primitives(mass: float, shapes: Sequence[Shape]) -> Inertial:
-    """Return the inertia of a body of this mass (kg) and of one density, in the axes of its shapes' poses."""
+    """Return the inertia of a body of this mass (kg) and one density, in its shapes' axes."""
     moments = joined([of_primitive(shape) for shape in shapes])
     return inertial(moments, mass / moments.volume, mass)
 
@@ -139,7 +142,7 @@ def trace(tensor: Tensor) -> float:
 
 
 def traces(mass: float, *bodies: tuple[Shape, ...]) -> tuple[float, ...]:
-    """Return of each body of primitives the trace that its tensor would have at this mass and one density."""
+    """Return the tensor's trace at this mass and one density for each primitive body."""
     primitives = [
         shapes for shapes in bodies if shapes and not any(shape.mesh for shape in shapes)
     ]

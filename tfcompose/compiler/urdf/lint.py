@@ -1,4 +1,7 @@
-"""What is wrong with a URDF, or a xacro file, that tfcompose did not write; places are those of that file."""
+"""What is wrong with a URDF, or a xacro file, that tfcompose did not write.
+
+Places are those of that file.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,10 @@ _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 def lint_urdf(
     file: str, packages: Packages, arguments: Mapping[str, str] | None = None
 ) -> list[Finding]:
-    """Return what is wrong with the file, by place. A xacro file is expanded; places are where elements are written."""
+    """Return what is wrong with the file, by place.
+
+    A xacro file is expanded; places are where elements are written.
+    """
     try:
         document = read_urdf(file, packages, arguments)
     except RejectedError as error:
@@ -64,7 +70,9 @@ class Document:
 def read_urdf(
     file: str, packages: Packages, arguments: Mapping[str, str] | None = None
 ) -> Document:
-    """Return what the file holds; a xacro file, by its name or by what is in it, is expanded, with arguments.
+    """Return what the file holds.
+
+    A xacro file, by its name or by what is in it, is expanded, with arguments.
 
     Raises:
         RejectedError: if it cannot be read, or is no URDF; or takes no arguments, and is given
@@ -101,7 +109,10 @@ def read_urdf(
 
 
 def _kept(expansion: Expansion, read: Callable[[str], str]) -> Iterator[Allow]:
-    """Yield the comments that allow findings, of those that xacro keeps: it leaves out what it does not expand."""
+    """Yield the comments that allow findings, of those that xacro keeps.
+
+    It leaves out what it does not expand.
+    """
     for number in dict.fromkeys(file for file, _, _ in expansion.comments):
         begins = {
             (line, column + 1) for file, line, column in expansion.comments if file == number

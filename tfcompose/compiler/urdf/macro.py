@@ -42,7 +42,10 @@ _TAGS = frozenset(
 
 
 def macro_name(robot: str) -> str:
-    """Return what the robot's macro is called: as the robot, unless xacro or Python has the word."""
+    """Return what the robot's macro is called.
+
+    As the robot, unless xacro or Python has the word.
+    """
     return f"{robot}_robot" if robot in _TAGS or keyword.iskeyword(robot) else robot
 
 
@@ -110,7 +113,7 @@ def _literal(text: str) -> str:
 
 
 def _blocks(robot: Robot) -> list[str]:
-    """Return the raw blocks, in which what is a name of the robot's, and nothing else, gets the prefix."""
+    """Return the raw blocks with the prefix added to the robot's names and nothing else."""
     if not robot.blocks:
         return []
     names = [*_names(robot), *(name for block in robot.blocks for name in block.own_names())]
@@ -125,7 +128,10 @@ def _names(robot: Robot) -> list[str]:
 
 
 def caller(robot: Robot) -> str:
-    """Return the file that is the robot alone: the macro, called with arguments of the same names."""
+    """Return the file that is the robot alone.
+
+    The macro, called with arguments of the same names.
+    """
     defaults = {"prefix": "", "parent": "", "xyz": "0 0 0", "rpy": "0 0 0"}
     arguments = "\n".join(
         f'  <xacro:arg name="{name}" default="{default}"/>' for name, default in defaults.items()

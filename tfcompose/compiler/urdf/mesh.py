@@ -1,4 +1,4 @@
-"""Volume, centre and moments of inertia of what a mesh file encloses, integrated over its triangles by trimesh."""
+"""Volume, centre and moments of inertia enclosed by a mesh, integrated by trimesh."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _why_flat(mesh: Any) -> str:
 
 
 def _facing_alike(mesh: Any) -> Any:
-    """Return the mesh with every body facing as its largest one does, and every cavity the other way.
+    """Return the mesh with consistent orientation: bodies outwards, cavities inwards.
 
     A separate body that faces inwards is no hole: integrated as it is, it would have a negative
     mass. A cavity faces the other way too, but lies within a body. The mesh has to be closed and
@@ -85,7 +85,10 @@ def _facing_alike(mesh: Any) -> Any:
 
 
 def _bodies(faces: Any, count: int) -> Any:
-    """Return for each face the number of its body: the least of all corners that edges connect with its own."""
+    """Return for each face the number of its body.
+
+    The least of all corners that edges connect with its own.
+    """
     least = np.arange(count)
     ends = np.concatenate((faces[:, :2], faces[:, 1:]))
     while True:
@@ -99,7 +102,9 @@ def _bodies(faces: Any, count: int) -> Any:
 
 
 def _is_within(point: Any, corners: Any) -> bool:
-    """Return whether the triangles enclose the point: the solid angles at which it sees them sum up to a sphere.
+    """Return whether the triangles enclose the point.
+
+    The solid angles at which it sees them sum up to a sphere.
 
     Van Oosterom and Strackee, The Solid Angle of a Plane Triangle, 1983.
     """

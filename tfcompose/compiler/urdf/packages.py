@@ -1,4 +1,6 @@
-"""Where packages and files are: by the robot's ``packages:``, then by the ament index, then around the file that asks.
+"""Where packages and files are.
+
+By the robot's ``packages:``, then by the ament index, then around the file that asks.
 
 Nothing is opened here. What may be asked about files is handed in, so that a robot can be compiled
 from text alone.
@@ -69,7 +71,9 @@ class Disk:
 
 @dataclass(slots=True)
 class Packages:
-    """Finds packages and addressed files. ``named`` are those that the robot names: name → folder and its place.
+    """Finds packages and addressed files.
+
+    ``named`` are those that the robot names: name → folder and its place.
 
     ``advice`` says what to do where a package is not found. ``local`` are the packages, with their
     folders, that were found nowhere else than around the file that addresses something in them, as
@@ -92,7 +96,10 @@ class Packages:
         ]
 
     def folder(self, name: str, file: str) -> str | None:
-        """Return the package's folder, or None where there is none; the last candidate is the package of ``file``."""
+        """Return the package's folder, or None where there is none.
+
+        The last candidate is the package of ``file``.
+        """
         if self.disk is None:
             return None
         found = next(
@@ -102,7 +109,7 @@ class Packages:
         return (folder or ".") if around == name else found
 
     def not_found(self, name: str, at: Span | None) -> Finding:
-        """Return the finding that a package is not found, with the list of where it was looked for."""
+        """Return the finding that a package was not found, with the searched folders."""
         folders = self.candidates(name)
         searched = f"looked in {', '.join(folders)}" if folders else "AMENT_PREFIX_PATH is empty"
         near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
@@ -114,7 +121,9 @@ class Packages:
         return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
 
     def path_of(self, named: str, at: Span) -> str:
-        """Return the path of a file that is named at a place: in a package, or relative to the file there.
+        """Return the path of a file that is named at a place.
+
+        In a package, or relative to the file there.
 
         Raises:
             RejectedError: if the package is not found.
@@ -128,7 +137,7 @@ class Packages:
         return posixpath.join(folder, found[2])
 
     def asset(self, uri: str, at: Span, document: str = "") -> tuple[Asset, Finding | None]:
-        """Return the file that is addressed at a place, and what is wrong with the address, if anything is.
+        """Return the file that is addressed at a place, and what is wrong with the address.
 
         ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files;
         relative ones begin in the folder of the file that names them, or of the ``document`` that
@@ -212,12 +221,18 @@ class Packages:
         return None
 
     def _package_above(self, path: str) -> tuple[str, str]:
-        """Return the package whose source or share folder the file is in, and its path there; empty without one."""
+        """Return the package whose source or share folder the file is in, and its path there.
+
+        Empty without one.
+        """
         name, top = self._around(posixpath.dirname(path))
         return (name, posixpath.relpath(path, top or ".")) if name else ("", "")
 
     def _around(self, folder: str) -> tuple[str, str]:
-        """Return the name and folder of the package that the folder is, or is in; empty without one."""
+        """Return the name and folder of the package that the folder is, or is in.
+
+        Empty without one.
+        """
         if folder not in self._above:
             self._above[folder] = self._find_above(folder)
         return self._above[folder]

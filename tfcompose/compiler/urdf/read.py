@@ -38,7 +38,10 @@ _BLOCK = 4096
 
 
 class _Text:
-    """A file's text, with the places of its bytes: few are asked for, and they are computed only then."""
+    """A file's text, with the places of its bytes.
+
+    Few are asked for, and they are computed only then.
+    """
 
     def __init__(self, text: str, file: str) -> None:
         self.text, self.file = text, file
@@ -75,7 +78,9 @@ class _Text:
         )
 
     def tag_at(self, begin: int) -> tuple[dict[str, tuple[int, int]], int]:
-        """Return where the values of a tag's attributes begin and end, and where the last one ends, quotes aside.
+        """Return where each attribute value of a tag begins and ends, without quotes.
+
+        And where the last one ends.
 
         The tag begins at a character, where there must be one. The last tag is remembered.
         """
@@ -178,7 +183,10 @@ class Element:
         return declared.source.span(place[0], place[1] - place[0] or 1) if place else self.at
 
     def raw_value(self, name: str) -> str:
-        """Return an attribute's value as in the text: XML turns tabs and line breaks in it into spaces."""
+        """Return an attribute's value as in the text.
+
+        XML turns tabs and line breaks in it into spaces.
+        """
         begin, end = self._source.tag_at(self._source.position(self.begin))[0].get(name, (0, 0))
         return self._source.text[begin:end]
 
@@ -202,7 +210,9 @@ def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
 
 
 def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) -> Element:
-    """Return the root of the document that xacro made of a file; elements are placed where they were written.
+    """Return the root of the document that xacro made of a file.
+
+    Elements are placed where they were written.
 
     Raises:
         RejectedError: as ``read_xml``.

@@ -1,4 +1,6 @@
-"""Whether a written URDF is the robot that was meant: yourdfpy reads it, and the two are compared value by value.
+"""Whether a written URDF is the robot that was meant.
+
+Yourdfpy reads it, and the two are compared value by value.
 
 yourdfpy reads links and joints with what URDF says of them. It does not read other elements
 (``ros2_control``, ``gazebo``, ``transmission``), takes the first of elements that are there twice,
@@ -37,7 +39,9 @@ _MOMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Iterator[str]:
-    """Yield what the text says otherwise than the robot: about links, joints, poses, masses and shapes.
+    """Yield what the text says otherwise than the robot.
+
+    About links, joints, poses, masses and shapes.
 
     ``full`` is as in ``urdf``; the text is what that, or ``emit``, returned for the same target.
     """
@@ -129,7 +133,10 @@ def _given(values: Any) -> dict[str, Any]:
 
 
 def _values(joint: Joint) -> dict[str, dict[str, Any] | None]:
-    """Return what is to stand in the joint by yourdfpy's names: values, or None where it is not to be there."""
+    """Return what is to stand in the joint by yourdfpy's names.
+
+    Values, or None where it is not to be there.
+    """
     limit, mimic = joint.limit, joint.mimic
     rates = {
         "effort": (limit and limit.effort) or 0.0,
@@ -209,7 +216,10 @@ def _form(there: Any) -> dict[str, Any]:
 
 
 def _solids(shape: Shape, target: Target) -> Iterator[tuple[str, dict[str, Any], Pose]]:
-    """Yield the solids that a shape is in URDF, which has no capsule: kind, values and pose of each."""
+    """Yield the solids that a shape is in URDF, which has no capsule.
+
+    Kind, values and pose of each.
+    """
     size, radius = shape.size, {"radius": shape.size[0]}
     if shape.mesh:
         scale = {} if size == (1.0, 1.0, 1.0) else {"scale": size}

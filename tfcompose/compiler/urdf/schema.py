@@ -1,4 +1,6 @@
-"""The words of URDF and what they hold: elements, attributes, shapes, types of joints, and the values of attributes.
+"""The words of URDF and what they hold.
+
+Elements, attributes, shapes, types of joints, and the values of attributes.
 
 A word or a value that is none is a finding. Source: the URDF XML specification of ROS (link,
 joint, robot). What transmissions, Gazebo and ros2_control blocks hold is not checked.
@@ -79,7 +81,9 @@ _MISSPELT = 0.8
 
 
 def unknown_words(root: Element) -> Iterator[Finding]:
-    """Yield a finding for each element and attribute that URDF does not have: an error where a known one is misspelt.
+    """Yield a finding for each element and attribute that URDF does not have.
+
+    An error where a known one is misspelt.
 
     Others may be an extension, and are warnings; directly below <robot> they are accepted.
     """
@@ -104,7 +108,10 @@ def unknown_words(root: Element) -> Iterator[Finding]:
 
 
 def _unexpanded(element: Element) -> Finding:
-    """Return the finding about an element that xacro should have replaced: readers of URDF ignore it."""
+    """Return the finding about an element that xacro should have replaced.
+
+    Readers of URDF ignore it.
+    """
     if element.tag in _XACRO:
         message = f"<{element.tag}> is a tag of xacro, not expanded without its prefix"
         return finding("TF720", message, element.at, help=f"<xacro:{element.tag} …>")
@@ -136,7 +143,7 @@ HUGE = 1e30
 
 @dataclass(slots=True)
 class Values:
-    """Reads attributes; ``found`` is what was wrong with them, ``has_quaternions`` whether rotations may be such.
+    """Reads attributes; ``found`` collects faults, ``has_quaternions`` allows quat_xyzw.
 
     ``refused`` counts what is no value; what is a warning only leaves a value as it is.
     """
@@ -162,7 +169,10 @@ class Values:
     def numbers(
         self, element: Element | None, name: str, default: tuple[float, ...]
     ) -> tuple[float, ...]:
-        """Return an attribute's numbers, as many as ``default`` has; that is taken where there are none."""
+        """Return an attribute's numbers, as many as ``default`` has.
+
+        That is taken where there are none.
+        """
         if element is None or name not in element.attributes:
             return default
         words = element.attributes[name].split()
@@ -199,7 +209,10 @@ class Values:
         return self.numbers(element, name, (0.0,))[0]
 
     def bound(self, element: Element, name: str) -> float | None:
-        """Return an attribute's number that limits something; one that limits nothing is as large as numbers may be."""
+        """Return an attribute's number that limits something.
+
+        One that limits nothing is as large as numbers may be.
+        """
         try:
             value = float(element.attributes.get(name, ""))
         except ValueError:
@@ -224,7 +237,7 @@ class Values:
         return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
 
     def _quaternion(self, origin: Element) -> Quaternion:
-        """Return the rotation that is given as a quaternion, which URDF has from version 1.1 on."""
+        """Return the rotation given as a quaternion, which URDF has since version 1.1."""
         before, at = self.refused, origin.at_value("quat_xyzw")
         x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
         if not any((x, y, z, w)):
@@ -245,7 +258,10 @@ class Values:
 
 
 def version_of(root: Element, values: Values) -> tuple[int, ...]:
-    """Return the version of URDF that the document declares; a finding where parsers of ROS 2 Jazzy reject it."""
+    """Return the version of URDF that the document declares.
+
+    A finding where parsers of ROS 2 Jazzy reject it.
+    """
     text = root.attributes.get("version", "1.0")
     version = tuple(map(int, text.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", text) else ()
     if version != (1, 0):

@@ -41,7 +41,9 @@ quoted = lru_cache(maxsize=1 << 16)(quoteattr)
 
 
 def urdf(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[str, str]:
-    """Return the URDF of everything below ``robot.base``, which must be there, in a right tree: in full, and for stock.
+    """Return the URDF of everything below ``robot.base``, which must be there, in a right tree.
+
+    In full, and for stock.
 
     In full it holds every edge as it is, whoever publishes it. For a stock robot_state_publisher
     edges of other owners are floating joints, which that node leaves alone. ``target`` says how
@@ -60,13 +62,16 @@ def block_lines(blocks: Iterable[Block]) -> list[str]:
 
 
 class Writer:
-    """Writes links, joints and hardware as lines; how names and values are spelt is for subclasses to change."""
+    """Writes links, joints and hardware as lines.
+
+    How names and values are spelt is for subclasses to change.
+    """
 
     def __init__(self, target: Target = AS_IN_SOURCE) -> None:
         self.target = target
 
     def name(self, text: str) -> str:
-        """Return the name of a link, joint, material or piece of hardware, as an attribute's value in quotes."""
+        """Return the quoted name of a link, joint, material or piece of hardware."""
         return quoted(text)
 
     def value(self, text: str) -> str:
@@ -86,7 +91,7 @@ class Writer:
         return quoted(self.target.address(asset))
 
     def body(self, robot: Robot) -> tuple[list[str], list[str]]:
-        """Return the links and joints below ``robot.base``, in full and for a stock publisher, as ``urdf`` does.
+        """Return the URDF elements below ``robot.base``, in full and for a stock publisher.
 
         A frame of unknown pose is left out with what is below it, and a comment says so.
 
@@ -286,7 +291,10 @@ def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:
 
 
 def _joint_names(edges: list[Edge]) -> list[str]:
-    """Return a name for each edge's joint: the user's, or ``parent_to_child``, longer where that is taken."""
+    """Return a name for each edge's joint.
+
+    The user's, or ``parent_to_child``, longer where that is taken.
+    """
     taken = {edge.joint_name for edge in edges}
     names = []
     for edge in edges:

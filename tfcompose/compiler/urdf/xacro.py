@@ -35,7 +35,9 @@ class Expansion:
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """How a robot file uses a xacro file, ``at`` a place: as a whole, or a call of a ``macro`` that is defined there.
+    """How a robot file uses a xacro file, ``at`` a place.
+
+    As a whole, or a call of a ``macro`` that is defined there.
 
     The macro's parameters are words, of which ``places`` holds where they are given, and blocks of
     XML; ``files`` are what is included for it.
@@ -50,7 +52,7 @@ class Use:
 
 
 def macros_in(text: str) -> dict[str, str]:
-    """Return the parameters of each macro that a xacro file defines, as they are declared, by the macro's name."""
+    """Return the parameters of each macro that a xacro file defines, by macro name."""
     macros = {}
     for found in _MACRO.finditer(text):
         params = _PARAMS.search(text[found.start() : text.find(">", found.end())])

@@ -175,7 +175,7 @@ class Expansion:
         self._noted = ""
 
     def made(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Return the document that xacro makes, with the places of its elements, or why it makes none."""
+        """Return xacro's document with the places of its elements, or why there is none."""
         try:
             with self._hooked():
                 document = self._document(request)
@@ -207,7 +207,10 @@ class Expansion:
 
     @contextmanager
     def _hooked(self) -> Iterator[None]:
-        """Put this between xacro and what it opens, parses, evaluates and looks for; it offers no other way."""
+        """Put this between xacro and what it opens, parses, evaluates and looks for.
+
+        It offers no other way.
+        """
         hooks = {
             (xacro, "open"): self._reader.open,
             (xacro, "glob"): SimpleNamespace(glob=self._reader.glob),
@@ -250,7 +253,7 @@ class Expansion:
         return folder
 
     def _evaluate(self, evaluate: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
-        """Return xacro's evaluation of a text within a bounded time, which Python code alone could not keep to."""
+        """Return xacro's evaluation of a text with a time limit that Python cannot enforce."""
 
         def evaluated(text: str, symbols: Any) -> Any:
             if "$" not in text:
@@ -270,7 +273,10 @@ class Expansion:
         return evaluated
 
     def _places(self, document: Any) -> tuple[list[Any], list[Any]]:
-        """Return the place of each element, in the order of the text, None where it is in no file; and of comments."""
+        """Return the place of each element, in the order of the text, None where it is in no file.
+
+        And of comments.
+        """
         places, comments, waiting = [], [], [document]
         while waiting:
             node = waiting.pop()
@@ -282,7 +288,7 @@ class Expansion:
         return places, [place for place in dict.fromkeys(comments) if place]
 
     def _failure(self, error: Exception) -> dict[str, Any]:
-        """Return what xacro, or something that it called, did not like, and what it was about then."""
+        """Return xacro's complaint, or that of something it called, and what it was doing."""
         chain: list[Any] = [error]
         while (
             getattr(chain[-1], "exc", None) is not None
@@ -336,7 +342,10 @@ class Expansion:
 
 
 def _busy_with(frame: FrameType) -> Any | None:
-    """Return the element that a function of xacro has as its argument, or that it has come to; None for others."""
+    """Return the element that a function of xacro has as its argument, or that it has come to.
+
+    None for others.
+    """
     if frame.f_globals.get("__name__") != "xacro":
         return None
     node: Any = frame.f_locals.get("node") or frame.f_locals.get("elt")
@@ -348,7 +357,10 @@ def _busy_with(frame: FrameType) -> Any | None:
 
 
 def _reason(chain: list[Any]) -> str:
-    """Return the message of a chain of exceptions in one line; the last one is the cause of the others."""
+    """Return the message of a chain of exceptions in one line.
+
+    The last one is the cause of the others.
+    """
     root = chain[-1]
     if isinstance(root, OSError):
         words = [f"{root.strerror}: {root.filename}"]

@@ -152,7 +152,10 @@ def late_stamps(state: TreeState) -> Iterator[Finding]:
 
 
 def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, float, EdgeState]]:
-    """Return of the edge above the data that is behind the others: how far it is behind the data, and their age."""
+    """Return of the edge above the data that is behind the others.
+
+    How far it is behind the data, and their age.
+    """
     if len(each.delays_s) < FEWEST:
         return []
     age_s = median(each.delays_s)
@@ -161,7 +164,10 @@ def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, floa
 
 
 def keeps_data_waiting(state: TreeState) -> set[tuple[str, str]]:
-    """Return the edges, parent and child, whose stamps lag data that need them: they are reported with the data."""
+    """Return the edges, parent and child, whose stamps lag data that need them.
+
+    They are reported with the data.
+    """
     found = [way for each in state.stamped for way in _latest_above(state, each)]
     return {(edge.parent, edge.child) for lack_s, _, edge in found if lack_s > LACK_S}
 
@@ -169,7 +175,10 @@ def keeps_data_waiting(state: TreeState) -> set[tuple[str, str]]:
 def _off_clock(
     state: TreeState, each: StampedData, edge: EdgeState, age_s: float, *, simulated: bool
 ) -> str:
-    """Return how data are of another clock than an edge; nothing where they are only late or ahead."""
+    """Return how data are of another clock than an edge.
+
+    Nothing where they are only late or ahead.
+    """
     if each.stamp_ns is None or KEPT_S < abs(age_s) < HOUR_S:
         return ""
     apart_ns = (
@@ -212,7 +221,7 @@ def _delay_s(edge: EdgeState) -> float:
 
 
 def _moving_above(state: TreeState, frame: str) -> list[EdgeState]:
-    """Return the moving edges from a frame up to its root, of each frame the one that came last."""
+    """Return the moving edges from a frame to its root, the newest of each frame."""
     newest: dict[str, EdgeState] = {}
     for edge in state.taken:
         known = newest.get(edge.child)
@@ -303,7 +312,9 @@ def _missing(state: TreeState) -> list[MovingJoint]:
 
 
 def _joint_topics(state: TreeState) -> list[Topic]:
-    """Return the topics of joint states that are meant: those named ``joint_states``, but for robots beside this one.
+    """Return the topics of joint states that are meant.
+
+    Those named ``joint_states``, but for robots beside this one.
 
     A robot beside has TF topics of its own, in a namespace below this one's.
     """

@@ -48,7 +48,7 @@ def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
 
 
 def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
-    """Return whether the plan says where a fixed frame is that this process owns, and no preset does.
+    """Return whether the plan, and no preset, gives the pose of this process's frame.
 
     Another owner's pose is the identity where the robot says none.
     """
@@ -58,7 +58,7 @@ def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
 
 
 def fixed_of(plan: Plan) -> dict[str, PlanEdge]:
-    """Return the fixed edges with a pose that others than tfcompose's own publisher own, by their child."""
+    """Return the fixed edges with a pose that others than ``static`` own, by child."""
     known, owners = expected_of(plan), {process.name: process for process in plan.processes}
     return {
         edge.child: edge
@@ -100,7 +100,10 @@ def is_pose(sent: Pose) -> bool:
 
 
 def is_off(expected: Expected, sent: Pose) -> bool:
-    """Return whether a pose is farther from the preset's than a calibration explains; False for what tf2 drops."""
+    """Return whether a pose is farther from the preset's than a calibration explains.
+
+    False for what tf2 drops.
+    """
     return is_pose(sent) and offset_of(expected.edge.pose, sent).beyond(
         NOMINAL if expected.nominal else EXACT
     )
@@ -109,7 +112,7 @@ def is_off(expected: Expected, sent: Pose) -> bool:
 def driver_pose_differs(
     node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None
 ) -> Finding:
-    """Return the finding for frames of one sensor that its driver ``node``, empty if not known, sends elsewhere."""
+    """Return the finding for a sensor's frames that its driver sends with other poses."""
     (expected, sent), *others = off
     driven, edge = expected.driven, expected.edge
     more = f", and {counted(len(others), 'more frame')} elsewhere" if others else ""
@@ -137,7 +140,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SentPose:
-    """What a publisher sent of a frame that a driver is expected to send, or another owner, as the plan says."""
+    """Transforms of a frame that a driver or owner sends, as compared with the plan."""
 
     expected: Expected | PlanEdge
     pose: Pose
@@ -188,7 +191,7 @@ class SentPoses:
         return frozenset(self._expected)
 
     def judge(self) -> Iterator[Finding]:
-        """Yield what was sent otherwise than presets or the plan say, once for each publisher and sensor."""
+        """Yield poses that differ from presets or plan, once per publisher and sensor."""
         wrong: dict[tuple[str, str], list[tuple[Expected, Pose]]] = {}
         elsewhere: dict[str, list[tuple[PlanEdge, str, Pose]]] = {}
         waiting = []
@@ -221,7 +224,10 @@ def not_taken(
     found: dict[str, Value | None],
     drives: tuple[Driven, ...] = (),
 ) -> list[Finding]:
-    """Return a finding for each parameter of the node that is not what the plan wrote; None: it has no such one."""
+    """Return a finding for each parameter of the node that is not what the plan wrote.
+
+    None: it has no such one.
+    """
     return [
         _not_taken(node, name, value, found[name], drives)
         for name, value in wanted.items()

@@ -1,4 +1,4 @@
-"""Publishers: settings that no listener accepts, the wrong topic or type, two of one edge, and poses that are off."""
+"""Publishers: unusable QoS, wrong topics or types, duplicates, and wrong poses."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ def two_publishers_message(edges: str, publishers: Sequence[str], *, several: bo
 def topics_message(
     edges: str, topics: Sequence[tuple[str, str]], declared: str = "", *, several: bool = False
 ) -> str:
-    """Return the message for edges that come on the wrong topic, or on two: the topics, each with who publishes there.
+    """Return the message for edges that come on the wrong topic, or on two.
+
+    The topics, each with who publishes there.
 
     ``declared`` is the topic that the plan says, empty where none does.
     """
@@ -99,7 +101,7 @@ def flooded(state: TreeState) -> Iterator[Finding]:
 
 
 def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: bool) -> Finding:
-    """Return the finding for a process of a strict plan that is not behind the fence, which may be of remappings.
+    """Return the finding for a process of a strict plan outside its isolation.
 
     ``profile`` is the profile file that it was started with instead of the fence's; empty: none.
     """
@@ -170,7 +172,7 @@ def leak(node: str, topic: str, own: str) -> Finding:
 
 
 def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Finding:
-    """Return the finding for a publisher whose last latched message, which the guard heard, lacks these edges."""
+    """Return the finding for a publisher whose last latched message lacks these edges."""
     lost, named = counted(sent_before, "message"), listed(missing, LISTED_AT_MOST)
     message = (
         f"{node} sent {lost} on /tf_static before the guard received it, and none since contains"
@@ -181,7 +183,10 @@ def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Fin
 
 
 def volatile_publisher(node: str, topic: str, owned: Sequence[str]) -> Finding:
-    """Return the finding for a publisher of fixed edges that no TF listener accepts; ``owned`` are its edges."""
+    """Return the finding for a publisher of fixed edges that no TF listener accepts.
+
+    ``owned`` are its edges.
+    """
     notes = [Note(f"it owns {listed(owned, LISTED_AT_MOST)}")] if owned else []
     message = f"{node} publishes {topic} with durability volatile, so no listener receives it"
     return finding(
@@ -354,7 +359,10 @@ def isolation_leak(state: TreeState) -> Iterator[Finding]:
 
 
 def _together(edges: Sequence[EdgeState]) -> bool:
-    """Whether two of them sent in the same stretch of time; what is fixed is sent once and holds on."""
+    """Whether two of them sent in the same stretch of time.
+
+    What is fixed is sent once and holds on.
+    """
     spans = sorted(
         (e.stream.first_ns, float("inf") if e.stream.static else e.stream.arrivals.last_ns)
         for e in edges
@@ -394,7 +402,9 @@ def compared(expected: Pose, observed: Pose) -> str:
 def pose_differs(
     off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None
 ) -> Finding:
-    """Return the finding for edges that come with another pose than the plan's: each with its parent, as it was sent.
+    """Return the finding for edges that come with another pose than the plan's.
+
+    Each with its parent, as it was sent.
 
     ``publisher`` is empty where it is not known; ``place`` is where the first edge is in the
     robot's file.

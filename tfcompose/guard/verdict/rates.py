@@ -223,7 +223,7 @@ def fell_silent(state: TreeState) -> Iterator[Finding]:
 
 
 def fixed_left(state: TreeState) -> Iterator[Finding]:
-    """Fixed edges were there, and the publisher that held them for those who come later has left."""
+    """Fixed edges were there, but the publisher that latched them has left."""
     held = {edge.child for edge in state.taken if edge.stream.static and edge.present is not False}
     held |= state.planned
     lost: dict[str, list[EdgeState]] = {}
@@ -236,7 +236,10 @@ def fixed_left(state: TreeState) -> Iterator[Finding]:
 
 
 def _speed(state: TreeState, edge: EdgeState) -> float:
-    """Return how fast simulated time goes by, 1 at most: so much less often may come what it rules."""
+    """Return how fast simulated time goes by, 1 at most.
+
+    So much less often may come what it rules.
+    """
     clock_ns = state.clock_ns
     ruled = clock_ns is not None and abs(edge.stream.stamp_ns - clock_ns) <= KEPT_NS
     return min(1.0, edge.stream.speed) if ruled else 1.0

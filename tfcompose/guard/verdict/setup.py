@@ -75,7 +75,7 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
 
 
 def other_settings(state: TreeState) -> Iterator[Finding]:
-    """Where frames are missing: processes of this machine that cannot be heard, because ROS is set up otherwise."""
+    """Missing frames: local processes that cannot be heard because ROS is set up otherwise."""
     complete = not state.planned - {edge.child for edge in state.edges}
     if (state.edges and complete) or (not state.edges and _elsewhere(state)):
         return
@@ -157,7 +157,7 @@ def settings_contradict(state: TreeState) -> Iterator[Finding]:
 
 
 def settings_apart(theirs: Mapping[str, str], ours: Mapping[str, str]) -> dict[str, str]:
-    """Return the settings in which processes on one machine differ so that they do not discover each other."""
+    """Return the settings that keep processes of one machine from discovering each other."""
     apart = {}
     for name, default in DEFAULTS.items():
         their, our = theirs.get(name) or default, ours.get(name) or default

@@ -60,7 +60,7 @@ STANDS_S = 0.3
 
 
 def other_clock(stamp_ns: int, received_ns: int, sim_ns: int | None, *, simulated: bool) -> str:
-    """Return how a stamp is of another clock than it should be, empty where it is of the right one.
+    """Return how a stamp is of another clock than expected, empty if it is not.
 
     ``received_ns`` is the system's time when it came, 0 where that is not known; ``sim_ns`` the
     newest time on /clock, None where there is none. ``simulated`` says which of the two it should
@@ -127,7 +127,7 @@ def advice(code: str, detail: str) -> str:
 
 @dataclass(slots=True)
 class Clocks:
-    """What time it is: the system's time when a message came, and the newest on /clock (None: nothing came yet).
+    """The time: the system's when a message came, and the newest /clock (None: none yet).
 
     ``sent`` says whether anybody is there who could send it.
     """
@@ -152,7 +152,10 @@ class Clocks:
             self._since = (now, sim_ns)
 
     def stands(self, now: float) -> bool:
-        """Return whether time came and has stopped: no node sends anything then, and none counts as silent."""
+        """Return whether time came and has stopped.
+
+        No node sends anything then, and none counts as silent.
+        """
         return (
             self.simulated
             and self.sent
@@ -161,7 +164,10 @@ class Clocks:
         )
 
     def speed(self, now: float) -> float:
-        """Return how many seconds go by on /clock in a second, 1 at most: the least of what is, and was a while ago."""
+        """Return how many seconds go by on /clock in a second, 1 at most.
+
+        The least of what is, and was a while ago.
+        """
         enough = self._since is not None and now - self._since[0] >= SPEED_OVER_S / 4
         return min(self._speed, self._passed(now)) if enough else self._speed
 
@@ -185,7 +191,10 @@ class StampHistory:
     wrong: int = 0
 
     def judge(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> tuple[str, str]:
-        """Take a message's stamps and return the fault's code and what was observed; empty where all is well."""
+        """Take a message's stamps and return the fault's code and what was observed.
+
+        Empty where all is well.
+        """
         last, self.last = self.last, stamps_ns
         off = self._clock(stamps_ns, received_ns, clocks)
         step = self._step(stamps_ns, last) if last else ("", "")
@@ -255,7 +264,10 @@ def stamp_went_back(state: TreeState) -> Iterator[Finding]:
 
 
 def wrong_clock(state: TreeState) -> Iterator[Finding]:
-    """Stamps are of another clock than the others': simulated and system time mixed, or no stamp at all."""
+    """Stamps are of another clock than the others'.
+
+    Simulated and system time mixed, or no stamp at all.
+    """
     simulated = state.simulated
     for edges in by_publisher(
         state, lambda edge: bool(_off_clock(state, edge, simulated=simulated))

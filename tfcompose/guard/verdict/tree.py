@@ -36,7 +36,7 @@ def way(frames: Sequence[str]) -> str:
 
 
 def loop_message(frames: Sequence[str], closed_by: str = "") -> str:
-    """Return the message for a loop, from a frame down to it again, and for who closed it, if that is known."""
+    """Return the message for a loop of frames, and for who closed it, if known."""
     return f"the frames {way(frames)} form a loop" + (
         f", closed by {closed_by}" if closed_by else ""
     )
@@ -91,7 +91,7 @@ def drops(state: TreeState) -> Iterator[Finding]:
 
 
 def rejected_transforms(edge: EdgeState) -> Iterator[Finding]:
-    """Give the finding for an edge of which tf2 drops transforms, unless it is a frame in itself."""
+    """Give the finding for an edge of which tf2 drops transforms, unless it is a self-loop."""
     stream = edge.stream
     if stream.rejected is None or edge.parent == edge.child:
         return
@@ -192,7 +192,10 @@ def two_trees(state: TreeState) -> Iterator[Finding]:
 
 
 def trees_of(state: TreeState) -> dict[str, set[str]]:
-    """Return the frames of each tree by its root, the largest tree first; frames on loops have no root."""
+    """Return the frames of each tree by its root, the largest tree first.
+
+    Frames on loops have no root.
+    """
     return trees(_pairs(state))
 
 
@@ -233,7 +236,7 @@ def _described(state: TreeState, edge: EdgeState) -> str:
 
 
 def _hands_over(edges: list[EdgeState]) -> bool:
-    """Whether they are all of one publisher, who puts the frame now in this parent, now in that."""
+    """Whether all are of one publisher that alternates between parents."""
     handover = edges[0].stream.handover
     return handover is not None and handover.is_one and len(handover.streams) == len(edges)
 

@@ -221,7 +221,10 @@ class _Comparison:
 
 
 def _times(edge: PlanEdge, one: EdgeState, *, simulated: bool) -> Iterator[Difference]:
-    """Judge whether it comes, and often enough; a simulation may go slower than the time of day."""
+    """Judge whether it comes, and often enough.
+
+    A simulation may go slower than the time of day.
+    """
     rate, limit_s = edge.rate, edge.silent_after_s
     if one.present is False:
         yield Difference("TF804", edge, one, silence_s=one.age_s)
@@ -282,7 +285,10 @@ def group_finding(
     place: Span | None = None,
     slow_is: Severity = "warning",
 ) -> Finding:
-    """Return the finding for differences of one group; ``place`` is where the first edge is in the robot's file."""
+    """Return the finding for differences of one group.
+
+    ``place`` is where the first edge is in the robot's file.
+    """
     first = group[0]
     found = (
         _fault_finding(group, state, plan, place)
@@ -404,7 +410,10 @@ def differs_from_plan(state: TreeState) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What is wrong with an edge, nothing if all is as expected; ``owner`` is None where nobody declared it."""
+    """What is wrong with an edge, nothing if all is as expected.
+
+    ``owner`` is None where nobody declared it.
+    """
 
     edge: str
     owner: str | None
@@ -417,7 +426,7 @@ def verify(
     tolerance: Offset,
     places: Mapping[str, Span] | None = None,
 ) -> list[Verdict]:
-    """Return a verdict for each planned edge, in the plan's order, then one for each edge that is not in the plan.
+    """Return a verdict for each planned edge, in order, then for each unplanned one.
 
     ``places`` is where the edges stand in the robot's file, by child.
     """

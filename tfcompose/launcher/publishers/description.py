@@ -46,7 +46,10 @@ class Description:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether ``check`` should be called again soon: a publisher is known before its node's name is."""
+        """Whether ``check`` should be called again soon.
+
+        A publisher is known before its node's name is.
+        """
         return bool(self._unnamed)
 
     def check(self) -> None:

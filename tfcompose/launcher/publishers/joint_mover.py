@@ -1,4 +1,6 @@
-"""From joint states to TF messages, bytes to bytes; unusable joint states are reported and left out.
+"""From joint states to TF messages, bytes to bytes.
+
+Unusable joint states are reported and left out.
 
 The pose of a joint's edge is its pose at 0 followed by the motion (URDF). For a turn about the
 unit axis a that is p₀, q₀·(a sin q/2, cos q/2) = cos q/2 · q₀ + sin q/2 · q₀·(a, 0); for a slide
@@ -50,7 +52,7 @@ class PublishOptions:
 
 @dataclass(slots=True)
 class _Source:
-    """Joint states with the same names, and when the last of them was published, in nanoseconds of their own time."""
+    """Joint states with the same names, and the newest stamp in nanoseconds."""
 
     names: Names
     moving: Moving | None
@@ -111,7 +113,7 @@ class JointMover:
         ]
 
     def tf_message(self, data: bytes, received_ns: int) -> bytes | None:
-        """Return what a joint state says as a TFMessage, or None where it says nothing or is left out."""
+        """Return a joint state as a TFMessage, or None if it says nothing."""
         try:
             source = self._source(data)
             if source.moving is None:
@@ -222,7 +224,7 @@ class Moving:
         self._along = _columns([rotate(pose.quat_xyzw, axis) for pose, axis in sliding], 3)
 
     def message(self, positions: NDArray[np.float64], stamp_ns: int) -> bytes:
-        """Return the TFMessage for these positions, in the order of the names, at this time in nanoseconds.
+        """Return the TFMessage for these positions, in the names' order, at a stamp in ns.
 
         Raises:
             ValueError: with a sentence that is the same for the same fault, if a position is not

@@ -1,4 +1,4 @@
-"""The process that turns joint states into edges on /tf, and names the joints that none speaks of."""
+"""Joints process: turns joint states into edges on /tf, and names missing joints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def joints(own: Own, stop: Stop) -> None:
-    """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
+    """Publish the moving edges of each ``joint_states`` message, and latch the description."""
     # ROS, once signals are handled.
     from tfcompose.launcher.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415
 

@@ -16,7 +16,7 @@ SLIDING = ("prismatic",)
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """The position of a joint: ``multiplier`` · positions[``column``] + ``offset``, in rad or m."""
+    """A joint's position: ``multiplier`` · positions[``column``] + ``offset``, rad or m."""
 
     joint: int
     column: int
@@ -39,7 +39,10 @@ class Joints:
         self._mimics = {joint.name: joint for joint in joints if joint.mimic is not None}
 
     def followed(self, names: Sequence[str]) -> list[Followed]:
-        """Return the joints that a message with these names determines; of a name that comes twice the first counts."""
+        """Return the joints that a message with these names determines.
+
+        Of a name that comes twice the first counts.
+        """
         columns: dict[str, int] = {}
         for column, name in enumerate(names):
             columns.setdefault(name, column)

@@ -1,4 +1,6 @@
-"""The process that stands in for an owner: its edges, or joint states, at the plan's rate and by the plan's clock.
+"""The process that stands in for an owner.
+
+Its edges, or joint states, at the plan's rate and by the plan's clock.
 
 How what it simulates moves are pure functions, in seconds, metres and radians.
 """
@@ -93,7 +95,10 @@ def _joint_states(
 
 
 def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
-    """Give seconds since the start and the time to stamp with, at ``rate``; ticks that were missed are left out."""
+    """Give seconds since the start and the time to stamp with, at ``rate``.
+
+    Ticks that were missed are left out.
+    """
     start, tick = time.monotonic(), 0
     while not stop.wait(max(0.0, start + tick / rate - time.monotonic())):
         elapsed_s = time.monotonic() - start
@@ -129,7 +134,7 @@ def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int
 
 
 class JointSource:
-    """The simulated joints, and behind them those of the plan that mimic them, also through chains.
+    """The simulated joints, followed by those that mimic them, also through chains.
 
     A robot_state_publisher of the stock kind follows a chain only in the order of the names, so
     that mimics are sent with their own values.
@@ -153,7 +158,9 @@ class JointSource:
 
 
 def circle(radius: float, speed: float, time_s: float) -> Pose:
-    """Return the pose, in the circle's centre, of a body that drives on it: x = r cos ωt, y = r sin ωt.
+    """Return the pose, in the circle's centre, of a body that drives on it.
+
+    X = r cos ωt, y = r sin ωt.
 
     ``speed`` is ω in rad/s, counter-clockwise where positive. The body looks where it goes.
     """
@@ -165,7 +172,7 @@ def circle(radius: float, speed: float, time_s: float) -> Pose:
 
 
 def swept(sweep: Sweep, start: float, time_s: float) -> float:
-    """Return the position (rad or m) of a joint that is at ``start`` at time 0 and moves as the sweep says.
+    """Return the position (rad or m) of a joint that sweeps from ``start`` at time 0.
 
     To and fro it is a sine about the middle, which sets out upwards: the position and its speed
     have no steps, and the speed is π · (upper - lower) / period at most. Round and round the angle

@@ -1,4 +1,4 @@
-"""The process that latches the fixed edges on /tf_static, and the description where nobody else sends it."""
+"""Static publisher process: latches fixed edges on /tf_static and the description."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def static(own: Own, stop: Stop) -> None:
-    """Latch all fixed edges in one message on /tf_static, and the description where no joints process does."""
+    """Latch all fixed edges in one message, and the description without ``joints``."""
     # ROS, once signals are handled.
     from tfcompose.launcher.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415
 
@@ -66,5 +66,5 @@ def static(own: Own, stop: Stop) -> None:
 
 
 def _joints_of(own: Own) -> str:
-    """Return the name of the process that sends the description in this one's place, where there is one."""
+    """Return the name of the process that sends the description instead, if any."""
     return f"{own.process.name.removesuffix('static')}joints"

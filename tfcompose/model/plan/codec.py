@@ -1,4 +1,6 @@
-"""Dataclasses as JSON, by the types of their fields: the plan, messages between processes, and state on disk.
+"""Dataclasses as JSON, by the types of their fields.
+
+The plan, messages between processes, and state on disk.
 
 What a type is in JSON:
 
@@ -48,13 +50,16 @@ FLAT: Mapping[str, bool] = types.MappingProxyType({"flat": True})
 
 
 def documented(default: Any, about: str, *examples: Any, **metadata: Any) -> Any:
-    """Return a field of a dataclass that users write as well: what an editor and the reference say of the key."""
+    """Return a field of a dataclass that users write as well.
+
+    What an editor and the reference say of the key.
+    """
     more = {"examples": list(examples)} if examples else {}
     return field(default=default, metadata={**metadata, "description": about, **more})
 
 
 def narrowed(kind: type[T], value: T, **changes: Any) -> T:
-    """Return a dataclass ``kind`` with what ``value``, of one of its subclasses, has in its fields, but for changes."""
+    """Return a ``kind`` with the fields of ``value``, of one of its subclasses, changed."""
     of: Any = kind
     same = {one.name: getattr(value, one.name) for one in fields_of_dataclass(of) if one.init}
     return kind(**same | changes)
@@ -73,7 +78,9 @@ _LONGEST_SHOWN = 60
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rule:
-    """What holds for a value beyond its type: ``check`` raises a ValueError whose sentence goes on after the path.
+    """What holds for a value beyond its type.
+
+    ``check`` raises a ValueError whose sentence goes on after the path.
 
     ``schema`` holds keywords of JSON Schema that say the same, as far as it can.
     """
@@ -83,7 +90,10 @@ class Rule:
 
 
 class DecodeError(ValueError):
-    """Data that are not of the type that is expected: one sentence, which begins with the path to them."""
+    """Data that are not of the type that is expected.
+
+    One sentence, which begins with the path to them.
+    """
 
     def __init__(self, what: str) -> None:
         super().__init__(what)
@@ -97,7 +107,10 @@ class DecodeError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field as it is written. ``kind`` is its type; ``default`` is MISSING where it must be there."""
+    """A field as it is written. ``kind`` is its type.
+
+    ``default`` is MISSING where it must be there.
+    """
 
     name: str
     kind: Any
@@ -214,7 +227,10 @@ class TaggedUnion(Generic[T]):
 
 
 def shown(value: Any) -> str:
-    """Return a value that was read as an error shows it: what kind it is, or the value itself, if it is short."""
+    """Return a value that was read as an error shows it.
+
+    What kind it is, or the value itself, if it is short.
+    """
     if isinstance(value, (dict, list)):
         return "a mapping" if isinstance(value, dict) else "a list"
     text = json.dumps(value, ensure_ascii=False)

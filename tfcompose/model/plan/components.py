@@ -25,7 +25,9 @@ LOAD, UNLOAD, LIST = "_container/load_node", "_container/unload_node", "_contain
 
 @dataclass(frozen=True, slots=True)
 class LoadRequest:
-    """A component to load. ``container`` and ``node`` are full names of nodes; values of parameters are those of ROS.
+    """A component to load. ``container`` and ``node`` are full names of nodes.
+
+    Values of parameters are those of ROS.
 
     A list has values of one kind; a list of whole and other numbers counts as one of others.
     """
@@ -49,7 +51,9 @@ def load_file(folder: Path, process: str) -> Path:
 def load_request(
     plan: Plan, process: PlanProcess, fill: Callable[[str], str], *, private: bool
 ) -> LoadRequest:
-    """Return the request for a component of the plan; ``fill`` replaces what only the starting machine knows.
+    """Return the request for a component of the plan.
+
+    ``fill`` replaces what only the starting machine knows.
 
     With ``private`` the processes of a strict plan are remapped to TF topics of their own.
 

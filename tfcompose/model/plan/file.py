@@ -29,7 +29,10 @@ _FOR_PROGRAMS = frozenset({"argv", "env", "switches", "component"})
 
 
 def write_plan(plan: Plan) -> str:
-    """Return the plan as JSON text: one line an edge and a process, the same bytes for the same plan."""
+    """Return the plan as JSON text.
+
+    One line an edge and a process, the same bytes for the same plan.
+    """
     lines = (
         f"  {_json(key)}: {_rows(value) if isinstance(value, list) else _json(value)}"
         for key, value in encode(plan).items()
@@ -69,7 +72,10 @@ def read_plan(text: str, file: str) -> Plan:
 
 
 def _wrong_text(data: Any) -> Iterator[str]:
-    """Yield what is wrong with each text: control characters would move a terminal's cursor, or begin a new line."""
+    """Yield what is wrong with each text.
+
+    Control characters would move a terminal's cursor, or begin a new line.
+    """
     waiting: list[tuple[Any, tuple[str, ...]]] = [
         (data, ())
     ]  # what no field takes may be nested deeper than calls may
@@ -87,7 +93,10 @@ def _wrong_text(data: Any) -> Iterator[str]:
 
 
 def _wrong_names(plan: Plan) -> Iterator[str]:
-    """Yield what is wrong with names: those that no robot file can give, of nothing, and of files elsewhere."""
+    """Yield what is wrong with names.
+
+    Those that no robot file can give, of nothing, and of files elsewhere.
+    """
     if not _ROBOT.fullmatch(plan.robot):
         yield f"robot is {shown(plan.robot)}, not a name of lower case letters, digits and _"
     known = Counter(process.name for process in plan.processes)

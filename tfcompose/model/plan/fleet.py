@@ -1,4 +1,4 @@
-"""The process of a plan that shares a robot's edges with its fleet, and what it needs where it runs."""
+"""The process that shares a robot's edges with its fleet, and its requirements."""
 
 from __future__ import annotations
 
@@ -18,12 +18,15 @@ INSTALL = "pip install 'tfcompose[fleet]'"
 
 
 def is_fleet_share(process: PlanProcess) -> bool:
-    """Return whether a process shares the robot's edges, and is tfcompose's own: it needs eclipse-zenoh."""
+    """Return whether a process shares the robot's edges, and is tfcompose's own.
+
+    It needs eclipse-zenoh.
+    """
     return process.argv[: len(SHARE_COMMAND)] == SHARE_COMMAND
 
 
 def missing_zenoh(process: PlanProcess) -> Finding | None:
-    """Return the finding that this Python cannot share edges, where that is what the process does; or None."""
+    """Return the finding that this Python cannot share edges, or None."""
     if not is_fleet_share(process) or find_spec("zenoh") is not None:
         return None
     message = f"{process.name} needs eclipse-zenoh, which is not installed"

@@ -74,7 +74,10 @@ def share_of(plan: Plan, host: str | None, machine: str) -> Plan | Finding:
 
 
 def describe_share(plan: Plan) -> tuple[str, ...]:
-    """Return what is printed of a share: what this machine starts, and what others do; nothing of a whole plan."""
+    """Return what is printed of a share: what this machine starts, and what others do.
+
+    Nothing of a whole plan.
+    """
     if plan.host is None:
         return ()
     others: dict[str, list[str]] = {}
@@ -104,7 +107,10 @@ def _share(plan: Plan, host: str | None) -> Plan:
 
 
 def _edge_on_host(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:
-    """Return the edge as it is seen on a host: what another machine's process sends, its strict guard passes on."""
+    """Return the edge as it is seen on a host.
+
+    What another machine's process sends, its strict guard passes on.
+    """
     owner = plan.process(edge.owner)
     if owner.kind == "external" or owner.host == host:
         return edge
@@ -140,6 +146,6 @@ def _elsewhere(process: PlanProcess) -> PlanProcess:
 
 
 def without_computer(plan: Plan) -> tuple[str, ...]:
-    """Return the processes that would run on no computer under ``hosts``, where the plan is deployed to these."""
+    """Return the processes that no computer under ``hosts`` would run."""
     own = (one for one in plan.managed if one.kind != "guard")
     return tuple(process.name for process in own if process.host not in plan.hosts)

@@ -1,4 +1,6 @@
-"""What a plan's processes need for the middleware (rmw) that it names: variables, and Zenoh's router.
+"""What a plan's processes need for the middleware (rmw) that it names.
+
+Variables, and Zenoh's router.
 
 Facts of rmw_zenoh_cpp (its README and design): sessions are peers that find each other through one
 router, which listens on port 7447 of their own computer. ``ZENOH_CONFIG_OVERRIDE`` holds
@@ -64,7 +66,10 @@ def middleware_variables(ros: RosSettings, base: Mapping[str, str]) -> dict[str,
 
 
 def router_variables(ros: RosSettings) -> dict[str, str]:
-    """Return what the router alone has in its environment: where it listens, if that is not its own default."""
+    """Return what the router alone has in its environment.
+
+    Where it listens, if that is not its own default.
+    """
     meant = re.fullmatch(ENDPOINT, ros.router) if ros.router else None
     if meant is None and ros.discovery != "localhost":
         return {}

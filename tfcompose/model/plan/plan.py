@@ -1,4 +1,4 @@
-"""What a plan holds: its enumerations, edges, processes, what all of them share, and the guard's policy.
+"""Contents of a plan: enumerations, edges, processes, shared settings, guard policy.
 
 Each enumeration of the plan and of the language is a Literal here; ``get_args`` gives its words.
 """
@@ -116,7 +116,7 @@ class EdgePattern:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A moving joint: its edge's pose at position q is the edge's ``pose`` followed by the motion along ``axis``.
+    """A moving joint: the edge's ``pose`` followed by motion along ``axis`` gives the pose.
 
     ``axis`` is a unit vector in the child's frame at q = 0. With ``mimic`` the position is
     ``multiplier`` · q(mimic) + ``offset``. Positions are radians, or metres for a prismatic joint.
@@ -178,7 +178,9 @@ _AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """How a simulated joint moves: to and fro between two positions (rad or m) once in ``period_s``.
+    """How a simulated joint moves.
+
+    To and fro between two positions (rad or m) once in ``period_s``.
 
     Without them it turns round and round, once in that time.
     """
@@ -225,7 +227,9 @@ class Ready:
 
 @dataclass(frozen=True, slots=True)
 class StopRule:
-    """How a process is ended: the first signal, and the time until a firmer one; None: the launcher's own.
+    """How a process is ended: the first signal, and the time until a firmer one.
+
+    None: the launcher's own.
 
     ``kill_timeout_s`` is the time between SIGTERM and SIGKILL; None: ``timeout_s``.
     """
@@ -237,7 +241,9 @@ class StopRule:
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """How the kernel schedules a process: on which processors (empty: any), and by which policy (sched(7)).
+    """How the kernel schedules a process.
+
+    On which processors (empty: any), and by which policy (sched(7)).
 
     ``priority`` is that of the real-time policies, 1 to 99, and 0 for the others.
     """
@@ -253,7 +259,9 @@ ParameterValue = str | int | float | bool
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """A sensor that a process drives. ``publishes`` says that the frames inside the sensor are the driver's.
+    """A sensor that a process drives.
+
+    ``publishes`` says that the frames inside the sensor are the driver's.
 
     ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not
     its own. ``frames`` says of the frames that the driver publishes inside the sensor whether
@@ -285,7 +293,9 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class PlanProcess:
-    """What is started, or, with kind ``external``, expected to run; of kind ``component``, what a container loads.
+    """What is started, or, with kind ``external``, expected to run.
+
+    Of kind ``component``, what a container loads.
 
     ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought
     after the start. ``required`` says what ends the plan: True, this process's end; None, its
@@ -443,7 +453,10 @@ class GuardPolicy:
 
 @dataclass(frozen=True, slots=True)
 class PlanClaim:
-    """An edge that a node publishes by default and another process owns; ``switch`` stops it, empty: nothing does."""
+    """An edge that a node publishes by default and another process owns.
+
+    ``switch`` stops it, empty: nothing does.
+    """
 
     node: str
     parent: str
@@ -505,7 +518,10 @@ class Plan:
 
     @property
     def started(self) -> tuple[PlanProcess, ...]:
-        """The processes that are started, in the plan's order: all but external ones, and what containers load."""
+        """The processes that are started, in the plan's order.
+
+        All but external ones, and what containers load.
+        """
         return tuple(
             process for process in self.processes if process.kind not in ("external", "component")
         )
@@ -521,7 +537,10 @@ class Plan:
         return tuple(process for process in self.processes if process.component)
 
     def guards_of(self, host: str | None) -> tuple[str, ...]:
-        """Return the nodes of the guard of a host's share; None or empty: of the machine that has no name here."""
+        """Return the nodes of the guard of a host's share.
+
+        None or empty: of the machine that has no name here.
+        """
         own = [
             node for process in self.processes if process.kind == "guard" for node in process.nodes
         ]
@@ -537,7 +556,10 @@ class Plan:
         )
 
     def may_be_undeclared(self, parent: str, child: str) -> bool:
-        """Whether nobody needs to have declared the edge: by policy, or because it is another robot's."""
+        """Whether nobody needs to have declared the edge.
+
+        By policy, or because it is another robot's.
+        """
         policy, ros = self.guard, self.ros
         if (
             ros.frame_prefix
@@ -555,7 +577,10 @@ class Plan:
         return tuple(edge for edge in self.edges if edge.owner == owner)
 
     def started_with(self, process: PlanProcess) -> tuple[Any, ...]:
-        """Return all of the plan that decides how the process runs; an edge's place in the robot file does not."""
+        """Return all of the plan that decides how the process runs.
+
+        An edge's place in the robot file does not.
+        """
         guards = process.kind == "guard"
         edges = self.edges if guards else self.edges_of(process.name)
         fence = (self.robot, self.guard.fence) if self.guard.mode == "strict" else None

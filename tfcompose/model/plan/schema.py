@@ -24,7 +24,10 @@ _TYPES: dict[Any, dict[str, Any]] = {
 
 
 def plan_schema() -> dict[str, Any]:
-    """Return the schema, draft 2020-12. Keys that it does not name are allowed: a later plan may have more."""
+    """Return the schema, draft 2020-12.
+
+    Keys that it does not name are allowed: a later plan may have more.
+    """
     made: dict[str, dict[str, Any]] = {}
     schema = _object(Plan, made)
     return (

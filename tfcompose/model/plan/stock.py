@@ -1,4 +1,6 @@
-"""Stock nodes in the place of tfcompose's own publishers: their names, and what robot_state_publisher accepts.
+"""Stock nodes in the place of tfcompose's own publishers.
+
+Their names, and what robot_state_publisher accepts.
 
 ``export launch`` starts them, and ``verify`` takes what they send for their owners', where these
 do not run.
@@ -22,7 +24,10 @@ _NO_NODE = re.compile(r"\W")
 
 
 def static_names(plan: Plan) -> dict[str, str]:
-    """Return the name of the static_transform_publisher of each own fixed edge, by its child; no two are the same."""
+    """Return the name of the static_transform_publisher of each own fixed edge, by its child.
+
+    No two are the same.
+    """
     own = {process.name for process in plan.processes if process.kind in OWN_KINDS}
     names: dict[str, str] = {}
     for edge in plan.edges:
@@ -35,7 +40,7 @@ def static_names(plan: Plan) -> dict[str, str]:
 
 
 def stand_ins(plan: Plan) -> dict[str, frozenset[str]]:
-    """Return, for the child of each own edge, the full names of the stock nodes that may send it instead."""
+    """Return the stock nodes that may send an own edge instead, by child."""
     own = {process.name for process in plan.processes if process.kind in OWN_KINDS}
     below = f"/{plan.ros.namespace}/" if plan.ros.namespace else "/"
     fixed = static_names(plan)

@@ -1,4 +1,6 @@
-"""On which topics a plan's processes publish TF: those of the plan, and behind which fence, if its guard is strict.
+"""On which topics a plan's processes publish TF.
+
+Those of the plan, and behind which fence, if its guard is strict.
 
 A fence is a DDS partition, or topics of each process's own, to which it is remapped. Launcher and
 guard both know it.
@@ -37,13 +39,16 @@ def topics_below(namespace: str) -> Topics:
 
 
 def namespace_options(names: Iterable[str]) -> str:
-    """Return the options that lead to these topics: ``--namespace /robot1 or --namespace /robot2``."""
+    """Return the options that lead to these topics.
+
+    ``--namespace /robot1 or --namespace /robot2``.
+    """
     spaces = dict.fromkeys(name.rpartition("/")[0] for name in names)
     return " or ".join(f"--namespace {name}" if name else "without --namespace" for name in spaces)
 
 
 def parts_of(plan: Plan) -> dict[Topics, Plan]:
-    """Return, for each pair of topics (moving, fixed) that owners publish on, the plan with the edges on these."""
+    """Return the plan for each pair of topics, with the edges published on them."""
     topics = {process.name: process.topics for process in plan.processes}
     edges: dict[Topics, list[PlanEdge]] = {}
     for edge in plan.edges:
@@ -52,7 +57,10 @@ def parts_of(plan: Plan) -> dict[Topics, Plan]:
 
 
 def partition_of(plan: Plan) -> str:
-    """Return the partition that the plan's processes send TF in: those of one host, where it runs on several."""
+    """Return the partition that the plan's processes send TF in.
+
+    Those of one host, where it runs on several.
+    """
     return (
         f"tfc_{plan.robot}.{re.sub(r'[^A-Za-z0-9.-]', '_', plan.host)}"
         if plan.host
@@ -61,24 +69,30 @@ def partition_of(plan: Plan) -> str:
 
 
 def fence_file(folder: Path, process: str) -> Path:
-    """Return the profile file, in the folder of a run's plan, that moves a process's writers into the partition."""
+    """Return the profile file that moves a process's writers into the partition."""
     return folder / _FENCE / f"{process.replace('/', '.')}.xml"
 
 
 def is_fence(file: str, process: str) -> bool:
-    """Return whether a profile file is one that fences the process off; that of the run's plan before is one, too."""
+    """Return whether a profile file is one that fences the process off.
+
+    That of the run's plan before is one, too.
+    """
     return PurePosixPath(file).parts[-2:] == PurePosixPath(fence_file(Path(), process)).parts[-2:]
 
 
 def judged_topics(plan: Plan) -> set[Topics]:
-    """Return the pairs of topics that the guard watches: a process that sends on others is nobody's business."""
+    """Return the pairs of topics that the guard watches.
+
+    A process that sends on others is nobody's business.
+    """
     return {process.topics for process in plan.processes if process.kind == "guard"} | parts_of(
         plan
     ).keys()
 
 
 def private_topics(plan: Plan) -> dict[str, Topics]:
-    """Return, for each process that can be remapped, the topics (moving, fixed) that it is remapped to.
+    """Return the remapped topics (moving, fixed) of each process that can be remapped.
 
     Their first underscore hides them from lists of topics.
     """
@@ -92,7 +106,7 @@ def private_topics(plan: Plan) -> dict[str, Topics]:
 
 
 def takes_remappings(process: PlanProcess) -> bool:
-    """Return whether it is started by us, may send TF, and takes ROS arguments as far as anybody knows.
+    """Return whether we start it, it may send TF, and it takes ROS arguments.
 
     What is started by a plain command may be no ROS node at all, unless it owns an edge or is
     given ROS arguments. What follows a text that a shell reads does not reach the program.
@@ -109,6 +123,6 @@ def takes_remappings(process: PlanProcess) -> bool:
 
 
 def _plain(name: str) -> str:
-    """Return the name as part of a topic's, which holds no two underscores in a row and ends with none."""
+    """Return the name as part of a topic: no double or trailing underscores."""
     plain = _UNDERSCORES.sub("_0", name)
     return name if plain == name else f"{plain}_{crc32(name.encode()):08x}"

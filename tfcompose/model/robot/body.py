@@ -60,7 +60,10 @@ class Shape:
 
     @property
     def radius(self) -> float:
-        """The radius of the sphere around the shape, in metres; endless for a mesh, whose extent its file knows."""
+        """The radius of the sphere around the shape, in metres.
+
+        Endless for a mesh, whose extent its file knows.
+        """
         match self.kind:
             case "sphere":
                 return self.size[0]
@@ -75,7 +78,9 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Mass in kg, the pose of the centre of mass in the link, and the tensor about it (xx, xy, xz, yy, yz, zz).
+    """Mass in kg, pose of the centre of mass in the link, and tensor about it.
+
+    The tensor is (xx, xy, xz, yy, yz, zz).
 
     ``of_shapes`` holds, where the tensor was given, the traces of those that the visual and the
     collision shapes would have at one density. The trace is the same in all axes.
@@ -90,7 +95,7 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """The body on a frame. ``has_mass`` says that it was given one, even if no inertia could be computed from it."""
+    """The body on a frame. ``has_mass``: a mass was given, even without an inertia."""
 
     name: str
     at: Span

@@ -82,7 +82,9 @@ class ReferencePositions:
 
 @dataclass(frozen=True, slots=True)
 class Joint(PlanJoint):
-    """A joint of the plan, with what only the compiler knows of it; the axis of a planar one is the plane's normal.
+    """A joint of the plan, with what only the compiler knows of it.
+
+    The axis of a planar one is the plane's normal.
 
     ``axis_length`` is that of the axis as it was written, ``mimic_at`` the place of the joint that
     it follows.
@@ -127,7 +129,10 @@ class Calibration:
         return f"pose of {self.child} in {self.parent}, {source}"
 
     def off(self, pose: Pose) -> tuple[float, float]:
-        """Return how far ``pose`` is from the nominal one, in metres and radians; 0 if there is none."""
+        """Return how far ``pose`` is from the nominal one, in metres and radians.
+
+        0 if there is none.
+        """
         if self.nominal is None:
             return (0.0, 0.0)
         far = math.dist(pose.xyz, self.nominal.xyz)

@@ -61,7 +61,10 @@ _QUOTES = {'"': "&quot;", "'": "&#x27;"}
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Elements that stand in the URDF as the user wrote them; ``places`` are theirs, in order, if known."""
+    """Elements that stand in the URDF as the user wrote them.
+
+    ``places`` are theirs, in order, if known.
+    """
 
     name: str
     at: Span
@@ -69,11 +72,14 @@ class Block:
     places: tuple[Span, ...] = field(default=(), compare=False)
 
     def own_names(self) -> list[str]:
-        """Return the names of the elements in it that have one for themselves in the whole robot."""
+        """Return the names of its elements that must be unique in the robot."""
         return _NAMED.findall(self.text)
 
     def renamed(self, names: Mapping[str, str]) -> Block:
-        """Return the block with other names: of what an attribute or an element holds, if that is a name alone."""
+        """Return the block with other names.
+
+        Of what an attribute or an element holds, if that is a name alone.
+        """
 
         def other(found: re.Match[str]) -> str:
             before, held = (part for part in found.groups() if part is not None)

@@ -25,7 +25,9 @@ class OpticsSource:
 
 @dataclass(frozen=True, slots=True)
 class Optics:
-    """One stream of a sensor, in its frame. What is not known is None; lengths in metres, angles in radians.
+    """One stream of a sensor, in its frame.
+
+    What is not known is None; lengths in metres, angles in radians.
 
     A ``camera`` looks along z of ``frame``, x right and y down (REP-103), one that is ``backward``
     along -z with y up; every other kind looks along x, y left and z up. ``horizontal`` and

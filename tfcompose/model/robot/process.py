@@ -30,7 +30,9 @@ class AsInFile(str):
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One ROS node of a process, by its full name; ``lifecycle`` is the state that it is brought into.
+    """One ROS node of a process, by its full name.
+
+    ``lifecycle`` is the state that it is brought into.
 
     ``path`` leads to the mapping that holds its ``params``; ``contradicting`` are those, by their
     full names, that are known to contradict the tree. ``places`` are those of the first level in
@@ -67,7 +69,10 @@ def _flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def _meant(value: Any) -> Any:
-    """Return a word of a parameter file as ROS reads it, as far as switches and names need it: true, false, or text."""
+    """Return a word of a parameter file as ROS reads it, as far as switches and names need it.
+
+    True, false, or text.
+    """
     if not isinstance(value, AsInFile):
         return value
     return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
@@ -111,7 +116,10 @@ class Process(PlanProcess):
 
     @property
     def takes_ros_arguments(self) -> bool:
-        """Whether what follows on the command line reaches a node: a shell and a launch file do not pass it on."""
+        """Whether what follows on the command line reaches a node.
+
+        A shell and a launch file do not pass it on.
+        """
         return self.launch is None and self.argv[:2] not in {SHELL, ROS2_LAUNCH}
 
     @property

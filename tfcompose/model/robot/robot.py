@@ -83,7 +83,7 @@ class Zone:
 
 @dataclass(frozen=True, slots=True)
 class SourceNumbers:
-    """The numbers of one pose or joint limit as the source file gives them, in SI, each with its place.
+    """The numbers of a pose or limit as in the source file, in SI, with their places.
 
     ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each
     number whether it stands there with a unit, and ``place`` where the number of an index stands.
@@ -103,7 +103,7 @@ class SourceNumbers:
 
     @property
     def entry(self) -> str:
-        """The name of the frame, link, joint, sensor or process that the value belongs to, as in its file."""
+        """The name in its file of the frame, link, joint, sensor or process of the value."""
         return str(self.path[1])
 
     @property
@@ -114,7 +114,10 @@ class SourceNumbers:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A tool's section of the robot file: what it says, as its model has it, and where that stands."""
+    """A tool's section of the robot file.
+
+    What it says, as its model has it, and where that stands.
+    """
 
     name: str
     value: Any
@@ -127,7 +130,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part that is a robot of its own beside others, with its own ``static``, ``joints`` and description.
+    """A part that is a robot beside others, with its own publishers and description.
 
     ``robot`` has the names of the part's own file; in the robot that holds it, frames and joints
     have ``prefix`` too.
@@ -139,7 +142,7 @@ class Part:
 
 
 def may_be_refused(name: str, broken: frozenset[tuple[str, str]], known: Iterable[str]) -> bool:
-    """Return whether a name is one that an entry among the ``broken`` ones, (section, name), would have brought.
+    """Return whether a refused entry (section, name) would have brought a name.
 
     A part without a prefix may have brought any name; one that is a letter off the ``known`` ones
     is wrong still.
@@ -152,7 +155,7 @@ def may_be_refused(name: str, broken: frozenset[tuple[str, str]], known: Iterabl
 
 
 def left_out_by(conditions: Mapping[tuple[str, str], str], name: str) -> str:
-    """Return advice about a name that an entry would have brought which its condition leaves out; empty else."""
+    """Return advice about a name whose entry a condition removes; empty otherwise."""
     for entry, condition in conditions.items():
         names, beginnings = _brought(frozenset({entry}))
         if name in names or name.startswith(beginnings):
@@ -164,7 +167,7 @@ def left_out_by(conditions: Mapping[tuple[str, str], str], name: str) -> str:
 
 @lru_cache(maxsize=8)  # a robot's names are looked up in the same entries
 def _brought(broken: frozenset[tuple[str, str]]) -> tuple[frozenset[str], tuple[str, ...]]:
-    """Return the names that refused entries would have brought, and how further ones would have begun."""
+    """Return the names that refused entries would have brought, and prefixes of more."""
     beginnings = [f"{entry}_" for section, entry in broken if section == "sensors"]
     beginnings += [entry for section, entry in broken if section == "parts"]
     return frozenset(entry for _, entry in broken), tuple(beginnings)
@@ -226,7 +229,10 @@ class Robot:
         return frame if frame in self.ros.shared_frames else f"{self.ros.frame_prefix}{frame}"
 
     def with_final_names(self) -> Robot:
-        """Return the robot with every frame named as on the live tree. URDF keeps plain names; RViz adds the prefix."""
+        """Return the robot with every frame named as on the live tree.
+
+        URDF keeps plain names; RViz adds the prefix.
+        """
         if not self.ros.frame_prefix:
             return self
         final = self.final
@@ -257,13 +263,16 @@ class Robot:
         )
 
     def excuses(self, name: str) -> bool:
-        """Return whether a frame, process or joint may be missing only because an entry was refused already."""
+        """Return whether a frame, process or joint may be missing because of a refused entry."""
         return may_be_refused(
             name, self.broken, chain(self.frames, (process.name for process in self.processes))
         )
 
     def is_foreign(self, at: Span | None) -> bool:
-        """Return whether the place is in a URDF, or what xacro made: advice speaks of XML there."""
+        """Return whether the place is in a URDF, or what xacro made.
+
+        Advice speaks of XML there.
+        """
         return at is not None and at.file in self.foreign
 
     def parent_edge(self, child: str) -> Edge | None:
@@ -271,7 +280,7 @@ class Robot:
         return next((edge for edge in self.edges if edge.child == child), None)
 
     def roots(self) -> list[str]:
-        """Return the declared frames that no edge has as its child, in the order of declaration."""
+        """Return the declared frames that are no edge's child, in declaration order."""
         children = {edge.child for edge in self.edges}
         return [frame for frame in self.frames if frame not in children]
 
@@ -283,7 +292,10 @@ class Robot:
         return table
 
     def described(self) -> set[str]:
-        """Return the frames that a URDF can hold: the base, and what is below it over edges of known pose."""
+        """Return the frames that a URDF can hold.
+
+        The base, and what is below it over edges of known pose.
+        """
         known = [(edge.parent, edge.child) for edge in self.edges if edge.pose_known]
         return below(children_of(known), self.base) if self.base is not None else set()
 

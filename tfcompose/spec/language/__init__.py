@@ -1,4 +1,6 @@
-"""The language of robot files, presets and calibration sections: pydantic models, and what merges files.
+"""The language of robot files, presets and calibration sections.
+
+Pydantic models, and what merges files.
 
 The models are the one description of validation, JSON Schema and reference. ``overlay`` merges
 sources, ``validate`` makes a ``RobotSpec`` of one.

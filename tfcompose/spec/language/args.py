@@ -1,4 +1,4 @@
-"""``args``: values that a robot is built with, given by the command line, the environment or what holds the robot."""
+"""``args``: build-time values from the command line, the environment or the holder."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,10 @@ _CALLED: dict[ArgType, str] = {
 
 @dataclass(frozen=True, slots=True)
 class GivenArg:
-    """A value that an argument is given, and where; on the command line and in the environment it is a text."""
+    """A value that an argument is given, and where.
+
+    On the command line and in the environment it is a text.
+    """
 
     value: Any
     at: Span
@@ -51,7 +54,10 @@ class Given:
 
 
 class ArgError(ValueError):
-    """A value is not one that the argument can have; ``code`` is the finding's, ``advice`` its help."""
+    """A value is not one that the argument can have.
+
+    ``code`` is the finding's, ``advice`` its help.
+    """
 
     def __init__(self, code: str, message: str, advice: str = "") -> None:
         super().__init__(message)
@@ -70,7 +76,10 @@ Scalar = Annotated[Any, BeforeValidator(_scalar, str | float | bool)]
 
 
 class ArgSpec(Checked):
-    """A value that is given when the robot is built: NAME:=VALUE. Without a default it has to be given."""
+    """A value that is given when the robot is built: NAME:=VALUE.
+
+    Without a default it has to be given.
+    """
 
     type: ArgType | None = key(
         None, "default: what default, or the first of choices, is; else string", "int"
@@ -103,7 +112,9 @@ class ArgSpec(Checked):
 
     @property
     def alternatives(self) -> tuple[str, ...]:
-        """The values that are judged, as the command line gives them: all, or an integer's bounds and default.
+        """The values that are judged, as the command line gives them.
+
+        All, or an integer's bounds and default.
 
         Empty where there is neither a choice nor a bound.
         """
@@ -123,7 +134,7 @@ class ArgSpec(Checked):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also choices, bounds and a default that are of another type, or a default that it cannot have."""
+        """Yield choices, bounds and defaults of another type, and impossible defaults."""
         yield from super().check(data)
         try:
             spec = cls.model_validate(

@@ -48,7 +48,10 @@ class Mesh(Spec):
 
 
 class Material(Spec):
-    """A colour or a texture, and its name. The name alone refers to the material that has it elsewhere."""
+    """A colour or a texture, and its name.
+
+    The name alone refers to the material that has it elsewhere.
+    """
 
     name: Name | None = key(None, "its name; default: named after the colour", "blue")
     rgba: Colour | None = key(
@@ -122,7 +125,10 @@ MASSES = frozenset({"mass", "density"})
 
 
 class Inertial(Rotated):
-    """A link's mass and its distribution; the pose is that of the centre of mass, by default that of the shapes."""
+    """A link's mass and its distribution.
+
+    The pose is that of the centre of mass, by default that of the shapes.
+    """
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*Rotated.EXCLUSIVE, MASSES)
 

@@ -249,7 +249,9 @@ _DEFAULTS: dict[type[PoseXyzQuat | PoseXyzRpy], dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """The pose of ``child`` in ``parent``, by the names of the file; ``what`` is the key that holds it, if it matters.
+    """The pose of ``child`` in ``parent``, by the names of the file.
+
+    ``what`` is the key that holds it, if it matters.
 
     A matrix has no names.
     """
@@ -268,7 +270,10 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFile:
-    """What a calibration file says; ``found`` holds what is wrong with it, at the place that names it."""
+    """What a calibration file says.
+
+    ``found`` holds what is wrong with it, at the place that names it.
+    """
 
     file: str
     format: str
@@ -289,7 +294,10 @@ def _inside(code: str, found: Finding, file: str, at: Span) -> Finding:
 
 
 def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFile:
-    """Return what the text says, read in the format, which ``auto`` recognises; ``at`` is where the file is named."""
+    """Return what the text says, read in the format, which ``auto`` recognises.
+
+    ``at`` is where the file is named.
+    """
     try:
         kind, documents = load_calibration(text, file)
     except RejectedError as error:
@@ -371,7 +379,10 @@ M = TypeVar("M", bound=FileEntry)
 
 @dataclass(slots=True)
 class _Reader:
-    """Reads documents in each of the formats; an entry that is wrong is a finding, and the others are taken."""
+    """Reads documents in each of the formats.
+
+    An entry that is wrong is a finding, and the others are taken.
+    """
 
     named_at: Span
     source: Source = field(init=False)
@@ -536,7 +547,10 @@ class _Reader:
         index: int,
         where: dict[str, int],
     ) -> Pose | None:
-        """Return the pose that arguments are; ``where`` is each argument's place among the words."""
+        """Return the pose that arguments are.
+
+        ``where`` is each argument's place among the words.
+        """
         made, refusals = read(model, _DEFAULTS[model] | given)
         for one in refusals:
             path = (

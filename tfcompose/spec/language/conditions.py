@@ -49,7 +49,9 @@ Scope = dict[str, "Value"]
 
 @dataclass(slots=True)
 class Unfolded:
-    """A source with the entries that there are; ``scopes`` are the values of their loops, by (section, name).
+    """A source with the entries that there are.
+
+    ``scopes`` are the values of their loops, by (section, name).
 
     ``found`` is what is wrong with conditions and loops, and ``refused`` are their paths.
     ``conditions`` are those of the entries that they leave out, as they are written, by (section,
@@ -64,7 +66,7 @@ class Unfolded:
 
 
 def unfolded(source: Source, variables: Variables) -> Unfolded:
-    """Return the source with the entries that conditions leave, once for each value of their loops."""
+    """Return the source without entries whose conditions fail, loops unrolled."""
     return _Unfolding(source, variables).unfolded()
 
 

@@ -1,4 +1,4 @@
-"""``${…}`` in strings: arithmetic and conditions with quantities, ``vars``, ``args`` and ``pi``; nothing else.
+"""``${…}`` in strings: arithmetic and conditions with quantities, vars, args and pi.
 
 No Python is run, and of the environment only what ``env`` names is read. The grammar::
 
@@ -94,7 +94,10 @@ class ExpressionError(ValueError):
 
 
 class EnvironmentText(str):
-    """What a variable of the environment holds: a text among others, and alone the number or condition that it says."""
+    """What a variable of the environment holds.
+
+    A text among others, and alone the number or condition that it says.
+    """
 
     __slots__ = ()
 
@@ -159,7 +162,9 @@ def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | Non
 
 
 def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
-    """Return the value of an expression; ``lookup`` gives the value of a variable, and of ``env(NAME, default)``.
+    """Return the value of an expression.
+
+    ``lookup`` gives the value of a variable, and of ``env(NAME, default)``.
 
     Raises:
         ExpressionError: if it is malformed, too long or not computable.
@@ -175,7 +180,7 @@ def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
 
 
 def items(text: str, lookup: Callable[[str], Value]) -> list[Value]:
-    """Return the values that a loop goes through by ``${range(end)}`` or ``${range(first, end)}``: whole numbers.
+    """Return the whole numbers of a loop ``${range(end)}`` or ``${range(first, end)}``.
 
     Raises:
         ExpressionError: if it is no such text, or its ends are no whole numbers, or more than
@@ -210,7 +215,7 @@ MOST_ITEMS = 1000
 
 
 def environment_in(text: str) -> tuple[str, str | None] | None:
-    """Return the variable that ``env(NAME, default)`` names and its default, or None if the text is no such call."""
+    """Return the variable and default of ``env(NAME, default)``, or None for other texts."""
     match = _ENV.fullmatch(text)
     if not match:
         return None
@@ -226,7 +231,10 @@ def environment_in(text: str) -> tuple[str, str | None] | None:
 
 
 def names_in(text: str) -> list[str]:
-    """Return the names in the text's expressions, in order: variables, and also units and functions."""
+    """Return the names in the text's expressions, in order.
+
+    Variables, and also units and functions.
+    """
     return [
         name for hole in _HOLE.findall(text) for name in _DOTTED.findall(_QUOTED.sub("", hole))
     ]

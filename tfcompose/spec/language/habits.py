@@ -1,4 +1,7 @@
-"""What other formats call a key, and what is written here instead: URDF, launch files, ROS messages, compose files."""
+"""What other formats call a key, and what is written here instead.
+
+URDF, launch files, ROS messages, compose files.
+"""
 
 from __future__ import annotations
 
@@ -268,7 +271,7 @@ _VALUES = {
 
 
 def habit(word: str, known: Collection[str], value: object = None) -> str:
-    """Return what to write instead of a key that another format has, where ``known`` are the keys; else nothing.
+    """Return what to write instead of another format's key, given the ``known`` keys.
 
     ``value`` is what stands there.
     """

@@ -1,4 +1,7 @@
-"""The language as JSON Schema (draft 2020-12), made from the models; editors and check-jsonschema read it."""
+"""The language as JSON Schema (draft 2020-12), made from the models.
+
+Editors and check-jsonschema read it.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ _MODELS: dict[str, type[Spec]] = {"preset": PresetSpec, "node": NodePresetSpec}
 
 
 def model_of(language: str) -> type[Spec]:
-    """Return the model of ``robot``, ``preset`` or ``node``, or of a language that a tool brings."""
+    """Return the model of ``robot``, ``preset``, ``node`` or a tool's language."""
     if language == "robot":
         return full_robot_model()
     model: type[Spec] = _MODELS.get(language) or load(installed().languages()[language].model)
@@ -92,7 +95,10 @@ def json_schema(
 
 
 def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict[str, Any]:
-    """Return the schema with every type that is no mapping where it is used: beside ``$ref`` editors read nothing."""
+    """Return the schema with every type that is no mapping where it is used.
+
+    Beside ``$ref`` editors read nothing.
+    """
     names = {kind.__name__ for kind in mappings}
     types = {f"#/$defs/{name}": one for name, one in schema["$defs"].items() if name not in names}
 
@@ -129,7 +135,10 @@ _EXPRESSIONS = ({"type": "string", "pattern": EXPRESSION}, COMPUTED)
 
 
 class _Generator(GenerateJsonSchema):
-    """Leaves out what tells an editor nothing: titles, empty defaults, and null for what may be left out."""
+    """Leaves out what tells an editor nothing.
+
+    Titles, empty defaults, and null for what may be left out.
+    """
 
     def get_title_from_name(self, name: str) -> str:
         """Return no title: the key says it."""
@@ -181,7 +190,10 @@ class _Generator(GenerateJsonSchema):
 
 
 def _examples(field: FieldInfo, form: dict[str, Any]) -> list[Any]:
-    """Return the examples that an editor can insert: where a key has several forms it shows a mapping as one word."""
+    """Return the examples that an editor can insert.
+
+    Where a key has several forms it shows a mapping as one word.
+    """
     examples = examples_of(field)
     return [one for one in examples if not isinstance(one, dict)] if "anyOf" in form else examples
 
@@ -205,7 +217,7 @@ def _exclude(
 
 
 def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
-    """Let a file that is merged over another one leave out what that one has, and remove it with null."""
+    """Let a file that is merged over another omit required keys and remove with null."""
     own["required"] = ["preset"]
     for model in (own, *(one for one in definitions.values() if "properties" in one)):
         if model is not own:
@@ -236,7 +248,7 @@ def _add_codes(rules: dict[str, Any], definitions: dict[str, Any]) -> None:
 
 
 def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> None:
-    """Let a profile hold whatever a robot file does but profiles, with nothing required and null for what it removes.
+    """Let a profile hold a robot file's keys but profiles, all optional and removable.
 
     That goes for each mapping in it too, but not for those in lists, which a profile replaces as a
     whole. ``at`` points to the schema of the robot, ``own``.
@@ -266,7 +278,7 @@ def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> 
 
 
 def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict[str, Any]:
-    """Return the schema of a mapping that is merged over one of the schema that stands at a pointer."""
+    """Return the schema of a mapping that is merged over one at a pointer."""
 
     def merged(value: Any) -> Any:
         if isinstance(value, list):

@@ -62,7 +62,7 @@ class Role(Spec):
 
 
 class NodePresetSpec(Spec):
-    """A node that publishes TF: which edges, from which parameters their names come, and how it is stopped."""
+    """A node that publishes TF: its edges, their name parameters, and its switch."""
 
     preset: Literal[1] = key(..., "the version of this language", 1)
     node: Text = key(..., "the node's own name", "slam_toolbox")

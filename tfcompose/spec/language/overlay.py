@@ -1,4 +1,6 @@
-"""Robots from several files: ``include``, profiles, overlays, and single values from the command line.
+"""Robots from several files.
+
+``include``, profiles, overlays, and single values from the command line.
 
 Mappings merge; scalars and lists replace; ``null`` in an overlay removes the key, and its default
 returns. Where a mapping holds one choice out of several keys (how a process runs, how a rotation
@@ -39,7 +41,9 @@ def composed(
     overlays: Sequence[Source] = (),
     given: Given = _NOTHING,
 ) -> Source:
-    """Return the robot with its named profiles laid over it, in order, then the overlays; without ``profiles``.
+    """Return the robot with its named profiles laid over it, in order, then the overlays.
+
+    Without ``profiles``.
 
     Before the named ones come those whose own condition, ``when``, holds for what is ``given`` to
     the others. An overlay may bring profiles of its own.
@@ -82,7 +86,7 @@ def _laid_over_all(
 
 
 def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], list[Finding]]:
-    """Return the profiles whose condition holds with the values of the others, and what is wrong with conditions."""
+    """Return the profiles whose conditions hold, and what is wrong with conditions."""
     variables = Variables(others, given)
     names: list[str] = []
     found = []
@@ -108,7 +112,9 @@ def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], l
 def lay_over(
     base: Source, overlay: Source, *, is_overlay: bool = True, of: type[Spec] | None = None
 ) -> Source:
-    """Return ``base`` with ``overlay`` merged into it; each key remembers where it is from, and what it replaced.
+    """Return ``base`` with ``overlay`` merged into it.
+
+    Each key remembers where it is from, and what it replaced.
 
     With ``is_overlay`` a value that changes nothing is a finding. ``of`` is the language that both
     are written in, by default that of robot files.
@@ -134,7 +140,10 @@ def lay_over(
 
 
 def _with_full_args(source: Source) -> Source:
-    """Return the source with each argument as a mapping: a value alone, laid over one, is its default."""
+    """Return the source with each argument as a mapping.
+
+    A value alone, laid over one, is its default.
+    """
     declared = source.data.get("args")
     if not isinstance(declared, dict) or all(
         isinstance(one, dict) or one is None for one in declared.values()
@@ -163,7 +172,10 @@ Part = tuple[dict[str, Any], Place]
 
 
 class _Merger:
-    """Merges in time proportional to the overlay and to the mappings that it reaches; neither side is changed."""
+    """Merges in time proportional to the overlay and to the mappings that it reaches.
+
+    Neither side is changed.
+    """
 
     def __init__(
         self, below: Replaced, above: Replaced, of: type[Spec], *, is_overlay: bool
@@ -213,7 +225,10 @@ class _Merger:
         return data, base[1].with_inside(inside, keys)
 
     def choices_at(self, path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
-        """Return the choices that a mapping at the path makes: of each, it holds a key with a value."""
+        """Return the choices that a mapping at the path makes.
+
+        Of each, it holds a key with a value.
+        """
         return [
             keys
             for kind in mappings_at(self.of, path)
@@ -245,7 +260,10 @@ def _idle(message: str, place: Place, old: Place | None = None) -> Finding:
 
 
 def is_for_later(path: Path) -> bool:
-    """Return whether what stands there is merged over something only later: a profile, or a variant of a preset."""
+    """Return whether what stands there is merged over something only later.
+
+    A profile, or a variant of a preset.
+    """
     return path[:1] == ("profiles",) or (path[:1] == ("options",) and path[2:3] == ("variants",))
 
 
@@ -274,7 +292,7 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
     settings: dict[str, Any],
     variables: dict[str, Any],
 ) -> tuple[Source, list[Finding]]:
-    """Return a robot file as a part of another one, and a finding for each setting of its own that it cannot have.
+    """Return a robot file as a part, and a finding for each setting it cannot have there.
 
     ``path`` leads to the part in its ``holder``. Laid over the part are the holder's settings
     ``ros``, of which the part has some of its own, ``settings``, and the ``variables`` that it is
@@ -395,7 +413,9 @@ MOST_FILES = 50
 
 
 def with_includes(source: Source, read: Reader) -> Source:
-    """Return the source laid over the files that it includes, and they over theirs; ``read`` gives a file's text.
+    """Return the source laid over the files that it includes, and they over theirs.
+
+    ``read`` gives a file's text.
 
     Raises:
         RejectedError: if a file cannot be read or is not YAML, if files include each other, or are
@@ -466,7 +486,9 @@ def _included(found: Finding, at: Span) -> Finding:
 
 
 def set_value(setting: str) -> Source:
-    """Return the overlay that ``PATH=VALUE`` means; the value is read as YAML: ``sensors.camera.xyz=[0.2, 0, 10 cm]``.
+    """Return the overlay that ``PATH=VALUE`` means.
+
+    The value is read as YAML: ``sensors.camera.xyz=[0.2, 0, 10 cm]``.
 
     Raises:
         RejectedError: if there is no ``=``, the value is not YAML, or the key is one that is read

@@ -1,4 +1,6 @@
-"""Poses and edges as users write them: a position, one rotation out of five ways, a parent, and who publishes it.
+"""Poses and edges as users write them.
+
+A position, one rotation out of five ways, a parent, and who publishes it.
 
 What is written stays as it is: ``rotation`` and ``Posed.xyz`` are what it means.
 """
@@ -111,7 +113,7 @@ class LookAngles(Checked):
 
     @property
     def rotation(self) -> Quaternion:
-        """The rotation x, y, z, w: pitch is down − up, yaw is left − right (REP-103: looking down is positive)."""
+        """The rotation x, y, z, w: pitch is down − up, yaw is left − right (REP-103)."""
         return quat_from_rpy(
             self.roll,
             (self.down or 0.0) - (self.up or 0.0),

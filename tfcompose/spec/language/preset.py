@@ -106,7 +106,10 @@ class PresetOptics(OpticsSpec):
 
 
 class Chosen(Spec):
-    """A value that an option decides: the option's own, if given; or one of two, by a condition."""
+    """A value that an option decides: the option's own, if given.
+
+    Or one of two, by a condition.
+    """
 
     option: Text | None = key(
         None, "the option whose value it is; without one the parameter is left out", "serial"
@@ -117,7 +120,10 @@ class Chosen(Spec):
 
 
 class DriverClaim(Spec):
-    """An edge outside the sensor that its driver publishes by default. Switched off, unless the driver owns it."""
+    """An edge outside the sensor that its driver publishes by default.
+
+    Switched off, unless the driver owns it.
+    """
 
     parent: Text = key(..., "the parent frame", "map")
     child: Text = key(..., "the child frame", "odom")
@@ -235,7 +241,10 @@ _TF = ("driver", "tfcompose")
 
 
 def wrong_names(preset: PresetSpec) -> Iterator[Refusal]:
-    """Yield what the preset names and does not have: frames, options and their values; its frames are one tree."""
+    """Yield what the preset names and does not have: frames, options and their values.
+
+    Its frames are one tree.
+    """
     yield from _frames(preset)
     yield from _options(preset)
     for path, process in _processes(preset):

@@ -533,7 +533,7 @@ class Started(Supervised):
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
-        """Yield also a command in one string that is not marked for a shell, and the other way round."""
+        """Yield a command in one string not marked for a shell, and the reverse."""
         yield from super().check(data)
         run, shell = data.get("run"), data.get("shell") is True
         if isinstance(run, str) and not shell:
@@ -601,7 +601,10 @@ def keys_of(way: Way) -> frozenset[str]:
 
 
 class ContainerSpec(Supervised, Entry):
-    """A process that loads components: one of rclcpp_components' containers, or one that is started elsewhere."""
+    """A process that loads components.
+
+    One of rclcpp_components' containers, or one that is started elsewhere.
+    """
 
     isolation: Isolation = key(
         "shared",
@@ -630,7 +633,10 @@ class ContainerSpec(Supervised, Entry):
 
 
 class DriverSpec(Started):
-    """Keys over those of the preset's driver; or the name of the process that drives this sensor; or none."""
+    """Keys over those of the preset's driver.
+
+    Or the name of the process that drives this sensor; or none.
+    """
 
     process: Text | None = key(None, "the process that drives this sensor, or none", "camera_rig")
 

@@ -1,4 +1,6 @@
-"""From plain data to a model: everything that is refused, in this project's words, and a model of the rest.
+"""From plain data to a model.
+
+Everything that is refused, in this project's words, and a model of the rest.
 
 pydantic gives all or nothing. So what it refuses is taken out of the data and the rest is read
 again; each turn finds everything at once, and what is refused then only because something is gone
@@ -72,7 +74,7 @@ class Refusal:
 
 
 def _laid_over_nothing(source: Source, path: Path) -> str:
-    """Return advice for an entry that a profile or an overlay adds, if it probably means one that is there."""
+    """Return advice for an overlay's new entry that probably means an existing one."""
     around = source.places.get(path[:-1])
     names = list(around.keys) if around else []
     before = names[: names.index(path[-1])] if path and path[-1] in names else []
@@ -113,12 +115,18 @@ def read(
 
 
 def _culprit(path: Path, error: ErrorDetails) -> Path:
-    """Return the path of what has to go: of a key that is missing, the mapping that it is missing in."""
+    """Return the path of what has to go.
+
+    Of a key that is missing, the mapping that it is missing in.
+    """
     return path[:-1] if error["type"] == "missing" else path
 
 
 def _path_of(loc: tuple[int | str, ...], data: Any) -> Path:
-    """Return the path in the file: pydantic's has labels of unions, and indexes where one item stands for a list."""
+    """Return the path in the file.
+
+    Pydantic's has labels of unions, and indexes where one item stands for a list.
+    """
     steps: list[int | str] = []
     for step in loc:
         is_index = isinstance(step, int)
@@ -135,7 +143,9 @@ def _path_of(loc: tuple[int | str, ...], data: Any) -> Path:
 
 
 def _without(data: Any, paths: Iterable[Path], gone: set[Path]) -> Any:
-    """Return the data without what is at the paths, or None if that is all of it; the paths are added to ``gone``.
+    """Return the data without what is at the paths, or None if that is all of it.
+
+    The paths are added to ``gone``.
 
     A list goes with one of its items. Nothing that is given changes.
     """
@@ -160,7 +170,10 @@ _ALL: Any = {None: None}
 
 
 def _existing(data: Any, path: Path) -> Path:
-    """Return the path as far as it leads to something of its own: short forms and items of lists have no keys."""
+    """Return the path as far as it leads to something of its own.
+
+    Short forms and items of lists have no keys.
+    """
     end = 0
     for count, step in enumerate(path, 1):
         if isinstance(data, dict) and step in data:
@@ -210,7 +223,10 @@ def _slip(model: type[Spec], path: Path) -> str | None:
 def _unknown_key(
     model: type[Spec], path: Path, data: Any, meant: Counter[tuple[Path, str | None]]
 ) -> Refusal:
-    """Return the refusal of a key; one that is there already, or is meant by two, is not proposed."""
+    """Return the refusal of a key.
+
+    One that is there already, or is meant by two, is not proposed.
+    """
     name, known = str(path[-1]), list(fields_of(mapping_at(model, path[:-1])))
     slip = _slip(model, path)
     around = data
@@ -251,7 +267,10 @@ def _is_a_section(model: type[Spec], path: Path) -> bool:
 
 
 def _indented_too_little(path: Path, around: dict[str, Any], known: list[str]) -> str:
-    """Return the help for a key that follows a known one without a value: it probably belongs to that."""
+    """Return the help for a key that follows a known one without a value.
+
+    It probably belongs to that.
+    """
     before = list(around)[: [*around].index(str(path[-1]))]
     owner = next((name for name in reversed(before) if name in known), "")
     return f"indent it, if it belongs to {owner}" if owner and around[owner] is None else ""
@@ -301,7 +320,10 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
 
 
 def _example(model: type[Spec], path: Path, value: Any) -> str:
-    """Return the help for what stands where a mapping with known keys belongs: an example, with the value in it."""
+    """Return the help for what stands where a mapping with known keys belongs.
+
+    An example, with the value in it.
+    """
     keys = fields_of(mapping_at(model, path))
     required = [name for name, field in keys.items() if field.is_required()]
     of_word = [name for name in keys if value in _words_allowed(model, (*path, name))]
@@ -345,7 +367,10 @@ def _as_string(value: Any) -> str:
 
 
 def _as_mapping(model: type[Spec], path: Path, value: Any) -> str:
-    """Return the help for what stands where a mapping with the user's own keys belongs: its items, or an example."""
+    """Return the help for what stands where a mapping with the user's own keys belongs.
+
+    Its items, or an example.
+    """
     around = mapping_at(model, path[:-1])
     field = fields_of(around).get(str(path[-1])) if around else None
     example = (
@@ -371,7 +396,7 @@ _ASSIGNED = re.compile(r"([^\s=:]+)(?::=|=)(.*)")
 
 
 def _pair(item: Any, usual: Any) -> tuple[str, Any] | None:
-    """Return key and value of an item of a list that should be a mapping, whose values are such as ``usual``."""
+    """Return key and value of a list item that should be a mapping like ``usual``."""
     if isinstance(item, str) and (assigned := _ASSIGNED.fullmatch(item)):
         return assigned[1], assigned[2]
     if isinstance(item, str) and item.endswith((".yaml", ".yml")):
@@ -389,7 +414,10 @@ def _pair(item: Any, usual: Any) -> tuple[str, Any] | None:
 
 
 def _in_yaml(value: Any) -> str:
-    """Return a value as it is written in YAML, a plain word without quotes; what is in a mapping is left out."""
+    """Return a value as it is written in YAML, a plain word without quotes.
+
+    What is in a mapping is left out.
+    """
     if isinstance(value, dict):
         return "{…}"
     return (

@@ -40,7 +40,10 @@ def _keys() -> frozenset[str]:
 
 
 def is_recognized(text: str, keys: Collection[str] = ()) -> bool:
-    """Return whether a text is that of a robot file, a preset or a fleet, however broken; ``keys`` are others."""
+    """Return whether a text is that of a robot file, a preset or a fleet, however broken.
+
+    ``keys`` are others.
+    """
     if _SURE.search(text):
         return True
     there = set(_KEY.findall(text))
@@ -49,7 +52,9 @@ def is_recognized(text: str, keys: Collection[str] = ()) -> bool:
 
 
 def load_named(text: str, file: str, of: type[Spec] | None = None) -> Source:
-    """Return what a file says that another file names, as ``load`` does; ``of`` is its model, if it is no robot.
+    """Return what a file says that another file names, as ``load`` does.
+
+    ``of`` is its model, if it is no robot.
 
     Raises:
         RejectedError: as ``load`` does; of a file of something else it says nothing but that.

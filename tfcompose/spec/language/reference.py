@@ -1,4 +1,7 @@
-"""The language as a reference for people, in Markdown: every key with its type, unit, default, meaning and example."""
+"""The language as a reference for people, in Markdown.
+
+Every key with its type, unit, default, meaning and example.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ _REQUIRED = "Keys without a default are required."
 
 
 def reference(language: str) -> str:
-    """Return the reference of ``robot``, ``preset``, ``node``, or a language that a tool brings."""
+    """Return the reference of ``robot``, ``preset``, ``node`` or a tool's language."""
     root = model_of(language)
     sections: dict[Any, list[str]] = {}
     for pattern, kind in walk(root):
@@ -93,7 +96,7 @@ def key_page(path: str) -> str | None:
 
 
 def paths() -> list[str]:
-    """Return where each key of a robot file is, such as ``sensors.place``, without the names between."""
+    """Return where each key of a robot file is, such as ``sensors.place``, without names."""
     found = walk(model_of("robot"))
     return [
         ".".join(step for step in (*at, name) if step != "*")

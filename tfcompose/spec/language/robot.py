@@ -84,7 +84,10 @@ class FrameSpec(MountKeys):
 
 
 class Mimic(Spec):
-    """The joint follows another one: its position is multiplier · position of the other + offset."""
+    """The joint follows another one.
+
+    Its position is multiplier · position of the other + offset.
+    """
 
     joint: Text = key(..., "the joint that it follows", "finger_left_joint")
     multiplier: Number = key(1.0, "the factor")
@@ -277,7 +280,10 @@ Blocks = Annotated[
 
 
 class FrameOverride(Rotated):
-    """One frame of a sensor: this unit's own value, or another name. What is left out is the preset's."""
+    """One frame of a sensor: this unit's own value, or another name.
+
+    What is left out is the preset's.
+    """
 
     xyz: Xyz | None = key(None, "position in the parent", [0, 0.0148, 0])
     parent: Text | None = key(
@@ -350,7 +356,10 @@ _ENDINGS = {".urdf": "urdf", ".xacro": "xacro", ".yaml": "spec", ".yml": "spec"}
 
 
 class PartSpec(MountKeys):
-    """Another robot as a part: a robot file, URDF or xacro. Everywhere else in this file its names have the prefix."""
+    """Another robot as a part: a robot file, URDF or xacro.
+
+    Everywhere else in this file its names have the prefix.
+    """
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*MountKeys.EXCLUSIVE, frozenset(PART_KINDS))
 

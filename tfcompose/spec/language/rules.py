@@ -1,4 +1,7 @@
-"""What a robot file sets about rules: severities and limits, and the zones that sensors have to see."""
+"""What a robot file sets about rules.
+
+Severities and limits, and the zones that sensors have to see.
+"""
 
 from typing import Annotated, Any, Literal
 

@@ -95,7 +95,10 @@ class Checked(Spec):
 
 
 class Entry(Checked):
-    """An entry of a section, which may be there or not, or several times: ``conditions`` decides it before this."""
+    """An entry of a section, which may be there or not, or several times.
+
+    ``conditions`` decides it before this.
+    """
 
     when: Condition | None = Field(
         None,
@@ -115,7 +118,7 @@ class Entry(Checked):
 def several(
     *errors: tuple[Path, PydanticCustomError], also: ValidationError | None = None
 ) -> ValidationError:
-    """Return what a validator raises for errors at paths below its value, and for those of another validation."""
+    """Return a validator's error for paths below its value, and another validation's."""
     lines: list[InitErrorDetails] = [
         {"type": error, "loc": path, "input": None} for path, error in errors
     ]
@@ -127,7 +130,10 @@ def several(
 
 
 def key(default: Any = ..., about: str = "", *examples: Any, **more: Any) -> Any:
-    """Describe a key of a ``Spec``; without a default it is required. ``more`` is for ``more_of``."""
+    """Describe a key of a ``Spec``; without a default it is required.
+
+    ``more`` is for ``more_of``.
+    """
     return Field(
         default,
         description=about or None,
@@ -143,7 +149,10 @@ def more_of(field: FieldInfo, name: str, default: Any) -> Any:
 
 
 def inherited(of: type, name: str) -> Any:
-    """Return a dataclass's field for a subclass that narrows its type: default and description stay."""
+    """Return a dataclass's field for a subclass that narrows its type.
+
+    Default and description stay.
+    """
     base = next(one for one in dataclasses.fields(of) if one.name == name)
     return dataclasses.field(
         default=base.default, default_factory=base.default_factory, metadata=base.metadata
@@ -151,7 +160,10 @@ def inherited(of: type, name: str) -> Any:
 
 
 def unnamed(annotation: Any) -> Any:
-    """Return what a named type stands for: pydantic makes its schema once, whichever models share it."""
+    """Return what a named type stands for.
+
+    Pydantic makes its schema once, whichever models share it.
+    """
     return annotation.__value__ if isinstance(annotation, TypeAliasType) else annotation
 
 
@@ -169,7 +181,10 @@ def kinds_of(annotation: Any) -> Iterator[Any]:
 
 
 def is_mapping(kind: Any) -> bool:
-    """Return whether the type is a mapping with known keys: a ``Spec``, or a dataclass that serves as one."""
+    """Return whether the type is a mapping with known keys.
+
+    A ``Spec``, or a dataclass that serves as one.
+    """
     return isinstance(kind, type) and (issubclass(kind, Spec) or dataclasses.is_dataclass(kind))
 
 
@@ -190,7 +205,7 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
 
 
 def below(annotation: Any, step: str | int) -> Any:
-    """Return the annotation of what is at a key or an index below one that is annotated so, or None."""
+    """Return the annotation below one, at a key or an index, or None."""
     for kind in kinds_of(annotation):
         if is_mapping(kind):
             if step in fields_of(kind):
@@ -206,7 +221,7 @@ def below(annotation: Any, step: str | int) -> Any:
 
 
 def measure_of(annotation: Any) -> Measure | None:
-    """Return the measure of the number, or of the numbers in a row, that an annotation allows, or None."""
+    """Return the measure of the number or numbers that an annotation allows, or None."""
     annotation = unnamed(annotation)
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)

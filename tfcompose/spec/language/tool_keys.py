@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def robot_model(names: Collection[str]) -> type[RobotSpec]:
-    """Return the model of a robot file that has these sections, with the sections of tools that it needs."""
+    """Return the model of a robot file with the sections of the tools it uses."""
     return _model(_tools_for(names))
 
 
@@ -32,7 +32,7 @@ def keys_in(names: Collection[str]) -> list[Key]:
 
 
 def problems_with(names: Collection[str]) -> list[Finding]:
-    """Return what is wrong with tools of other packages, where these sections of a robot file need any."""
+    """Return what is wrong with the foreign tools that these sections need."""
     tools = _tools_for(names)
     _, broken = _types(tools)
     return [
@@ -50,7 +50,10 @@ _NO_TOOLS = Toolset(())
 
 
 def _tools_for(names: Collection[str]) -> Toolset:
-    """Return the tools among which those are that know these sections: no more than needed are looked up."""
+    """Return the tools among which those are that know these sections.
+
+    No more than needed are looked up.
+    """
     unknown = set(names) - RobotSpec.model_fields.keys()
     if not unknown:
         return _NO_TOOLS

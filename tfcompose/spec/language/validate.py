@@ -177,7 +177,10 @@ def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[s
 
 
 def _nulls(source: Source) -> list[Refusal]:
-    """Return a refusal of each key and item without a value; null only removes what it is merged over."""
+    """Return a refusal of each key and item without a value.
+
+    Null only removes what it is merged over.
+    """
     found: list[Refusal] = []
 
     def visit(value: Any, path: Path) -> None:
@@ -210,5 +213,8 @@ _AFTER_A_COMMA = re.compile(r"\d+(\s*[a-zA-Z°/^0-9]+)?")
 
 
 def _findings(refusals: Iterable[Refusal], source: Source) -> list[Finding]:
-    """Return the findings, each once: what stands in an anchor is refused wherever an alias names it."""
+    """Return the findings, each once.
+
+    What stands in an anchor is refused wherever an alias names it.
+    """
     return list(dict.fromkeys(one.finding(source) for one in refusals))

@@ -1,4 +1,7 @@
-"""The simple values of the language: strings, lists, numbers in a row, and short forms of mappings."""
+"""The simple values of the language.
+
+Strings, lists, numbers in a row, and short forms of mappings.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """Annotates a string that has to match a pattern, in whole; ``means`` says the pattern in words."""
+    """Annotates a string that has to match a pattern, in whole.
+
+    ``means`` says the pattern in words.
+    """
 
     pattern: str
     means: str
@@ -59,7 +65,10 @@ class Matches:
 
 @dataclass(frozen=True, slots=True)
 class Computable:
-    """Annotates a value that an expression may give; ``plain`` is the function that takes it out of what that gives."""
+    """Annotates a value that an expression may give.
+
+    ``plain`` is the function that takes it out of what that gives.
+    """
 
     plain: Callable[[Any], Any]
 
@@ -104,7 +113,10 @@ class InARow:
         )
 
     def _advice(self, value: Any) -> str:
-        """Return what to write instead: what may be meant by a string, a mapping, or numbers with decimal commas."""
+        """Return what to write instead.
+
+        What may be meant by a string, a mapping, or numbers with decimal commas.
+        """
         if isinstance(value, dict) and value.keys() == {"size"}:  # as URDF's box has it
             inner = value["size"]
             is_complete = isinstance(inner, list) and len(inner) == self.count

@@ -1,4 +1,7 @@
-"""``vars``, ``args`` and ``${…}``: computed first, so that a computed value is checked like a written one."""
+"""``vars``, ``args`` and ``${…}``.
+
+Computed first, so that a computed value is checked like a written one.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def unused(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str, str], ...]:
-    """Return the paths of variables and arguments that no ``${…}`` names, in ``data`` or in ``aside``."""
+    """Return the variables and arguments that no ``${…}`` in ``data`` or ``aside`` names."""
     declared: dict[str, tuple[str, str]] = {}
     for section, prefix in (("vars", ""), ("args", "args.")):
         names = data.get(section)
@@ -47,7 +50,7 @@ def unused(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str, str], ..
 def alternatives_of(
     source: Source, given: Given, aside: Source
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Return the values that the arguments can have which are used and not given, and of these those that they have.
+    """Return the possible values of used arguments that are not given.
 
     Both are by name, as the command line gives them. ``aside`` is the file with its profiles,
     which may use them too.
@@ -92,7 +95,10 @@ def _names(value: Any) -> Iterator[str]:
 
 
 def _filled(value: Any, path: Path, variables: Variables) -> Any:
-    """Return the value with expressions computed; the same object where it holds none, so that aliases stay one."""
+    """Return the value with expressions computed.
+
+    The same object where it holds none, so that aliases stay one.
+    """
     if isinstance(value, str):
         return variables.fill(value, path) if "${" in value else value
     if not isinstance(value, (dict, list)):
@@ -141,7 +147,10 @@ def _is_for_xacro(path: Path) -> bool:
 
 
 class NothingNewError(ExpressionError):
-    """A variable has been refused already; what needs it is broken too, and that is not said again."""
+    """A variable has been refused already.
+
+    What needs it is broken too, and that is not said again.
+    """
 
 
 class Variables:
@@ -172,7 +181,9 @@ class Variables:
     def compute(
         self, data: dict[str, Any], scopes: Mapping[Path, Mapping[str, Value]]
     ) -> dict[str, Any]:
-        """Return the data with every ``${…}`` computed; ``scopes`` are values by name for what is below some paths.
+        """Return the data with every ``${…}`` computed.
+
+        ``scopes`` are values by name for what is below some paths.
 
         What is one expression becomes a ``Quantity``, a ``Truth`` or a string. What could not be
         computed stays as it is; there is no second refusal of what only needs a variable that was
@@ -185,7 +196,10 @@ class Variables:
         return filled | ({"vars": data["vars"]} if "vars" in data else {})
 
     def _read_args(self) -> None:
-        """Read the arguments in order; the default of one may name those before it, and ``env``."""
+        """Read the arguments in order.
+
+        The default of one may name those before it, and ``env``.
+        """
         declared = self.source.data.get("args")
         declared = declared if isinstance(declared, dict) else {}
         for name, raw in declared.items():
@@ -246,7 +260,10 @@ class Variables:
         return GivenArg(value, Span(f"{spec.env}={value}"))
 
     def _read_all(self) -> None:
-        """Compute every variable, first those that it needs; without recursion, however long the chain."""
+        """Compute every variable, first those that it needs.
+
+        Without recursion, however long the chain.
+        """
         for first in self.given:
             self.open = [first]
             waiting = [self._names_in(first)]
@@ -285,7 +302,10 @@ class Variables:
             self._refuse(error, ("vars", name))
 
     def fill(self, text: str, path: Path, lookup: Callable[[str], Value] | None = None) -> Any:
-        """Return the text with every ``${…}`` computed, or, after noting why, as it is; the path is the text's."""
+        """Return the text with every ``${…}`` computed, or, after noting why, as it is.
+
+        The path is the text's.
+        """
         try:
             later = LATER if _is_of_a_process(path) else OF_FILES if _is_for_xacro(path) else None
             value = fill(text, lookup or self._lookup_at(path), later)
@@ -305,7 +325,7 @@ class Variables:
         return self.within(scope) if scope else self.lookup
 
     def value_in(self, text: str, scope: Mapping[str, Value]) -> Value:
-        """Return what a text says with every ``${…}`` computed, names looked up in the scope first.
+        """Return a text with every ``${…}`` computed, names looked up in the scope first.
 
         Raises:
             ExpressionError: if it cannot be computed.
@@ -317,7 +337,7 @@ class Variables:
         return lambda name: scope[name] if name in scope else self.lookup(name)
 
     def lookup(self, name: str) -> Value:
-        """Return the value of a variable, of an argument, ``args.NAME``, or of ``env(NAME, default)``.
+        """Return the value of a variable, of ``args.NAME``, or of ``env(NAME, default)``.
 
         Raises:
             ExpressionError: if there is none.

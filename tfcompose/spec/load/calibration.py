@@ -1,4 +1,6 @@
-"""Calibration files as plain data with places: YAML of one or several documents, rows of numbers, launch files.
+"""Calibration files as plain data with places.
+
+YAML of one or several documents, rows of numbers, launch files.
 
 The bounds are those of robot files. xacro's tags ``!degrees`` and ``!radians`` are read here, on
 plain numbers.
@@ -119,7 +121,10 @@ def _rows(lines: list[str], file: str) -> Source:
 
 
 def _launch(text: str, file: str) -> Source:
-    """Return the words of each static_transform_publisher; what stands in comments is left out, nothing is run."""
+    """Return the words of each static_transform_publisher.
+
+    What stands in comments is left out, nothing is run.
+    """
     lines = _Lines(text, file)
     places: dict[str | int, Place] = {}
     data: Any = []

@@ -1,4 +1,4 @@
-"""YAML text as plain data with the place of every key and value, in one pass over PyYAML's parser events.
+"""YAML text as plain data with the place of every key and value, from parser events.
 
 PyYAML's own composer recurses in C and a deeply nested text ends the interpreter; this one has a
 stack of its own and stops at a depth that no robot needs. Nothing is constructed by tags, no code
@@ -80,7 +80,10 @@ def parse_events(text: str) -> Iterator[Any]:
 
 @dataclass(slots=True)
 class _Part:
-    """A finished value that has a name: how many values and levels it holds, and what was found in it."""
+    """A finished value that has a name.
+
+    How many values and levels it holds, and what was found in it.
+    """
 
     value: Any
     place: Place
@@ -91,7 +94,10 @@ class _Part:
 
 @dataclass(slots=True)
 class _Open:
-    """A mapping or list that is being read; ``key`` waits for its value, which ``keeps`` says to keep."""
+    """A mapping or list that is being read.
+
+    ``key`` waits for its value, which ``keeps`` says to keep.
+    """
 
     data: Any
     start: yaml.CollectionStartEvent
@@ -115,7 +121,10 @@ class _Open:
 
 
 class Reader:
-    """Reads the documents of one text. ``found`` is what was wrong, ``has_nulls`` whether a value is null."""
+    """Reads the documents of one text.
+
+    ``found`` is what was wrong, ``has_nulls`` whether a value is null.
+    """
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -259,7 +268,10 @@ class Reader:
             self._put(done.data, place, done.size, done.height)
 
     def _inherit(self, done: _Open, value: Any, place: Place) -> None:
-        """Take what ``<<`` names for the keys that the mapping does not have; the first mapping that has a key wins."""
+        """Take what ``<<`` names for the keys that the mapping does not have.
+
+        The first mapping that has a key wins.
+        """
         steps = enumerate(value) if isinstance(value, list) else [(None, value)]
         for index, source in steps:
             at = place if index is None else place.inside[index]
@@ -298,7 +310,7 @@ class Reader:
     def _key(
         self, top: _Open, key: str | None, place: Place, what: str = "", *, is_merge: bool = False
     ) -> None:
-        """Take a key; the value of one that is no text, or is given twice, or holds anchors only, is not kept."""
+        """Take a key; ignore non-text, duplicate and anchor-only ones."""
         top.key, top.waits_for_key, top.is_merge, top.keeps = key or "", False, is_merge, True
         if key is None:
             message = f"a key must be a string; this one is {what}"
@@ -356,7 +368,10 @@ class Reader:
 
 
 def _between(file: str, start: Any, end: Any) -> tuple[str, int, int, int, int]:
-    """Return the file, and lines and columns from 0; the parser's marks would all have to be kept."""
+    """Return the file, and lines and columns from 0.
+
+    The parser's marks would all have to be kept.
+    """
     return file, start.line, start.column, end.line, end.column
 
 
@@ -366,7 +381,7 @@ _NOTHING: Mapping[Any, Any] = {}
 
 
 class Place:
-    """Where a value stands; of a mapping or a list also where its keys, and the values in it, stand.
+    """The place of a value; of a mapping or list also those of its keys and items.
 
     Most places are never asked for, and become a ``Span`` only then. Places do not change.
     ``inside`` holds the places of the values by key or index, ``keys`` those of the keys; an alias
@@ -381,7 +396,7 @@ class Place:
         inside: Mapping[Any, Place] = _NOTHING,
         keys: Mapping[Any, Place] = _NOTHING,
     ) -> None:
-        """``at`` is the place, or the file and the lines and columns of beginning and end, which count from 0."""
+        """``at`` is the place, or file, lines and columns of both ends, counted from 0."""
         self._at = at
         self.inside = inside
         self.keys = keys
@@ -410,7 +425,7 @@ class Place:
         return place
 
     def nearest(self, path: Path) -> Place:
-        """Return the place of what is at ``path`` below, or of the nearest thing around it that there is."""
+        """Return the place at ``path`` below, or of the nearest thing around it."""
         place = self
         for step in path:
             below = place.inside.get(step)

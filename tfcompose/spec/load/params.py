@@ -33,7 +33,10 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class NodeParams:
-    """What a file says to the nodes that ``name`` means: a name, or a pattern with * for one part and ** for any."""
+    """What a file says to the nodes that ``name`` means.
+
+    A name, or a pattern with * for one part and ** for any.
+    """
 
     name: str
     at: Span
@@ -81,7 +84,9 @@ def load_params(text: str, file: str) -> ParamsFile:
 
 
 def _refuse_deep(text: str, file: str) -> None:
-    """Do nothing for a text that is nested as deep as a file may be: PyYAML's composer recurses in C without bounds.
+    """Do nothing for a text that is nested as deep as a file may be.
+
+    PyYAML's composer recurses in C without bounds.
 
     Raises:
         RejectedError: if it is nested deeper.
@@ -107,7 +112,10 @@ class _Reader:
         self._open: set[int] = set()  # what is being read: an alias of one of these has no end
 
     def nodes(self, mapping: yaml.MappingNode, above: str) -> None:
-        """Take the nodes of a mapping; a mapping that has no parameters holds the nodes of a namespace."""
+        """Take the nodes of a mapping.
+
+        A mapping that has no parameters holds the nodes of a namespace.
+        """
         with self._reading(mapping):
             self._nodes(mapping, above)
 

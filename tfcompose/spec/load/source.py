@@ -1,4 +1,4 @@
-"""A file's plain data with the place of every key and value, and the comments that tfcompose reads.
+"""A file's data with the place of every key and value, and tfcompose's comments.
 
 Those are ``# tfcompose: allow TF401 because …``, in XML ``<!-- tfcompose: allow … -->``. A comment
 counts for its own line, or, alone on a line, for the next one. In XML that is the whole tag that
@@ -47,7 +47,7 @@ class Source:
     is_variant: bool = field(default=False, compare=False)
 
     def at(self, path: Path) -> Span:
-        """Return the place of the value, or of the nearest mapping or list around it that has one."""
+        """Return the value's place, or that of the nearest mapping or list around it."""
         return self.places.nearest(path).span
 
     def at_key(self, path: Path) -> Span:
@@ -143,7 +143,10 @@ def refuse_unreadable(text: str, file: str, most_characters: int = MOST_CHARACTE
 
 
 def path_named(named: str, at: Span) -> str:
-    """Return the path of a file that is named at a place: relative to the file there, or to the working folder."""
+    """Return the path of a file that is named at a place.
+
+    Relative to the file there, or to the working folder.
+    """
     folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)  # --set and its like
     return posixpath.normpath(posixpath.join(folder, named))
 

@@ -71,7 +71,7 @@ def no_yaml(text: str, file: str) -> Finding:
 
 @dataclass(frozen=True, slots=True)
 class _Fault:
-    """What the parser says: the line and column where it stopped, and where what it was reading began, from 0."""
+    """The parser's message: line and column of its stop and of what it was reading."""
 
     lines: list[str]
     at: tuple[int, int]

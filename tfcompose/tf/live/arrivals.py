@@ -1,4 +1,6 @@
-"""How often something arrives, how evenly, and how late: sums over a recent stretch of time, of bounded size.
+"""How often something arrives, how evenly, and how late.
+
+Sums over a recent stretch of time, of bounded size.
 
 Times are integer nanoseconds; what comes back is in seconds and hertz.
 """
@@ -82,7 +84,7 @@ class Timing:
 
 @dataclass(slots=True)
 class Arrivals:
-    """Counts arrivals. Its figures cover the last one to two ``window_ns``, or all where that is 0.
+    """Counts arrivals over the last one to two ``window_ns``, or over all if that is 0.
 
     Of arrivals in the first ``settle_ns`` only the number counts: a new subscriber gets at once
     what was kept for it.
@@ -113,7 +115,7 @@ class Arrivals:
             self._now.delay(delay_ns)
 
     def resumed(self, at_ns: int) -> None:
-        """Note an arrival before which nothing was expected for a while, so that there is no gap."""
+        """Note an arrival after a pause that is no gap."""
         if self.count:
             self.count += 1
             self.last_ns = at_ns
@@ -143,7 +145,10 @@ class Arrivals:
         )
 
     def steady_rate(self, least_ns: int) -> float | None:
-        """Return the rate without the longest gap, which may be a hiccup; None while the gaps add up to less time."""
+        """Return the rate without the longest gap, which may be a hiccup.
+
+        None while the gaps add up to less time.
+        """
         sums = self._before.plus(self._now)
         rest_ns = sums.gaps_ns - sums.longest_ns
         if sums.gaps < 2 or sums.gaps_ns < least_ns or rest_ns <= 0:  # noqa: PLR2004 (one besides the longest)

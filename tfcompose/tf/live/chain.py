@@ -1,4 +1,4 @@
-"""The edges between two frames as they are published, and how old the newest pose of the one in the other is."""
+"""The published edges between two frames, and the age of the newest pose."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """How old the newest stamp of an edge is, in seconds: in the mean, and at most, just before the next one comes."""
+    """How old the newest stamp of an edge is, in seconds.
+
+    In the mean, and at most, just before the next one comes.
+    """
 
     edge: EdgeState
     mean_s: float
@@ -24,7 +27,9 @@ class Delay:
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """The frames from A to B, and their edges: of each the one that counts, the newest, and those of other publishers.
+    """The frames from A to B, and their edges.
+
+    Of each the one that counts, the newest, and those of other publishers.
 
     ``newest`` and ``all_edges`` are in the order of ``frames``.
     """
@@ -35,7 +40,10 @@ class Chain:
 
     @property
     def delay(self) -> Delay | None:
-        """The delay of the edge that is the most behind, which is that of the pose; None where none moves."""
+        """The delay of the edge that is the most behind, which is that of the pose.
+
+        None where none moves.
+        """
         delays = [one for edge in self.newest if (one := _delay(edge))]
         return max(delays, key=lambda one: one.mean_s, default=None)
 

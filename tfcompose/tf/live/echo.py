@@ -95,7 +95,7 @@ class _Listened:
         self._rejected = next(iter(rejected), self._rejected)
 
     def follow(self, clock_ns: int | None) -> None:
-        """Forget all moving edges when simulated time goes back, as tf2's buffers do in nodes with use_sim_time."""
+        """Forget moving edges when simulated time jumps back, as tf2's buffers do."""
         if clock_ns is not None and clock_ns < self._clock_ns:
             self.buffer.clear()
             self._rejected = None

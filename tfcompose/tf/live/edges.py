@@ -36,7 +36,10 @@ _SECOND_NS = 1_000_000_000
 def nearer_clock(
     rows: Sequence[Row], received_ns: int, clock_ns: int | None, *, static: bool
 ) -> int | None:
-    """Return the time to compare stamps with: that of /clock where they are nearer to it, else None."""
+    """Return the time to compare stamps with.
+
+    That of /clock where they are nearer to it, else None.
+    """
     if clock_ns is None or static or not rows:
         return None
     stamp_ns = rows[0][2] * _SECOND_NS + rows[0][3]
@@ -145,7 +148,10 @@ class EdgeStream:
 
 @dataclass(slots=True)
 class Handover:
-    """The edges with which one publisher puts one frame now in this parent, now in that; and which came last."""
+    """The edges with which one publisher puts one frame now in this parent, now in that.
+
+    And which came last.
+    """
 
     streams: list[EdgeStream]
     holder: EdgeStream
@@ -158,7 +164,7 @@ class Handover:
                 each.handover = self
 
     def take(self, stream: EdgeStream) -> bool:
-        """Note that a transform of one of them came, and return whether the one before was another's."""
+        """Note a transform of one publisher; return whether the previous was another's."""
         if stream is self.holder:
             return False
         self.holder = stream
@@ -167,7 +173,10 @@ class Handover:
 
     @property
     def is_one(self) -> bool:
-        """Whether the frame changes hands, now and then; where one comes between the others, it jumps to and fro."""
+        """Whether the frame changes hands, now and then.
+
+        Where one comes between the others, it jumps to and fro.
+        """
         return all((each.begun - 1) * MIN_RUN <= each.arrivals.count for each in self.streams)
 
 
@@ -256,7 +265,10 @@ class TreeObserver:
         received_ns: int,
         clock_ns: int | None = None,
     ) -> None:
-        """Take one message; ``clock_ns`` is the time that stamps should have, ``received_ns`` unless that is given."""
+        """Take a message; ``clock_ns`` is the time that stamps should have.
+
+        It is ``received_ns`` unless given.
+        """
         self.begun_ns = self.begun_ns or received_ns
         self.messages += 1
         self.last_ns = received_ns
@@ -281,7 +293,10 @@ class TreeObserver:
     def _new(
         self, row: Row, *, static: bool, gid: bytes | None, received_ns: int, is_full: bool
     ) -> EdgeStream | None:
-        """Return the stream of an edge that is new, or written with a slash; None where there are too many."""
+        """Return the stream of an edge that is new, or written with a slash.
+
+        None where there are too many.
+        """
         parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
         stream = self._streams.get((parent, child, gid, static))
         if stream is None:
@@ -306,13 +321,19 @@ class TreeObserver:
             self.malformed[gid] = self.malformed.get(gid, 0) + 1
 
     def take_graph(self, publishers: Sequence[Publisher], nodes: Sequence[str] = ()) -> None:
-        """Take who is in the graph now, and the names of its nodes; what is known of one that has left is kept."""
+        """Take who is in the graph now, and the names of its nodes.
+
+        What is known of one that has left is kept.
+        """
         self.nodes = tuple(nodes)
         self.publishers.update(publishers)
 
     @property
     def until_ns(self) -> int:
-        """Until when anything is known: the end of the recording, or the last look; who looks late blames nobody."""
+        """Until when anything is known: the end of the recording, or the last look.
+
+        Who looks late blames nobody.
+        """
         return self.end_ns or self.observed_ns or self.last_ns
 
     @property
@@ -331,7 +352,7 @@ class TreeObserver:
         return tuple(self._streams.values())
 
     def edges(self, now_ns: int) -> list[EdgeState]:
-        """Return what is known of each edge at ``now_ns`` of the receiver's clock, sorted by parent and child."""
+        """Return the state of each edge at ``now_ns`` of the receiver, by parent and child."""
         streams = sorted(self._streams.values(), key=_order)
         return [self._state(stream, now_ns) for stream in streams]
 
@@ -354,7 +375,10 @@ class TreeObserver:
         )
 
     def _publisher_nodes(self, stream: EdgeStream) -> tuple[str, ...]:
-        """Return the publisher's node; without an id all on the topic, or all that were, where they have left."""
+        """Return the publisher's node.
+
+        Without an id all on the topic, or all that were, where they have left.
+        """
         nodes = self.publishers.nodes(stream.gid, static=stream.static)
         if nodes or stream.gid is not None:
             return nodes
@@ -387,7 +411,10 @@ class Branch:
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """One root and all below it, as it is drawn; or the frames of a loop, the first one again last."""
+    """One root and all below it, as it is drawn.
+
+    Or the frames of a loop, the first one again last.
+    """
 
     branches: tuple[Branch, ...]
     loop: tuple[str, ...] = ()
@@ -396,7 +423,9 @@ class Tree:
 def forest(
     edges: Iterable[EdgeState], planned: Mapping[str, PlanEdge] | None = None
 ) -> list[Tree]:
-    """Return the trees, the largest first, then the loops. Planned edges (by child) without messages are part of it.
+    """Return the trees, the largest first, then the loops.
+
+    Planned edges (by child) without messages are part of it.
 
     A frame with several parents is drawn below that of the newest message, as in tf2.
     """

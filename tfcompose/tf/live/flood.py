@@ -1,4 +1,7 @@
-"""What one publisher that sends ever new edges may cost an observer: how many are kept, and how long reading takes."""
+"""What one publisher that sends ever new edges may cost an observer.
+
+How many are kept, and how long reading takes.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ BUSY_S = 0.1
 
 
 class ReadingTime:
-    """Bounds the time for messages that are laid out like none before, of publishers of too many edges.
+    """Bounds the time for unfamiliar messages from publishers of too many edges.
 
     Their messages are skipped while the time of this second is used up; ``skipped`` counts them.
     """
@@ -39,7 +42,10 @@ class ReadingTime:
         floods: Callable[[bytes | None], bool],
         now: float,
     ) -> None:
-        """Read a message unless it must be skipped; ``floods`` says whether its publisher sends too many edges."""
+        """Read a message unless it must be skipped.
+
+        ``floods`` says whether its publisher sends too many edges.
+        """
         decoder = self._decoder
         if now - self._since >= 1.0:
             self._spent_s, self._since = 0.0, now
@@ -53,7 +59,10 @@ class ReadingTime:
 
 
 class EdgeBounds:
-    """The edges of each publisher that are kept; ``beyond`` counts transforms of others, by their publisher's id."""
+    """The edges of each publisher that are kept.
+
+    ``beyond`` counts transforms of others, by their publisher's id.
+    """
 
     def __init__(self) -> None:
         self.beyond: dict[bytes | None, int] = {}

@@ -36,7 +36,7 @@ LAST_WAIT_S = 0.1
 
 
 class TreeListener:
-    """Feeds an observer with what comes on a pair of TF topics (moving, fixed), as long as its node lives.
+    """Feeds an observer from a pair of TF topics (moving, fixed) while its node lives.
 
     Where a simulator publishes /clock, stamps that are nearer to it than to the system's time are
     compared with it.
@@ -59,7 +59,7 @@ class TreeListener:
         return self._clock.now_ns()
 
     def listen(self, timeout_s: float, stop: Stop) -> list[TFData]:
-        """Wait for messages, at most so long, put what has come into the observer, and return what could be read.
+        """Wait for messages for a bounded time; observe and return those that were read.
 
         Raises:
             RosError: if ROS cannot take messages.
@@ -108,7 +108,7 @@ def listen(  # noqa: PLR0913 (all but three are named)
     every_s: float = 1.0,
     show: Callable[[], object] | None = None,
 ) -> tuple[float, tuple[str, ...]]:
-    """Feed the observers of the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
+    """Feed the observers of the topics for some seconds, or until ``stop``.
 
     ``show`` is called ``every_s``. The node's name is ``name``.
     Return for how many seconds it listened, and the names of other topics on which there is TF.
@@ -139,7 +139,7 @@ def listen(  # noqa: PLR0913 (all but three are named)
 def tf_elsewhere(
     topics: Iterable[tuple[str, Sequence[str]]], own: Iterable[str]
 ) -> tuple[str, ...]:
-    """Return the names of topics with TF, of (name, types), that are none of our own, and not hidden (``/_…``)."""
+    """Return the names of TF topics, of (name, types), not ours and not hidden (``/_…``)."""
     return tuple(
         name
         for name, types in topics

@@ -1,4 +1,4 @@
-"""Which poses of one frame in another are wanted, of the live tree or of a bag, and why there are none."""
+"""Requested poses of one frame in another, live or from a bag, and why not."""
 
 from __future__ import annotations
 

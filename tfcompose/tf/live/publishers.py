@@ -1,4 +1,4 @@
-"""Who publishes on TF topics, by the ids that come with messages, since when, and what a message says.
+"""Publishers on TF topics by message ids, since when, and what messages say.
 
 What messages say is read fast where a publisher sends the same edges again and again.
 """
@@ -45,7 +45,7 @@ class Message:
 
 
 class MessageReader:
-    """Reads messages; the poses too in a publisher's first ones with edges that hold one of ``frames``."""
+    """Reads messages, with poses in a publisher's first ones that hold one of ``frames``."""
 
     def __init__(self, frames: frozenset[str] = frozenset()) -> None:
         self._frames = frames
@@ -102,7 +102,10 @@ UNCOUNTED = 2**64 - 1
 
 @dataclass(frozen=True, slots=True)
 class OtherRun:
-    """A run of another robot: its name, ROBOT@DOMAIN, its launcher's process, and since when: 14:03:27, local time."""
+    """A run of another robot: its name, ROBOT@DOMAIN, its launcher's process, and since when.
+
+    14:03:27, local time.
+    """
 
     name: str
     pid: int
@@ -156,7 +159,7 @@ class Publisher:
 
 
 def forget_oldest(known: dict[Key, Any], present: Collection[Key]) -> None:
-    """Forget what came first of publishers that are not present, where there are more than ``MOST_LEFT`` of them."""
+    """Forget the oldest of absent publishers beyond ``MOST_LEFT``."""
     left = (
         [key for key in known if key not in present]
         if len(known) > len(present) + MOST_LEFT
@@ -167,7 +170,9 @@ def forget_oldest(known: dict[Key, Any], present: Collection[Key]) -> None:
 
 
 class Publishers:
-    """All publishers that the graph has shown: those that are there, and the names of those that have left.
+    """All publishers that the graph has shown.
+
+    Those that are there, and the names of those that have left.
 
     Where the rmw does not say who sent a message (``says_who``), ids of messages tell senders
     apart, and any node on the topic may be the one.
@@ -196,11 +201,16 @@ class Publishers:
         return gid is not None and gid in self.known and self.known[gid].node is not None
 
     def is_sure(self, gid: bytes | None) -> bool:
-        """Return whether the id says whose it is: by the graph, once it shows the publisher's name."""
+        """Return whether the id says whose it is.
+
+        By the graph, once it shows the publisher's name.
+        """
         return gid is not None and (self.says_who or self.is_named(gid))
 
     def nodes(self, gid: bytes | None, *, static: bool) -> tuple[str, ...]:
-        """Return the publisher's node, nothing while it is not known; all on the topic where ids do not say whose.
+        """Return the publisher's node, nothing while it is not known.
+
+        All on the topic where ids do not say whose.
 
         One that sends behind a fence of remappings has an id in any case.
         """
@@ -223,7 +233,10 @@ class Publishers:
         return self.known[gid].where if gid is not None and gid in self.known else ""
 
     def is_present(self, gid: bytes | None) -> bool:
-        """Return whether the publisher is there; one whose id does not say whose it is, is while anybody is."""
+        """Return whether the publisher is there.
+
+        One whose id does not say whose it is, is while anybody is.
+        """
         return gid in self.present if self.is_sure(gid) else bool(self.present)
 
 
@@ -246,7 +259,9 @@ class Sender:
         self.last_ns, self.last_sequence = message.source_ns, message.sequence
 
     def began_before(self, time_ns: float, gaps: int = GAPS) -> bool | None:
-        """Return whether its first message was sent before that time; None: not sure by so many gaps.
+        """Return whether its first message was sent before that time.
+
+        None: not sure by so many gaps.
 
         A newcomer that is far from it is recognised by its second message.
         """
@@ -263,7 +278,7 @@ class Sender:
 
 
 def _median(values: Sequence[float]) -> float:
-    """Return the middle one; the library's median costs two megabytes in a process that needs it only here."""
+    """Return the median; the library's costs two megabytes in a process."""
     ordered, half = sorted(values), len(values) // 2
     return ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2
 
@@ -304,7 +319,10 @@ class Senders(Publishers):
         return None if gid is None else self._heard.get(gid)
 
     def process(self, gid: bytes | None) -> str:
-        """Return the plan's process that the publisher is proven to be of, by its environment; empty: none is."""
+        """Return the plan's process that the publisher is proven to be of, by its environment.
+
+        Empty: none is.
+        """
         one = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
         return one.process if one and one.ours else ""
 
@@ -314,24 +332,30 @@ class Senders(Publishers):
         return one.ours if one else None
 
     def shows_process(self, process: str, node: str, *, static: bool) -> bool:
-        """Return whether a publisher of that node on that kind of topic is there, and proven to be of the process."""
+        """Return whether a publisher of that node exists and provably is the process's."""
         return any(
             one.ours and one.process == process and one.node == node and one.static == static
             for one in self.present.values()
         )
 
     def is_held_back(self, gid: bytes | None) -> bool | None:
-        """Whether what the publisher may not send reaches nobody in a strict plan; None: that is not known."""
+        """Whether what the publisher may not send reaches nobody in a strict plan.
+
+        None: that is not known.
+        """
         one = self.present.get(gid) if gid is not None else None
         return one.fenced if one else None
 
     def run(self, gid: bytes | None) -> OtherRun | None:
-        """Return the run of another robot that the publisher is of, by its environment; None: no such is known."""
+        """Return the run of another robot that the publisher is of, by its environment.
+
+        None: no such is known.
+        """
         one = self.known.get(gid) if gid is not None else None
         return one.run if one else None
 
     def was_held_back(self, gid: bytes | None) -> bool:
-        """Return whether what one that may have left sent reached nobody, for all that is known."""
+        """Return whether messages of one that may have left reached nobody, as far as known."""
         one = self.known.get(gid) if gid is not None else None
         return bool(one and one.fenced)
 
@@ -341,7 +365,7 @@ class Senders(Publishers):
         return len(self._heard), sum(one.node is not None for one in self.known.values())
 
     def memory(self) -> dict[str, SenderMemory]:
-        """Return what the next guard must know of those that are there, by their ids in hexadecimal."""
+        """Return what the next guard must know of present publishers, by hexadecimal ids."""
         there = {gid: sender for gid, sender in self._heard.items() if gid in self.present}
         return {gid.hex(): SenderMemory(self.known[gid].nodes, one) for gid, one in there.items()}
 

@@ -68,7 +68,10 @@ class SensorTopics:
         self.joint_names: set[str] = set()
 
     def subscribe(self, graph: Iterable[Topic], robots_inside: tuple[str, ...]) -> None:
-        """Listen to topics that are new; not to those of robots inside, which have TF topics of their own."""
+        """Listen to topics that are new.
+
+        Not to those of robots inside, which have TF topics of their own.
+        """
         for topic in graph:
             inside = topic.name.startswith(f"{self._prefix}/") and not topic.name.startswith(
                 tuple(f"{name}/" for name in robots_inside)
@@ -89,7 +92,7 @@ class SensorTopics:
                 self._joints[topic.name] = JointStateSubscription(self._node, topic.name)
 
     def take(self, clock_ns: int | None) -> None:
-        """Take what has come; ``clock_ns`` is the newest simulated time, None where there is none."""
+        """Take what has come; ``clock_ns`` is the newest simulated time or None."""
         for topic, subscription in self._headers.items():
             taken = subscription.take_headers() if subscription else []
             for frame, stamp_ns, received_ns in taken:
@@ -302,7 +305,7 @@ class _View:
 
 
 def topics_in(node: Node) -> dict[str, Topic]:
-    """Return the topics that matter to TF, with their publishers and subscribers, by name and type."""
+    """Return the topics that matter to TF with their endpoints, by name and type."""
     found = {}
     for name, types in topics(node):
         if name not in GLOBAL and not set(types) & {*INTERESTING, *SensorTopics.TYPES}:
@@ -331,6 +334,6 @@ def _robots_inside(view: _View, graph: dict[str, Topic]) -> tuple[str, ...]:
 
 
 def own_settings() -> dict[str, str]:
-    """Return ROS's variables in this process's environment, and the middleware that it uses, set or not."""
+    """Return this environment's ROS variables and the middleware in use."""
     own = settings_in(b"\0".join(f"{name}={value}".encode() for name, value in os.environ.items()))
     return {**own, RMW: middleware()}

@@ -23,7 +23,7 @@ NO_NODE = "a DDS program that is no ROS node"
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic of the graph: its type, such as ``sensor_msgs/msg/LaserScan``, and the nodes at both ends."""
+    """A topic of the graph: its type, such as ``sensor_msgs/msg/LaserScan``, and nodes."""
 
     name: str
     type: str
@@ -50,7 +50,10 @@ class StampedData:
 
 @dataclass(frozen=True, slots=True)
 class MovingJoint:
-    """A joint of the robot's description that moves: a listener to joint states has to publish its edge."""
+    """A joint of the robot's description that moves.
+
+    A listener to joint states has to publish its edge.
+    """
 
     name: str
     parent: str
@@ -139,7 +142,10 @@ class TreeState:
 
     @property
     def simulated(self) -> bool:
-        """Whether stamps should be of simulated time: a plan says so, or most edges are nearer to /clock."""
+        """Whether stamps should be of simulated time.
+
+        A plan says so, or most edges are nearer to /clock.
+        """
         if self.plan and self.plan.ros.clock == "sim":
             return True
         if self.clock_ns is None:
@@ -150,7 +156,7 @@ class TreeState:
         )
 
     def where(self, edge: EdgeState) -> str:
-        """Return on which machine and as which process the publisher of an edge runs, empty if that is not known."""
+        """Return the machine and process of an edge's publisher, empty if unknown."""
         return next((one.where for one in self.publishers if one.gid == edge.stream.gid), "")
 
     def typed(self, type_: str) -> list[Topic]:

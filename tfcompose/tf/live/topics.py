@@ -1,4 +1,7 @@
-"""The TF topics of the running system: what comes on them, and who publishes there, with the process of each."""
+"""The TF topics of the running system.
+
+What comes on them, and who publishes there, with the process of each.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +44,7 @@ _ID_BYTES = 16
 
 
 def id_of_topic(topic: str) -> bytes:
-    """Return what stands for the id of whoever sends on a process's own topic, where the rmw does not say who sent."""
+    """Return a stand-in for the sender's id on a process's own topic."""
     return blake2b(topic.encode(), digest_size=_ID_BYTES).digest()
 
 
@@ -59,7 +62,7 @@ class TFData:
 
 
 class TFTopics:
-    """What comes on a pair of TF topics (moving, fixed), and behind the fence of a strict guard, by ``fence``.
+    """Messages on a pair of TF topics (moving, fixed), and behind a strict guard's fence.
 
     With ``deep`` more messages are kept than a listener keeps. ``own`` are ids whose messages are
     not taken. Call ``close`` before the node ends.
@@ -166,7 +169,9 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class RunMarks:
-    """What the environments of runs say: ``variable`` holds one's own ``run``, ``process`` the plan's process.
+    """What the environments of runs say.
+
+    ``variable`` holds one's own ``run``, ``process`` the plan's process.
 
     ``launcher`` holds a run's launcher: its process number, and when it began, in clock ticks
     since the start of the machine. ``profile`` names the profile file that fences the process off;
@@ -183,11 +188,14 @@ class RunMarks:
     launcher_pid: int = 0
 
     def process_of(self, known: Identity, node: str) -> str:
-        """Return the plan's process that a node is of, in an operating system's process that is known."""
+        """Return the plan's process of a node in a known operating system process."""
         return self.components.get((known.process, node), known.process)
 
     def identify(self, found: Sequence[Mapping[str, str]] | None) -> Identity:
-        """Return whose process it is of which one of these is the environment; None: nobody can say."""
+        """Return whose process it is of which one of these is the environment.
+
+        None: nobody can say.
+        """
         if found is None:
             return Identity()
         own = [one for one in found if one.get(self.variable) == self.run]
@@ -217,7 +225,9 @@ class RunMarks:
 
 
 class TFGraph:
-    """The publishers on a pair of TF topics (moving, fixed), and on the global ones; the node's own are left out.
+    """The publishers on a pair of TF topics (moving, fixed), and on the global ones.
+
+    The node's own are left out.
 
     Args:
         node: the node that asks.
@@ -249,7 +259,7 @@ class TFGraph:
         self._public |= dict.fromkeys(senders)
 
     def publishers(self) -> list[Publisher]:
-        """Return who publishes now: on the pair of topics, and on those that processes are remapped to."""
+        """Return the current publishers on the topics and on remapped ones."""
         found = self._publishers()
         present = {one.gid for one in found}
         for known in (self._where, self._ours, self._public):
@@ -266,7 +276,9 @@ class TFGraph:
         return found
 
     def may_pass(self, gid: bytes) -> bool | None:
-        """Whether what the publisher sends behind the fence is of one's own run; None: it is not known yet.
+        """Whether what the publisher sends behind the fence is of one's own run.
+
+        None: it is not known yet.
 
         In the common partition that must be seen; on a topic of a process's own, nobody else is
         expected.
@@ -306,13 +318,16 @@ class TFGraph:
         ]
 
     def _is_own(self, one: Writer) -> bool:
-        """Whether a publisher is of this process: by its id, or on Zenoh, whose ids are hashes, by its node's name."""
+        """Whether a publisher is of this process.
+
+        By its id, or on Zenoh, whose ids are hashes, by its node's name.
+        """
         if middleware() == IMPLEMENTATIONS["zenoh"]:
             return one.node == own_name(self._node)
         return one.gid[:PARTICIPANT] == self._own_gid()[:PARTICIPANT]
 
     def _by_topic(self, topics: Topics, there: list[Publisher]) -> Iterator[Publisher]:
-        """Yield what stands for all that send on a topic, as a message does not say which of them did."""
+        """Yield stand-ins for all senders on a topic, as messages do not identify them."""
         for static, topic in zip((False, True), topics, strict=True):
             gid = id_of_topic(topic)
             those = [one for one in there if one.static == static]

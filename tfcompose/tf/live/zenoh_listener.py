@@ -1,4 +1,7 @@
-"""Listens to TF on Zenoh where no ROS has rmw_zenoh, and feeds observers; liveliness tokens name who sent what."""
+"""Listens to TF on Zenoh where no ROS has rmw_zenoh, and feeds observers.
+
+Liveliness tokens name who sent what.
+"""
 
 from __future__ import annotations
 
@@ -79,7 +82,7 @@ def listen_on_zenoh(
     every_s: float = 1.0,
     show: Callable[[], object] | None = None,
 ) -> float:
-    """Feed the observers of the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
+    """Feed the observers of the topics for some seconds, or until ``stop``.
 
     ``show`` is called ``every_s``. Return for how many seconds it listened.
 

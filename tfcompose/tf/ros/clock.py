@@ -36,7 +36,10 @@ class SimClock:
         self._now_ns: int | None = None
 
     def now_ns(self) -> int | None:
-        """Return the newest simulated time in nanoseconds, or None before the first; what is no time is left out."""
+        """Return the newest simulated time in nanoseconds, or None before the first.
+
+        What is no time is left out.
+        """
         for received in self.subscription.take():
             read_ns = read_clock(received.data)
             self._now_ns = self._now_ns if read_ns is None else read_ns
@@ -44,7 +47,9 @@ class SimClock:
 
 
 class StampClock:
-    """The time for a message that has none: its arrival, or simulated time, which is asked for only then.
+    """The time for a message that has none.
+
+    Its arrival, or simulated time, which is asked for only then.
 
     ``say`` is given a line for people.
     """
@@ -56,7 +61,7 @@ class StampClock:
         self.is_waiting = False
 
     def now_ns(self, received_ns: int) -> int | None:
-        """Return the time in nanoseconds for a message that arrived at that time, or None while there is none."""
+        """Return the time in ns for a message that arrived then, None while there is none."""
         if not self._sim:
             return received_ns
         if self._clock is None:
@@ -77,7 +82,10 @@ class StampClock:
 
 
 class ClockWatch:
-    """Looks for the first message on /clock, if the plan's time is simulated; ``check`` costs nothing afterwards."""
+    """Looks for the first message on /clock, if the plan's time is simulated.
+
+    ``check`` costs nothing afterwards.
+    """
 
     def __init__(self, node: Node, say: Callable[[str], None], *, sim: bool) -> None:
         self._node, self._say = node, say
@@ -115,5 +123,5 @@ def read_clock(data: bytes) -> int | None:
 
 
 def wall_ns() -> int:
-    """Return the system's time in nanoseconds since the epoch, as nodes without use_sim_time stamp."""
+    """Return the system's time in nanoseconds since the epoch, as nodes stamp without sim."""
     return time.time_ns()

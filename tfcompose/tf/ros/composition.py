@@ -51,7 +51,10 @@ def parameter(name: str, value: Any) -> Any:
 
 
 class Service:
-    """One service of a container. Its requests are sent and its answers taken by hand: nothing spins here."""
+    """One service of a container.
+
+    Its requests are sent and its answers taken by hand: nothing spins here.
+    """
 
     def __init__(self, node: Node, kind: Any, name: str) -> None:
         self._node = node

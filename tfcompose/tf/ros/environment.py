@@ -1,4 +1,6 @@
-"""What a process needs around it to speak ROS: rclpy, and the variables that ROS reads when it starts.
+"""What a process needs around it to speak ROS.
+
+Rclpy, and the variables that ROS reads when it starts.
 
 Some settings make ROS end the process that starts a node, without a sentence: ``ros_trouble``
 finds them before. This module imports no ROS, so that everything can ask whether there is one.
@@ -41,7 +43,10 @@ LAST_DOMAIN = 232
 
 
 class RosError(Exception):
-    """Raised when ROS is there and cannot be used as needed; the message is one sentence for the user."""
+    """Raised when ROS is there and cannot be used as needed.
+
+    The message is one sentence for the user.
+    """
 
 
 def missing_ros() -> str | None:
@@ -82,7 +87,10 @@ def is_fastdds(environment: Mapping[str, str]) -> bool:
 
 
 def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) -> Finding | None:
-    """Return what keeps a process with this environment from starting a node, or None; ``ros`` are the plan's words."""
+    """Return what keeps a process with this environment from starting a node, or None.
+
+    ``ros`` are the plan's words.
+    """
     named = environment.get(RMW, "")
     return (
         no_ros()
@@ -93,7 +101,7 @@ def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) 
 
 
 def installed_distro(environment: Mapping[str, str]) -> str | None:
-    """Return the release of ROS that is set up here, by its variable or its rclpy, such as ``jazzy``; or None."""
+    """Return the ROS release set up here, by its variable or rclpy: ``jazzy``; or None."""
     if found := environment.get(DISTRO):
         return found
     for name in _RCLPY:
@@ -116,7 +124,10 @@ def other_distro(environment: Mapping[str, str], ros: RosSettings) -> Finding | 
 
 
 def reads_zenoh_alone(environment: Mapping[str, str]) -> bool:
-    """Return whether TF on Zenoh has to be read, and can be, without ROS: by eclipse-zenoh, of the extra ``zenoh``."""
+    """Return whether TF on Zenoh has to be read, and can be, without ROS.
+
+    By eclipse-zenoh, of the extra ``zenoh``.
+    """
     wanted = (
         environment.get(RMW) == IMPLEMENTATIONS["zenoh"]
         and find_spec("zenoh")
@@ -128,7 +139,10 @@ def reads_zenoh_alone(environment: Mapping[str, str]) -> bool:
 
 
 def other_middleware(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
-    """Return a warning where the environment names another middleware than the plan: tools see no process then."""
+    """Return a warning where the environment names another middleware than the plan.
+
+    Tools see no process then.
+    """
     here, wanted = environment.get(RMW), IMPLEMENTATIONS[ros.rmw] if ros.rmw else None
     if not here or wanted in {None, here}:
         return None
@@ -178,7 +192,10 @@ def _domain(domain: str) -> Finding | None:
 
 
 def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
-    """Look for the library as ROS does; where it is not, ROS ends the process as soon as it is imported."""
+    """Look for the library as ROS does.
+
+    Where it is not, ROS ends the process as soon as it is imported.
+    """
     if not name:
         return None
     try:

@@ -68,7 +68,7 @@ class Writer:
 
 
 def writers(node: Node, topic: str) -> list[Writer]:
-    """Return the publishers of the topic that ``node`` has discovered until now, its own too, sorted by node and id.
+    """Return the topic's publishers that ``node`` has discovered, sorted by node and id.
 
     A relative ``topic`` is taken in the node's namespace, and the node's remappings are applied.
     """
@@ -98,7 +98,7 @@ def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[Writer]:
 
 
 def volatile_readers(node: Node, topic: str) -> list[str]:
-    """Return the names of other nodes that listen to the topic and do not ask for what was sent before they came."""
+    """Return the other nodes that listen to the topic without requesting latched messages."""
     own = own_name(node)
     infos = node.get_subscriptions_info_by_topic(topic)
     volatile = [info for info in infos if info.qos_profile.durability == DurabilityPolicy.VOLATILE]
@@ -109,7 +109,7 @@ def volatile_readers(node: Node, topic: str) -> list[str]:
 
 
 def own_gid(node: Node, topic: str) -> bytes:
-    """Return the id of the node's own subscription to the topic, empty where the graph does not show it."""
+    """Return the id of the node's own subscription, empty if the graph lacks it."""
     infos = node.get_subscriptions_info_by_topic(topic)
     own = (
         info
@@ -185,12 +185,14 @@ def services(node: Node) -> list[str]:
 
 
 def topics(node: Node) -> list[tuple[str, tuple[str, ...]]]:
-    """Return the full names of the topics that ``node`` has discovered until now, each with its types, sorted."""
+    """Return the topics that ``node`` has discovered with their types, sorted."""
     return sorted((name, tuple(types)) for name, types in node.get_topic_names_and_types())
 
 
 def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
-    """Return who publishes on a topic, and who listens: node, type, and whether it publishes; unnamed ones left out.
+    """Return who publishes on a topic, and who listens: node, type, and whether it publishes.
+
+    Unnamed ones left out.
 
     ``topic`` is a full name; the node's own ends are left out.
     """
@@ -233,7 +235,10 @@ class _Gid(ctypes.Structure):
 
 
 def ids_say_who(node: Node) -> bool:
-    """Return whether the id of a message is that of its publisher in the graph; asked once for each rmw."""
+    """Return whether the id of a message is that of its publisher in the graph.
+
+    Asked once for each rmw.
+    """
     rmw: str = get_rmw_implementation_identifier()
     if rmw.startswith("rmw_fastrtps"):
         return True
@@ -243,7 +248,7 @@ def ids_say_who(node: Node) -> bool:
 
 
 def _by_tokens(rmw: str) -> bool:
-    """Ask liveliness tokens from now on, if the rmw is Zenoh's, eclipse-zenoh is installed, and there is a router."""
+    """Ask liveliness tokens if the rmw is Zenoh's and a router is there."""
     if (
         rmw != IMPLEMENTATIONS["zenoh"]
         or find_spec("zenoh") is None
@@ -262,7 +267,10 @@ def _by_tokens(rmw: str) -> bool:
 
 
 def gid_of(publisher: Any) -> bytes:
-    """Return the id, 16 bytes, that comes with the messages of this publisher of one's own; empty where none does."""
+    """Return the id, 16 bytes, that comes with the messages of this publisher of one's own.
+
+    Empty where none does.
+    """
     library, gid = rcl(), _Gid()
     handle = library.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
     return (
@@ -285,7 +293,9 @@ def _ask(node: Node) -> bool:
 
 @cache
 def rcl() -> ctypes.CDLL:
-    """Return rcl, which rclpy has loaded, with what is called of it; rmw's and rcutils' functions are found with it.
+    """Return rcl, which rclpy has loaded, with what is called of it.
+
+    Rmw's and rcutils' functions are found with it.
 
     Raises:
         RosError: if the library cannot be opened.

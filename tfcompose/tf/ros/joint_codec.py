@@ -1,4 +1,6 @@
-"""sensor_msgs/JointState as bytes: what is needed of it, read and written without ROS's typed messages.
+"""sensor_msgs/JointState as bytes.
+
+What is needed of it, read and written without ROS's typed messages.
 
 Layout (OMG CDR; sizes count from the end of the four bytes of header): int32 seconds, uint32
 nanoseconds, the frame as uint32 length, bytes and a NUL that the length counts; uint32 number of
@@ -30,7 +32,9 @@ _DOUBLE = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Names:
-    """The part of a message that stays while its sender does: the frame and the names, as they were sent.
+    """The part of a message that stays while its sender does.
+
+    The frame and the names, as they were sent.
 
     ``raw`` are the bytes behind the stamp up to the number of positions, ``order`` is struct's
     sign of the byte order.
@@ -41,7 +45,10 @@ class Names:
     raw: bytes
 
     def fit(self, data: bytes) -> bool:
-        """Return whether the message has exactly these names; in the other byte order its lengths read differently."""
+        """Return whether the message has exactly these names.
+
+        In the other byte order its lengths read differently.
+        """
         return data.startswith(self.raw, _FRAME_AT)
 
     def stamp_ns(self, data: bytes) -> int:
@@ -50,7 +57,9 @@ class Names:
         return int(seconds) * _SECOND_NS + int(nanoseconds)
 
     def positions(self, data: bytes) -> NDArray[np.float64]:
-        """Return the positions of a message that has these names, in their order: rad or m, shape (names,).
+        """Return the positions of a message that has these names, in their order.
+
+        Rad or m, shape (names,).
 
         Raises:
             ValueError: with a sentence that is the same for the same fault, if it has another
@@ -94,7 +103,10 @@ def read_names(data: bytes) -> Names:
 
 
 def encode_names(names: Sequence[str]) -> bytearray:
-    """Return a message with these names and positions of 0, little-endian; ``fill`` gives it its values."""
+    """Return a message with these names and positions of 0, little-endian.
+
+    ``fill`` gives it its values.
+    """
     out = bytearray(LITTLE_ENDIAN + bytes(_FRAME_AT - _HEADER))
     out += struct.pack("<I", 1) + b"\0"
     _append_number(out, len(names))
@@ -109,7 +121,7 @@ def encode_names(names: Sequence[str]) -> bytearray:
 
 
 def fill(message: bytearray, stamp_ns: int, positions: Sequence[float]) -> None:
-    """Give a message of ``encode_names`` its time and as many positions (rad or m) as it has names."""
+    """Give a message of ``encode_names`` its time and its positions (rad or m)."""
     struct.pack_into("<iI", message, _STAMP_AT, *divmod(stamp_ns, _SECOND_NS))
     struct.pack_into(
         f"<{len(positions)}d", message, len(message) - 8 - len(positions) * _DOUBLE, *positions

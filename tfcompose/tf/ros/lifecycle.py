@@ -1,4 +1,7 @@
-"""A lifecycle node of another process: its state, asked for and, where that is wanted, changed, without waiting."""
+"""A lifecycle node of another process.
+
+Its state, asked for and, where that is wanted, changed, without waiting.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,10 @@ _NEXT = {
 
 
 class Lifecycle:
-    """One node, and the state in which it is to be. Requests are sent and taken by hand: nothing spins here."""
+    """One node, and the state in which it is to be.
+
+    Requests are sent and taken by hand: nothing spins here.
+    """
 
     def __init__(self, node: Node, name: str, state: str, *, drive: bool) -> None:
         self._node = node
@@ -56,11 +62,11 @@ class Lifecycle:
         return bool(self._state)
 
     def ask_again(self) -> None:
-        """Ask for the state anew. A node that has begun anew is driven again, one that was deactivated is not."""
+        """Request the state again; a restarted node is driven again, a deactivated one not."""
         self._state, self._is_fresh = "", False
 
     def check(self, now: float) -> tuple[bool, str]:
-        """Take what was answered, ask on, and return whether the node is in its state, and what is observed."""
+        """Take answers, ask on, and return whether the node is in its state."""
         self._take(now)
         if self._pending is None and self._state != self._wanted and now >= self._not_before:
             self._ask(now)

@@ -1,4 +1,6 @@
-"""A node of tfcompose's own, and TF as bytes: publish, take with the publisher's id, and wait without an executor.
+"""A node of tfcompose's own, and TF as bytes.
+
+Publish, take with the publisher's id, and wait without an executor.
 
 The node is cheap: it has no executor, parameters, services or signal handlers of rclpy's. rclpy on
 Jazzy does not say who published a message; rcl does (``rcl_take_serialized_message`` and rmw's
@@ -65,7 +67,10 @@ def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy
 
 
 def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> QoSProfile:
-    """Return what is given, or the default; a depth alone leaves all else of the default, so that latched stays so."""
+    """Return what is given, or the default.
+
+    A depth alone leaves all else of the default, so that latched stays so.
+    """
     if isinstance(qos_or_depth, int):
         given: Any = default
         return qos(qos_or_depth, given.durability, given.reliability)
@@ -150,7 +155,7 @@ def middleware() -> str:
 
 
 def latch(node: Node, topic: str, text: str) -> Any:
-    """Publish ``text`` as std_msgs/String for everybody who joins, while the returned publisher lives."""
+    """Publish ``text`` latched as std_msgs/String while the returned publisher lives."""
     publisher = node.create_publisher(String, topic, LATCHED)
     publisher.publish(String(data=text))
     return publisher
@@ -186,7 +191,7 @@ class _Bytes(ctypes.Structure):
 
 
 class _MessageInfo(ctypes.Structure):
-    """rmw_message_info_t with its rmw_gid_t (16 bytes of storage since Iron), and room behind it."""
+    """rmw_message_info_t with its rmw_gid_t (16 bytes since Iron), and spare room."""
 
     _fields_ = (
         ("source_ns", ctypes.c_int64),
@@ -249,7 +254,7 @@ class TFPublisher:
 
 
 class Reader(ABC):
-    """Something that messages of one topic are taken from as bytes, and that ``wait`` waits for."""
+    """A source of a topic's messages as bytes, which ``wait`` waits for."""
 
     def __init__(self, topic: str, *, says_who: bool) -> None:
         self._topic, self._says_who = topic, says_who
@@ -324,7 +329,7 @@ class Subscription(Reader):
 
 
 class TFSubscription(Subscription):
-    """A subscription to /tf or /tf_static, or to another ``topic`` with the same QoS, as a tf2 listener's.
+    """A subscription to /tf, /tf_static or ``topic`` with a tf2 listener's QoS.
 
     With ``deep`` it keeps ten times as many messages as listeners do, for one that must miss
     nobody: of a hundred latched publishers that it finds at once, or a flood.
@@ -373,7 +378,7 @@ class _Options(ctypes.Structure):
 
 
 class PublicTFReader(Reader):
-    """Reads a TF topic outside of all partitions, whatever partitions this process's profiles add, by its own port.
+    """Reads a TF topic outside of all partitions, through a port of its own.
 
     Profiles of readers go by the topic's name in ROS. This reader is of the same DDS topic under
     no name of ROS's, made with rmw itself: rcl takes names only that begin with a slash. What is
@@ -448,7 +453,7 @@ class WaitSet:
         self._wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, self._context)
 
     def wait(self, timeout_s: float | None) -> list[Reader]:
-        """Wait until a reader has something, the time is over (None: never) or ``stop`` is requested.
+        """Wait until a reader has something, time is up (None: never) or ``stop``.
 
         Return the readers that have something. A new publisher or reader in the graph ends no
         wait. Nothing is taken.

@@ -54,7 +54,9 @@ class ParameterReader:
             self._sequence, self._requested_at = self._client.handle.send_request(request), now
 
     def take(self) -> dict[str, Value | None] | None:
-        """Return the values if the answer has come, else None; a parameter that the node does not have is None.
+        """Return the values if the answer has come, else None.
+
+        A parameter that the node does not have is None.
 
         One that is neither a truth value nor a number nor a text counts as one that it does not
         have.

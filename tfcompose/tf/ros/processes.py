@@ -1,4 +1,6 @@
-"""Processes of this machine, read from /proc: those that have ROS loaded, and whose a publisher's id is.
+"""Processes of this machine, read from /proc.
+
+Those that have ROS loaded, and whose a publisher's id is.
 
 With Fast DDS an id begins with the vendor's number (01 0f), two bytes for the host, and the lower
 half of the process id (``GuidUtils``, Fast DDS 2.14). Two machines can have the same two bytes, so
@@ -28,7 +30,7 @@ _WORD = 1 << 16
 
 
 def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
-    """Give pid, command line and ROS's variables of each process that has rcl loaded, but this one."""
+    """Yield pid, command and ROS variables of each other process with rcl loaded."""
     for entry in sorted(_PROC.glob("[0-9]*"), key=lambda path: int(path.name)):
         if entry.name == str(os.getpid()):
             continue
@@ -43,13 +45,18 @@ def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
 
 
 def settings_in(environment: bytes) -> dict[str, str]:
-    """Return ROS's variables of an environment as /proc shows it: NAME=VALUE, each ended by a NUL."""
+    """Return ROS's variables of an environment as /proc shows it.
+
+    NAME=VALUE, each ended by a NUL.
+    """
     pairs = (word.decode(errors="replace").partition("=") for word in environment.split(b"\0"))
     return {name: value for name, _, value in pairs if name.startswith(_PREFIXES)}
 
 
 def origin(gid: bytes, own_gid: bytes) -> str:
-    """Return where a publisher runs: ``on this machine as pid 7: …``, ``on another machine``; empty if unknown.
+    """Return where a publisher runs: ``on this machine as pid 7: …``, ``on another machine``.
+
+    Empty if unknown.
 
     ``own_gid`` is an id of this process's own.
     """
@@ -65,7 +72,7 @@ def origin(gid: bytes, own_gid: bytes) -> str:
 
 
 def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
-    """Return the environments of the processes of which one is the publisher's, as they were started with them.
+    """Return the initial environments of the processes that may be the publisher's.
 
     Several have the id's half of a process id, or none has, where it runs on another machine, or
     has ended. None: nobody can say, because the id is another vendor's, or a process's environment
@@ -105,7 +112,7 @@ def has_ended(gid: bytes, own_gid: bytes) -> bool:
 
 
 def began_at(ticks: int) -> float:
-    """Return when a process began, in seconds since 1970, of clock ticks since the machine's start."""
+    """Return a process's start in seconds since 1970, from clock ticks since boot."""
     return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")
 
 
@@ -148,7 +155,10 @@ def _parent(pid: int) -> int:
 
 
 def _command(pid: int) -> str:
-    """Return the process's command line, empty where there is none; a thread of a process's own has none."""
+    """Return the process's command line, empty where there is none.
+
+    A thread of a process's own has none.
+    """
     try:
         return _shown((_PROC / str(pid) / "cmdline").read_bytes())
     except OSError:

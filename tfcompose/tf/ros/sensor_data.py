@@ -1,4 +1,4 @@
-"""The topics of sensors: joint states below the node's namespace, and the headers of messages that carry one.
+"""Sensor topics: joint states in the node's namespace, and headers of messages.
 
 Messages are bytes; ``joint_codec`` reads and writes joint states. std_msgs/Header is the first
 member of each type in ``HEADED``: int32 seconds, uint32 nanoseconds, and the frame as uint32
@@ -83,7 +83,7 @@ _LONGEST = 1024
 
 
 class HeaderSubscription(Subscription):
-    """A subscription to a topic of one of the types ``HEADED``, or of another that begins with a header.
+    """A subscription to a topic of a type in ``HEADED``, or one that begins with a header.
 
     Raises:
         ImportError: if the type is not installed.
@@ -94,7 +94,10 @@ class HeaderSubscription(Subscription):
         super().__init__(node, getattr(import_module(f"{package}.msg"), name), topic, _QOS)
 
     def take_headers(self) -> list[tuple[str, int, int]]:
-        """Return frame, stamp and time of arrival in nanoseconds of what has come; what is no header is left out."""
+        """Return frame, stamp and time of arrival in nanoseconds of what has come.
+
+        What is no header is left out.
+        """
         found = []
         for received in self.take():
             header = read_header(received.data)
@@ -104,7 +107,7 @@ class HeaderSubscription(Subscription):
 
 
 def read_header(data: bytes) -> tuple[str, int] | None:
-    """Return the frame and the stamp in nanoseconds with which a message begins, or None if it does not."""
+    """Return a message's frame and stamp in nanoseconds, or None without a header."""
     if len(data) < _NAME_AT or data[:2] not in {LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]}:
         return None
     seconds, nanoseconds, length = struct.unpack_from("<iII" if data[1] else ">iII", data, 4)

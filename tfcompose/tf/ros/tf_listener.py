@@ -41,7 +41,10 @@ _numbers = count(1)
 
 
 class Topic(NamedTuple):
-    """What is listened to: fixed edges or moving ones; ``qos`` is rclpy's profile, a depth, or None for tf2's."""
+    """What is listened to: fixed edges or moving ones.
+
+    ``qos`` is rclpy's profile, a depth, or None for tf2's.
+    """
 
     name: str
     static: bool
@@ -54,7 +57,9 @@ class Topic(NamedTuple):
 
 
 class NodeListener:
-    """Subscriptions in a node that is handed over; its executor calls ``on_message``, or ``poll`` does.
+    """Subscriptions in a node that is handed over.
+
+    Its executor calls ``on_message``, or ``poll`` does.
 
     With ``spin`` an executor in a thread of its own spins the whole node, as tf2_ros's listener
     does.
@@ -76,7 +81,10 @@ class NodeListener:
             self._thread.start()
 
     def poll(self) -> None:
-        """Take what has come and wait for nothing; for a caller who keeps the executor from doing it."""
+        """Take what has come and wait for nothing.
+
+        For a caller who keeps the executor from doing it.
+        """
         for subscription, static in self._subscriptions:
             with suppress(_rclpy.InvalidHandle), subscription.handle:
                 while (
@@ -110,7 +118,7 @@ class NodeListener:
 
 
 class ThreadListener:
-    """A node of its own, in a context of its own, with a thread that waits for messages and calls ``on_message``.
+    """A node in its own context, with a thread that calls ``on_message``.
 
     With ``use_sim_time`` the node's clock follows /clock.
 
@@ -158,7 +166,7 @@ class ThreadListener:
                     self._on_message(received.data, static)
 
     def _follow(self) -> None:
-        """Set the node's clock to the simulated time, so that its watchers are notified of jumps."""
+        """Set the node's clock to simulated time, which notifies watchers of jumps."""
         now_ns = self._clock.now_ns() if self._clock else None
         if now_ns is not None:
             clock: Any = self.node.get_clock()
@@ -168,7 +176,9 @@ class ThreadListener:
 
 
 def on_clock_jump(node: Node, callback: Callable[[], object]) -> Any:
-    """Call back when the node's clock goes back, or becomes a simulator's or the system's; while the result lives.
+    """Call back when the node's clock goes back, or becomes a simulator's or the system's.
+
+    While the result lives.
 
     The threshold is that of tf2_ros's ``Buffer`` in C++: any step back counts, and none forward.
     """
@@ -192,7 +202,10 @@ def on_clock_jump(node: Node, callback: Callable[[], object]) -> Any:
 
 
 def offer_frames(node: Node, text: Callable[[], str]) -> Any:
-    """Offer the service ``tf2_frames``, which answers with the text; return it, or None where there is no tf2_msgs."""
+    """Offer the service ``tf2_frames``, which answers with the text.
+
+    Return it, or None where there is no tf2_msgs.
+    """
     if find_spec("tf2_msgs") is None:
         return None
     from tf2_msgs.srv import FrameGraph  # noqa: PLC0415 (there is none with the wheels from PyPI)

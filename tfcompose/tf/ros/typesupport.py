@@ -1,4 +1,6 @@
-"""The type of TFMessage for rclpy: the installed ``tf2_msgs``, or an own type support where there is none.
+"""The type of TFMessage for rclpy.
+
+The installed ``tf2_msgs``, or an own type support where there is none.
 
 PyPI has rclpy and geometry_msgs but no tf2_msgs, and a type support is normally compiled.
 tfcompose publishes and takes finished bytes only, and for that rclpy and rmw_fastrtps_cpp need no
@@ -71,7 +73,10 @@ class TypeSupport(ctypes.Structure):
 
 
 class Callbacks(ctypes.Structure):
-    """rosidl_typesupport_fastrtps_cpp's message_type_support_callbacks_t; C++ namespace and name come first."""
+    """rosidl_typesupport_fastrtps_cpp's message_type_support_callbacks_t.
+
+    C++ namespace and name come first.
+    """
 
     _fields_ = (
         ("namespace", ctypes.c_char_p),
@@ -196,7 +201,9 @@ class Description(ctypes.Structure):
 
 @cache
 def tf_message_type() -> Any:
-    """Return the class to give rclpy for ``tf2_msgs/msg/TFMessage``; only its bytes can be published and taken.
+    """Return the class to give rclpy for ``tf2_msgs/msg/TFMessage``.
+
+    Only its bytes can be published and taken.
 
     Raises:
         RosError: if tf2_msgs is not installed and ROS is not as the own type support needs it.
@@ -302,7 +309,7 @@ def _getter(structure: ctypes.Structure) -> Any:
 
 
 def _stamped() -> int:
-    """Return the address of TransformStamped's type support, after looking whether it is laid out as expected.
+    """Return the address of TransformStamped's type support, after a layout check.
 
     It is taken as ``geometry_msgs.msg`` takes it, but without that, which imports numpy for its
     covariances.
@@ -364,7 +371,10 @@ def _message_class(support: TypeSupport, alive: list[Any]) -> Any:
 
 
 def type_hash(description: dict[str, Any]) -> str:
-    """Return the RIHS01 hash of a type description without default values: SHA-256 of its JSON (REP-2016)."""
+    """Return the RIHS01 hash of a type description without default values.
+
+    SHA-256 of its JSON (REP-2016).
+    """
     return "RIHS01_" + sha256(json.dumps(description).encode()).hexdigest()
 
 
@@ -392,14 +402,17 @@ def hash_text(type_support: int) -> str:
 
 
 def capsule_address(capsule: object) -> int:
-    """Return the address in one of the capsules without a name that rosidl's Python classes carry."""
+    """Return the address in an unnamed capsule of rosidl's Python classes."""
     get = ctypes.pythonapi.PyCapsule_GetPointer
     get.restype, get.argtypes = Pointer, (ctypes.py_object, ctypes.c_char_p)
     return int(get(capsule, None))
 
 
 def description_of(support: TypeSupport, address: int) -> Description:
-    """Return the description that a type support at that address gives; a ValueError if it gives none."""
+    """Return the description that a type support at that address gives.
+
+    A ValueError if it gives none.
+    """
     where = Getter(support.get_description)(address)
     if not where:
         raise ValueError("a type without a description")

@@ -73,7 +73,10 @@ class TokenOfPublisher:
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """What comes with a message: the publisher's count, when it was sent, and the publisher's id, 16 bytes."""
+    """What comes with a message.
+
+    The publisher's count, when it was sent, and the publisher's id, 16 bytes.
+    """
 
     sequence: int
     source_ns: int
@@ -96,7 +99,10 @@ def gid_of_token(token: str) -> bytes:
 
 
 def publisher_of(token: str) -> TokenOfPublisher | None:
-    """Return the publisher that declared the token; None where it is of something else, or of no release known."""
+    """Return the publisher that declared the token.
+
+    None where it is of something else, or of no release known.
+    """
     parts = token.split("/")
     if len(parts) < _PARTS or parts[0] != _SPACE or parts[5] != _PUBLISHER:
         return None
@@ -126,7 +132,9 @@ def attachment_of(data: bytes) -> Attachment | None:
 
 
 def open_session(environment: Mapping[str, str]) -> zenoh.Session:
-    """Return a session that reaches the robot's router, as a client; close it, or Python does not end.
+    """Return a session that reaches the robot's router, as a client.
+
+    Close it, or Python does not end.
 
     The environment's variables count as for rmw_zenoh's own sessions, but for the mode: a router
     passes on to clients what peers send to each other.
@@ -173,7 +181,10 @@ class ZenohGraph:
         return sorted(found, key=lambda one: (one.node, one.gid))
 
     def node_of(self, gid: bytes) -> str | None:
-        """Return the full name of the node whose publisher has this id; None while it is not known."""
+        """Return the full name of the node whose publisher has this id.
+
+        None while it is not known.
+        """
         with self._lock:
             self._take()
             return next((one.node for one in self._publishers.values() if one.gid == gid), None)
@@ -192,7 +203,10 @@ class ZenohGraph:
 
 
 class ZenohTF:
-    """Messages on a pair of TF topics (moving, fixed), each with who sent it; latched ones come at once."""
+    """Messages on a pair of TF topics (moving, fixed), each with who sent it.
+
+    Latched ones come at once.
+    """
 
     def __init__(self, session: zenoh.Session, domain: int, topics: tuple[str, str]) -> None:
         self._waiting: deque[ZenohMessage] = deque(maxlen=_MOST_WAITING)
@@ -238,7 +252,7 @@ def domain_of(environment: Mapping[str, str]) -> int:
 
 
 class RobotGraph:
-    """The graph of this process's own domain, over a session of its own, which is opened at the first question."""
+    """The graph of this process's domain, over a session opened on first use."""
 
     def __init__(self) -> None:
         self._session: Any = open_session(os.environ)

@@ -1,4 +1,7 @@
-"""Many poses and points at once: trajectories, arrays of points and PointCloud2. This module needs numpy."""
+"""Many poses and points at once: trajectories, arrays of points and PointCloud2.
+
+This module needs numpy.
+"""
 
 from __future__ import annotations
 
@@ -40,13 +43,19 @@ _FIELD_TYPES = {7: "f4", 8: "f8"}
 
 
 class Trajectory(NamedTuple):
-    """N poses of a frame in another: ``xyz`` N×3 in metres, ``quat_xyzw`` N×4, unit quaternions with w ≥ 0."""
+    """N poses of a frame in another.
+
+    ``xyz`` N×3 in metres, ``quat_xyzw`` N×4, unit quaternions with w ≥ 0.
+    """
 
     xyz: Floats
     quat_xyzw: Floats
 
     def matrices(self) -> Floats:
-        """Return the poses as homogeneous matrices, N×4×4: they take coordinates in the source to the target."""
+        """Return the poses as homogeneous matrices, N×4×4.
+
+        They take coordinates in the source to the target.
+        """
         x, y, z, w = self.quat_xyzw.T
         made = np.zeros((len(self.xyz), 4, 4))
         made[:, 0, 0], made[:, 0, 1], made[:, 0, 2] = (
@@ -107,7 +116,7 @@ def lookup_many(
 def _one_by_one(
     buffer: PoseBuffer, target: str, source: str, stamps: Stamps
 ) -> tuple[Trajectory, NDArray[np.bool_]]:
-    """Return the poses where frames change their parents, so that each time may have a chain of its own."""
+    """Return the poses where parents change over time, one chain for each time."""
     known = np.ones(len(stamps), bool)
     found = Trajectory(np.zeros((len(stamps), 3)), np.zeros((len(stamps), 4)))
     for index, stamp_ns in enumerate(stamps.tolist()):
@@ -121,7 +130,10 @@ def _one_by_one(
 
 
 def _at_once(chain: Chain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
-    """Return the poses at those times, and which times all edges know; the poses at others mean nothing."""
+    """Return the poses at those times, and which times all edges know.
+
+    The poses at others mean nothing.
+    """
     known = np.ones(len(stamps), bool)
     found = Trajectory(np.empty((len(stamps), 3)), np.empty((len(stamps), 4)))
     order = None if (stamps[1:] >= stamps[:-1]).all() else np.argsort(stamps, kind="stable")
@@ -171,7 +183,10 @@ def _of_unit_length(pose: tuple[Any, ...], count: int) -> Trajectory:
 
 
 def _poses(cache: TimeCache, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Floats, ...]:
-    """Return the edge's poses at those ascending times, seven arrays, and unset ``known`` where there is none."""
+    """Return the edge's poses at ascending times as seven arrays.
+
+    ``known`` is unset where there is none.
+    """
     count = len(cache)
     at = np.array(cache.stamps)[-count:]
     samples = np.array(cache.poses)[-7 * count :].reshape(count, 7).T.copy()
@@ -226,7 +241,7 @@ def _stretches(at: Stamps, samples: Floats) -> Floats:
 
 
 def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
-    """Return sine and cosine; of small angles by their series, which numpy adds up in a third of the time.
+    """Return sine and cosine, of small angles by a series that is three times faster.
 
     The first term that is left out is below the rounding of a double.
     """
@@ -240,7 +255,7 @@ def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def moved_points(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
-    """Return points in the parent's frame, from points in the child's whose pose in the parent is given.
+    """Return points in the parent's frame from points in the child's.
 
     ``points`` has the shape (…, 3), in metres; the result has it too. float32 and float64 stay
     what they are, other numbers become float64; what is computed is float64. NaN stays NaN.

@@ -1,4 +1,6 @@
-"""tf2_ros's ``TransformBroadcaster`` and ``StaticTransformBroadcaster``: send transforms on /tf and /tf_static.
+"""tf2_ros's ``TransformBroadcaster`` and ``StaticTransformBroadcaster``.
+
+Send transforms on /tf and /tf_static.
 
 They need rclpy, and no tf2_msgs.
 """
@@ -34,7 +36,9 @@ class TransformBroadcaster:
 
 
 class StaticTransformBroadcaster:
-    """Sends transforms of fixed edges, latched: each message has all that were sent so far, so that none gets lost.
+    """Sends transforms of fixed edges, latched.
+
+    Each message has all that were sent so far, so that none gets lost.
 
     As in tf2_ros's Python, the first transform of a child frame stays; one with another parent or
     pose is not sent, and the node's log says so.

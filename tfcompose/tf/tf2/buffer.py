@@ -50,7 +50,9 @@ _POLL_S = 0.005
 
 
 class BufferInterface:
-    """tf2_ros's ``BufferInterface``: whoever can look a transform up can move objects that have a header.
+    """tf2_ros's ``BufferInterface``.
+
+    Whoever can look a transform up can move objects that have a header.
 
     A subclass defines the lookups. ``registration`` says what is done with which type. From the
     start these messages are known: PointStamped, Vector3Stamped, PoseStamped,
@@ -67,7 +69,9 @@ class BufferInterface:
         timeout: Any = 0,
         new_type: type | None = None,
     ) -> Any:
-        """Return an object of the same type in another frame, at the time of its own stamp; or as a ``new_type``.
+        """Return an object of the same type in another frame, at the time of its own stamp.
+
+        Or as a ``new_type``.
 
         Raises:
             TypeException: if its type is not known, or nothing converts it into the new one.
@@ -89,7 +93,7 @@ class BufferInterface:
         timeout: Any = 0,
         new_type: type | None = None,
     ) -> Any:
-        """Return an object in another frame at another time, between which ``fixed_frame`` stands still.
+        """Return an object in another frame at another time, through ``fixed_frame``.
 
         Raises:
             TypeException: as ``transform`` does.
@@ -121,7 +125,10 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Any = 0,
     ) -> Any:
-        """Return the pose of the source frame at one time in the target frame at another: for subclasses to define."""
+        """Return the pose of the source frame at one time in the target frame at another.
+
+        For subclasses to define.
+        """
         raise NotImplementedException
 
     def can_transform(
@@ -180,7 +187,7 @@ class Buffer(BufferCore, BufferInterface):
     # Transforms in.
 
     def follow_clock(self, node: Any) -> None:
-        """Forget all moving edges whenever the node's clock goes back, or changes between the system's and another."""
+        """Forget moving edges whenever the node's clock jumps back or changes its source."""
         # Whoever has a node has ROS.
         from tfcompose.tf.ros.tf_listener import on_clock_jump  # noqa: PLC0415
 
@@ -239,7 +246,10 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Any = 0,
         return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (tf2's)
     ) -> Any:
-        """Return whether ``lookup_transform`` would answer; with ``return_debug_tuple`` also why not."""
+        """Return whether ``lookup_transform`` would answer.
+
+        With ``return_debug_tuple`` also why not.
+        """
         time_ns = nanoseconds(time)
         error = self._error(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
         return (error is None, str(error or "")) if return_debug_tuple else error is None
@@ -254,7 +264,10 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Any = 0,
         return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (the same)
     ) -> Any:
-        """Return whether ``lookup_transform_full`` would answer; with ``return_debug_tuple`` also why not."""
+        """Return whether ``lookup_transform_full`` would answer.
+
+        With ``return_debug_tuple`` also why not.
+        """
         times = nanoseconds(target_time), nanoseconds(source_time)
         error = self._error(
             lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame),
@@ -265,7 +278,7 @@ class Buffer(BufferCore, BufferInterface):
     # Futures and coroutines.
 
     def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Any:
-        """Return a future whose result is what ``lookup_transform`` returns, as soon as there is one."""
+        """Return a future of what ``lookup_transform`` returns."""
         return self._future(lambda: self.lookup_transform(target_frame, source_frame, time))
 
     def wait_for_transform_full_async(
@@ -276,7 +289,7 @@ class Buffer(BufferCore, BufferInterface):
         source_time: Any,
         fixed_frame: str,
     ) -> Any:
-        """Return a future whose result is what ``lookup_transform_full`` returns, as soon as there is one."""
+        """Return a future of what ``lookup_transform_full`` returns."""
         query = target_frame, target_time, source_frame, source_time, fixed_frame
         return self._future(lambda: self.lookup_transform_full(*query))
 
@@ -301,7 +314,9 @@ class Buffer(BufferCore, BufferInterface):
     def transform_points(
         self, cloud: ArrayLike, target: str, source: str, stamp: Any = 0
     ) -> NDArray[Any]:
-        """Return points given in ``source`` in ``target``, at a time (0: the newest common one). Needs numpy.
+        """Return points given in ``source`` in ``target``, at a time (0: the newest common one).
+
+        Needs numpy.
 
         ``cloud`` is N×3, or of any shape (…, 3), in metres; so is the result. float32 stays
         float32.
@@ -348,7 +363,9 @@ class Buffer(BufferCore, BufferInterface):
         return None
 
     def _wait(self, attempt: Callable[[], _Answer], timeout: Any) -> _Answer:
-        """Return the answer as soon as there is one; raise what it raised last when the time is over.
+        """Return the answer as soon as there is one.
+
+        Raise what it raised last when the time is over.
 
         Where a listener has no thread of its own the caller may be the one who would take its
         messages, so they are taken here.
@@ -371,7 +388,9 @@ class Buffer(BufferCore, BufferInterface):
                 poll()
 
     def _future(self, attempt: Callable[[], Any]) -> Any:
-        """Return a future that is done when the attempt succeeds: now, or after something new was taken.
+        """Return a future that is done when the attempt succeeds.
+
+        Now, or after something new was taken.
 
         A frame's name that can never be one ends it with the exception.
         """

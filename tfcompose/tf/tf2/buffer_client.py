@@ -1,4 +1,7 @@
-"""tf2_ros's ``BufferClient``: looks transforms up in a buffer server's buffer. It needs rclpy and tf2_msgs."""
+"""tf2_ros's ``BufferClient``: looks transforms up in a buffer server's buffer.
+
+It needs rclpy and tf2_msgs.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +59,7 @@ class BufferClient(BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0
     ) -> Any:
-        """Return the server's pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
+        """Return the server's pose of ``source_frame`` in ``target_frame`` at a time.
 
         Raises:
             TimeoutException: if there is no server, or it does not answer.

@@ -45,7 +45,9 @@ _COMPACT = 256
 
 
 class TimeCache:
-    """The samples of one child frame, oldest first. A static frame has a single one, valid at any time.
+    """The samples of one child frame, oldest first.
+
+    A static frame has a single one, valid at any time.
 
     ``parent`` is that of the newest sample, and empty where all samples were cleared; ``mixed``
     says that samples have different parents. Of samples with the same stamp only the first and the
@@ -98,7 +100,9 @@ class TimeCache:
         return self.stamps[-1]
 
     def append(self, stamp_ns: int, pose: bytes, cache_ns: int) -> bool:
-        """Take the next sample of a moving edge that has one parent, and return True; else do nothing.
+        """Take the next sample of a moving edge that has one parent, and return True.
+
+        Else do nothing.
 
         ``pose`` is what ``pack_pose`` gives: an array takes it in a third of the time of seven
         numbers.
@@ -114,7 +118,10 @@ class TimeCache:
         return True
 
     def insert(self, stamp_ns: int, parent: str, pose: PoseTuple, cache_ns: int) -> Outcome:
-        """Take a sample, as tf2 does: first drop what is older than ``cache_ns`` before the newest so far."""
+        """Take a sample, as tf2 does.
+
+        First drop what is older than ``cache_ns`` before the newest so far.
+        """
         if self.static:
             return self._replace(stamp_ns, parent, pose)
         stamps = self.stamps
@@ -147,7 +154,7 @@ class TimeCache:
         return x, y, z, qx, qy, qz, qw
 
     def at(self, stamp_ns: int) -> PoseTuple | None:
-        """Return the pose at that time (0: the newest), between two samples of one parent interpolated.
+        """Return the pose at that time (0: newest), interpolated between two samples.
 
         Between samples of two parents the older holds. None: there is no sample before, or none
         after.
@@ -256,7 +263,7 @@ class Chain:
         )
 
     def at(self, stamp_ns: int) -> PoseTuple | None:
-        """Return the pose of the source in the target at that time, or None if an edge has none then."""
+        """Return the source's pose in the target at that time, None if an edge has none."""
         if self.fixed is not None:
             return self.fixed
         pose = None
@@ -271,7 +278,10 @@ class Chain:
         return unit(pose or IDENTITY)
 
     def common_ns(self) -> int:
-        """Return the newest time that all moving edges have reached, in nanoseconds; 0 where none moves, as in tf2."""
+        """Return the newest time that all moving edges have reached, in nanoseconds.
+
+        0 where none moves, as in tf2.
+        """
         return min((cache.stamps[-1] for cache in self.moving if cache.stamps[-1]), default=0)
 
 
@@ -328,7 +338,7 @@ def _meet(
     source: str,
     parent_of: Callable[[TimeCache], str],
 ) -> tuple[list[TimeCache], list[TimeCache], tuple[str, ...]]:
-    """Return the edges from the target up to where the two ways meet, those from the source, and no frames.
+    """Return the edges from target and source to their common ancestor.
 
     Where the ways do not meet, the frames are the two at which they end.
     """
@@ -348,7 +358,7 @@ def _climb(
     goal: Container[str],
     parent_of: Callable[[TimeCache], str],
 ) -> tuple[list[TimeCache], str]:
-    """Return the edges from ``frame`` up to one of the goal, or else as far as there are parents; and that frame."""
+    """Return the edges from ``frame`` to a frame of the goal or the root, and that frame."""
     way: list[TimeCache] = []
     visited = {frame}
     while frame not in goal:

@@ -42,7 +42,10 @@ class BufferCore(PoseBuffer):
     # Transforms in.
 
     def set_transform(self, transform: Any, authority: str = "default_authority") -> None:
-        """Take a TransformStamped of a moving edge; what tf2 would reject is dropped. ``set`` says whether it was."""
+        """Take a TransformStamped of a moving edge; what tf2 would reject is dropped.
+
+        ``set`` says whether it was.
+        """
         self.insert([_row(transform)], static=False, authority=authority)
 
     def set_transform_static(self, transform: Any, authority: str = "default_authority") -> None:
@@ -97,7 +100,10 @@ class BufferCore(PoseBuffer):
         return _possible(lambda: self.lookup_transform_full_core(*query))
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
-        """Return the newest time that all moving edges between the two have reached; 0 where none moves."""
+        """Return the newest time that all moving edges between the two have reached.
+
+        0 where none moves.
+        """
         with self._lock:
             if target_frame == source_frame:
                 self._require(target_frame)
@@ -116,7 +122,9 @@ class BufferCore(PoseBuffer):
         reference_point: Sequence[float] = (0.0, 0.0, 0.0),
         reference_point_frame: str = "",
     ) -> Velocity:
-        """Return how fast one frame moves as seen from another: (``linear`` m/s, ``angular`` rad/s).
+        """Return how fast one frame moves as seen from another.
+
+        (``linear`` m/s, ``angular`` rad/s).
 
         It is the mean over ``averaging_interval`` around a time (0: up to the newest), as far as
         samples go, with the axes of ``reference_frame``, default the observation frame. Linear is
@@ -142,7 +150,10 @@ class BufferCore(PoseBuffer):
     def lookupVelocityCore(  # noqa: N802 (tf2_py's name)
         self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any
     ) -> Velocity:
-        """Return what ``lookup_velocity`` does; but time 0 is the epoch here, as in tf2, and not the newest."""
+        """Return what ``lookup_velocity`` does.
+
+        But time 0 is the epoch here, as in tf2, and not the newest.
+        """
         return self._velocity(
             Moving(tracking_frame, observation_frame), nanoseconds(time), averaging_interval
         )
@@ -157,7 +168,10 @@ class BufferCore(PoseBuffer):
         time: Any,
         averaging_interval: Any,
     ) -> Velocity:
-        """Return what ``lookup_velocity`` does; but time 0 is the epoch here, as in tf2, and not the newest."""
+        """Return what ``lookup_velocity`` does.
+
+        But time 0 is the epoch here, as in tf2, and not the newest.
+        """
         moving = Moving(
             tracking_frame,
             observation_frame,
@@ -193,11 +207,11 @@ class BufferCore(PoseBuffer):
         )
 
     def all_frames_as_yaml(self) -> str:
-        """Return each edge with its rate and times, as tf2's ``tf2_frames`` service gives view_frames."""
+        """Return each edge's rate and times, as tf2's ``tf2_frames`` service does."""
         return "".join(map(_yaml, _edges(self.all_frames()))) or "[]"
 
     def _allFramesAsDot(self, time: Any = 0) -> str:  # noqa: ARG002, N802 (tf2_py's name)
-        """Return the edges as a graph for graphviz, each with who sent it, its rate and its times."""
+        """Return the edges as graphviz text with sender, rate and times."""
         return f"digraph G {{\n{''.join(map(_dot, _edges(self.all_frames())))}}}"
 
     def _frameExists(self, frame_id: str) -> bool:  # noqa: N802 (tf2_py's name)
@@ -216,7 +230,7 @@ class BufferCore(PoseBuffer):
         source_time: Any,
         fixed_frame: str,
     ) -> list[str]:
-        """Return the children of the edges from the source to the fixed frame, then of those on to the target.
+        """Return the children of the edges from the source to the fixed frame and the target.
 
         Where both times are the same, tf2 gives the way to the fixed frame alone, and so does
         this.

@@ -1,4 +1,6 @@
-"""Why there is no transform, or why one was not taken: tf2's exceptions and rejections, and what they say.
+"""Why there is no transform, or why one was not taken.
+
+Tf2's exceptions and rejections, and what they say.
 
 The exceptions have tf2's names and hierarchy. Their messages name the edge that is missing, or say
 by how many milliseconds a time is too early or too late.
@@ -35,11 +37,11 @@ class ConnectivityException(TransformException):
 
 
 class ExtrapolationException(TransformException):
-    """Raised when an edge between two frames has no sample before, or none after, the requested time."""
+    """Raised when an edge has no sample before, or after, the requested time."""
 
 
 class InvalidArgumentException(TransformException):
-    """Raised when a frame's name is empty or starts with a slash, or a message cannot be transformed."""
+    """Raised for empty frame names, leading slashes and untransformable messages."""
 
 
 class TimeoutException(TransformException):
@@ -47,7 +49,10 @@ class TimeoutException(TransformException):
 
 
 class TypeException(Exception):
-    """Raised when a message of that type cannot be transformed; as in tf2 it is no TransformException."""
+    """Raised when a message of that type cannot be transformed.
+
+    As in tf2 it is no TransformException.
+    """
 
 
 class NotImplementedException(Exception):
@@ -86,7 +91,10 @@ _REJECTIONS = {
 
 
 def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
-    """Return why tf2 does not take a transform, whatever came before it; the first reason that holds, as in tf2."""
+    """Return why tf2 does not take a transform, whatever came before it.
+
+    The first reason that holds, as in tf2.
+    """
     if parent == child:
         return Rejection.SELF
     if not child:
@@ -150,7 +158,10 @@ def two_trees(known: Collection[str], a: str, b: str, top_a: str, top_b: str) ->
 
 
 def loop(frame: str, children: Sequence[str]) -> str:
-    """Return the loop that begins and ends at ``frame``; ``children`` are the frames on the way up."""
+    """Return the loop that begins and ends at ``frame``.
+
+    ``children`` are the frames on the way up.
+    """
     around = children[children.index(frame) :]
     return f"the live tree has a loop: {' → '.join([frame, *reversed(around)])}"
 

@@ -1,4 +1,7 @@
-"""tf2_ros's ``TransformListener``: fills a buffer with what comes on /tf and /tf_static. It needs rclpy."""
+"""tf2_ros's ``TransformListener``: fills a buffer with what comes on /tf and /tf_static.
+
+It needs rclpy.
+"""
 
 from __future__ import annotations
 
@@ -89,7 +92,10 @@ class TransformListener:
         self.close()
 
     def close(self) -> None:
-        """End the subscriptions, and the listener's own thread and node; the buffer keeps what it has."""
+        """End the subscriptions, and the listener's own thread and node.
+
+        The buffer keeps what it has.
+        """
         poll = getattr(self._ros, "poll", None)
         if poll in self.buffer.pollers:
             self.buffer.pollers.remove(poll)

@@ -1,4 +1,6 @@
-"""Messages in and out of a buffer: times, TransformStamped, and what moves other messages to another frame.
+"""Messages in and out of a buffer.
+
+Times, TransformStamped, and what moves other messages to another frame.
 
 A program that has loaded ROS's geometry_msgs gets its ``TransformStamped``, which it may publish;
 any other gets the classes of this module, which have the same fields. Times are what has
@@ -145,7 +147,10 @@ def _plain_message(target: str, source: str, stamp_ns: int, pose: PoseTuple) -> 
 
 
 def _ros_maker() -> Maker:
-    """Return what makes ROS's message: by its fields directly, if that gives the same as by its constructor."""
+    """Return what makes ROS's message.
+
+    By its fields directly, if that gives the same as by its constructor.
+    """
     slow = _by_constructor()
     try:
         fast = _by_fields()
@@ -171,7 +176,7 @@ def _by_constructor() -> Maker:
 
 
 def _by_fields() -> Maker:
-    """Return a maker that sets the fields of rosidl's Python classes (Jazzy) without their default values first."""
+    """Return a maker of rosidl's Python messages (Jazzy) that skips default values."""
     module = sys.modules["geometry_msgs.msg"]
     empty = module.TransformStamped()
     classes: tuple[Any, Any, Any] = (type(empty), type(empty.header), type(empty.header.stamp))
@@ -222,7 +227,10 @@ def do_transform_vector3(vector: Any, transform: Any) -> Any:
 
 
 def do_transform_pose(pose: Any, transform: Any) -> Any:
-    """Return a Pose, which has no header, in the transform's frame; a quaternion of zeros counts as no rotation."""
+    """Return a Pose, which has no header, in the transform's frame.
+
+    A quaternion of zeros counts as no rotation.
+    """
     moved = deepcopy(pose)
     at, rotation = moved.position, moved.orientation
     length = hypot(rotation.x, rotation.y, rotation.z, rotation.w)
@@ -246,7 +254,10 @@ def do_transform_pose_stamped(pose: Any, transform: Any) -> Any:
 
 
 def do_transform_pose_with_covariance_stamped(pose: Any, transform: Any) -> Any:
-    """Return a PoseWithCovarianceStamped in the transform's frame; the covariances' axes are turned along."""
+    """Return a PoseWithCovarianceStamped in the transform's frame.
+
+    The covariances' axes are turned along.
+    """
     moved = _headed(pose, transform)
     moved.pose.pose = do_transform_pose(pose.pose.pose, transform)
     moved.pose.covariance = transform_covariance(pose.pose.covariance, transform)
@@ -254,7 +265,7 @@ def do_transform_pose_with_covariance_stamped(pose: Any, transform: Any) -> Any:
 
 
 def transform_covariance(covariance: Sequence[float], transform: Any) -> list[float]:
-    """Return a 6×6 covariance (x y z and the three rotations; 36 numbers by rows) with its axes turned: R·C·Rᵀ.
+    """Return a 6×6 covariance (36 numbers by rows) with its axes rotated: R·C·Rᵀ.
 
     Each of its four 3×3 blocks is turned by itself.
     """
@@ -277,7 +288,7 @@ def transform_covariance(covariance: Sequence[float], transform: Any) -> list[fl
 
 
 def transform_points(point_cloud: ArrayLike, transform: Any) -> NDArray[Any]:
-    """Return points, N×3 in metres, moved by a Transform or a TransformStamped, as tf2_sensor_msgs does. Needs numpy.
+    """Return points, N×3 in m, moved by a transform, as tf2_sensor_msgs does. Needs numpy.
 
     Raises:
         InvalidArgumentException: if the last dimension is not 3.
@@ -300,7 +311,9 @@ def do_transform_polygon_stamped(polygon: Any, transform: Any) -> Any:
 
 
 def do_transform_cloud(cloud: Any, transform: Any) -> Any:
-    """Return a PointCloud2 in the transform's frame: x, y and z are moved, every other byte is as it was.
+    """Return a PointCloud2 in the transform's frame.
+
+    X, y and z are moved, every other byte is as it was.
 
     The fields may have any order, offsets, padding and byte order, and be float32 or float64; the
     cloud may be organised and hold NaN. The time stays the cloud's. Needs numpy.
@@ -350,7 +363,10 @@ def pose_of(transform: Any) -> PoseTuple:
 
 
 def _copied_with_header(headed: Any, stamp: Any) -> Any:
-    """Return a copy of a message or header whose stamp is given; rclpy's ``Time`` cannot be copied, nor changed."""
+    """Return a copy of a message or header whose stamp is given.
+
+    Rclpy's ``Time`` cannot be copied, nor changed.
+    """
     return deepcopy(headed, {} if hasattr(stamp, "sec") else {id(stamp): stamp})
 
 
@@ -372,12 +388,18 @@ def _headed(message: Any, transform: Any) -> Any:
 
 
 class TransformRegistration:
-    """The functions that move objects of a type; messages that are known from the start go by their type's name."""
+    """The functions that move objects of a type.
+
+    Messages that are known from the start go by their type's name.
+    """
 
     _moves: ClassVar[dict[type, Move]] = {}
 
     def add(self, key: type, callback: Move) -> None:
-        """Let ``Buffer.transform`` move objects of a type: ``callback(object, transform)`` returns the moved one."""
+        """Let ``Buffer.transform`` move objects of a type.
+
+        ``callback(object, transform)`` returns the moved one.
+        """
         self._moves[key] = callback
 
     def get(self, key: type) -> Move:
@@ -400,7 +422,10 @@ class TransformRegistration:
 
 
 class ConvertRegistration:
-    """The functions that turn objects of one type into another: directly, or by way of a message."""
+    """The functions that turn objects of one type into another.
+
+    Directly, or by way of a message.
+    """
 
     _to_msg: ClassVar[dict[type, Conversion]] = {}
     _from_msg: ClassVar[dict[type, Conversion]] = {}
@@ -446,7 +471,9 @@ class ConvertRegistration:
 
 
 def convert(a: Any, b_type: type) -> Any:
-    """Return an object as one of another type: directly, as a copy of itself, or by way of a message.
+    """Return an object as one of another type.
+
+    Directly, as a copy of itself, or by way of a message.
 
     Raises:
         TypeException: if nothing is registered that does it.

@@ -1,4 +1,6 @@
-"""The buffer without messages: takes transforms as plain numbers, and answers where one frame is in another.
+"""The buffer without messages.
+
+Takes transforms as plain numbers, and answers where one frame is in another.
 
 Frames are names, times are integer nanoseconds since the epoch, poses are
 ``tfcompose.foundation.geometry.Pose``.
@@ -49,7 +51,9 @@ Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class FrameInfo:
-    """A frame's edge to its parent; ``parent`` is empty for a root, and for a moving frame after ``clear``.
+    """A frame's edge to its parent.
+
+    ``parent`` is empty for a root, and for a moving frame after ``clear``.
 
     Times are in nanoseconds since the epoch, and 0 for a fixed edge, which is good at any time;
     ``samples`` counts what is kept.
@@ -65,7 +69,9 @@ class FrameInfo:
 
 
 class PoseBuffer:
-    """Takes transforms and answers where one frame is in another; safe to use from several threads.
+    """Takes transforms and answers where one frame is in another.
+
+    Safe to use from several threads.
 
     Args:
         cache_ns: how long samples are kept, in nanoseconds before the newest of their edge.
@@ -167,7 +173,7 @@ class PoseBuffer:
         return None
 
     def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:
-        """Return the pose of ``source`` in ``target`` at a time, and that time, both in nanoseconds since the epoch.
+        """Return the pose of ``source`` in ``target`` at a time, and that time, in ns.
 
         Time 0 is the newest that all moving edges between them have reached; where none moves it
         stays 0. The quaternion's w is not negative. A frame in itself is the identity, whether it
@@ -183,12 +189,15 @@ class PoseBuffer:
         return Pose((x, y, z), (quat[0], quat[1], quat[2], quat[3])), stamp_ns
 
     def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
-        """Return what ``lookup`` does for time 0; the time is None where only fixed edges are between the two."""
+        """Return what ``lookup`` does for time 0.
+
+        The time is None where only fixed edges are between the two.
+        """
         pose, stamp_ns = self.lookup(target, source)
         return pose, stamp_ns or None
 
     def behind(self, target: str, source: str) -> str | None:
-        """Return the moving edge between the two whose newest sample is the oldest, as "parent → child", or None.
+        """Return the moving edge with the oldest newest sample, as "parent → child", or None.
 
         Raises:
             LookupException: if a frame is not known.
@@ -228,7 +237,7 @@ class PoseBuffer:
         return self._lock
 
     def chain_for_all_times(self, target: str, source: str) -> Chain | None:
-        """Return the chain between two frames, or None where a frame has had several parents within the cache.
+        """Return the chain between two frames, None if a frame changed its parent.
 
         Raises:
             LookupException, ConnectivityException, InvalidArgumentException: as ``lookup`` for
@@ -264,7 +273,7 @@ class PoseBuffer:
     def _full_pose(
         self, target: str, target_ns: int, source: str, source_ns: int, fixed: str
     ) -> tuple[PoseTuple, int]:
-        """Return the pose of the source at one time in the target at another, and that of the target."""
+        """Return the source at one time in the target at another, and the target's motion."""
         with self._lock:
             for frame in (target, source, fixed):
                 self._require(frame)
@@ -273,7 +282,10 @@ class PoseBuffer:
         return unit(product(second, first)), stamp_ns
 
     def _pose_at(self, target: str, source: str, stamp_ns: int) -> PoseTuple:
-        """Return the pose by the parents of that time; in a loop of frames the other way round may be the one."""
+        """Return the pose by the parents of that time.
+
+        In a loop of frames the other way round may be the one.
+        """
         pose = chain_at(self._caches, target, source, stamp_ns).at(stamp_ns)
         if pose is None:
             raise ExtrapolationException(
@@ -282,7 +294,10 @@ class PoseBuffer:
         return pose
 
     def _chain_between(self, target: str, source: str, stamp_ns: int = 0) -> Chain:
-        """Return the chain between the two; the one by newest parents, if there is any, is remembered."""
+        """Return the chain between the two.
+
+        The one by newest parents, if there is any, is remembered.
+        """
         self._require(target)
         self._require(source)
         try:
@@ -303,7 +318,7 @@ class PoseBuffer:
             raise LookupException(exceptions.UnknownFrame(frame, self._names))
 
     def _new_cache(self, child: str, *, static: bool) -> TimeCache:
-        """Return the samples of a frame that is new, or fixed from now on, or moving from now on."""
+        """Return the samples of a frame that is new, or becomes fixed or moving."""
         cache = self._caches[child] = TimeCache(child, static=static)
         return cache
 

@@ -1,4 +1,6 @@
-"""Poses as seven plain numbers, for what is computed many times a second: x y z in metres, quaternion x y z w.
+"""Poses as seven plain numbers, for what is computed many times a second.
+
+X y z in metres, quaternion x y z w.
 
 ``tfcompose.foundation.geometry.Pose`` is the same arithmetic with a type; it normalises
 quaternions at every step, this module only at the end. The functions take numpy arrays for the
@@ -61,7 +63,10 @@ def inverse(a: PoseTuple) -> PoseTuple:
 
 
 def unit(a: PoseTuple) -> PoseTuple:
-    """Return the pose with a quaternion of length 1 and w ≥ 0; of the two for one rotation this is the shorter turn."""
+    """Return the pose with a quaternion of length 1 and w ≥ 0.
+
+    Of the two for one rotation this is the shorter turn.
+    """
     x, y, z, qx, qy, qz, qw = a
     squared = qx * qx + qy * qy + qz * qz + qw * qw
     if qw >= 0 and -4e-16 < squared - 1.0 < 4e-16:  # noqa: PLR2004 (the rounding of the sum)
@@ -71,7 +76,7 @@ def unit(a: PoseTuple) -> PoseTuple:
 
 
 def between(two: Sequence[float], part: float) -> PoseTuple:
-    """Return the pose that is ``part`` (0 to 1) of the way from the first to the second of two, 14 numbers.
+    """Return the pose at ``part`` (0 to 1) of the way between two, 14 numbers.
 
     Positions go straight and rotations on the great circle, the short way (Shoemake, 1985), as in
     tf2.

@@ -1,4 +1,6 @@
-"""Rotations as Euler angles, quaternions and matrices: the functions of tf_transformations. This module needs numpy.
+"""Rotations as Euler angles, quaternions and matrices: the functions of tf_transformations.
+
+This module needs numpy.
 
 ``from tfcompose.tf.tf2 import transformations as tf_transformations`` is what a program changes.
 Quaternions are x y z w, angles in radians, matrices homogeneous, 4×4. ``axes`` names an order of
@@ -143,7 +145,10 @@ def quaternion_inverse(quaternion: Numbers) -> Floats:
 def quaternion_slerp(
     quat0: Numbers, quat1: Numbers, fraction: float, spin: int = 0, shortestpath: bool = True  # noqa: FBT001, FBT002 (tf_transformations')
 ) -> Floats:  # fmt: skip
-    """Return the rotation at a fraction, 0 to 1, of the way from one to another; ``spin`` adds half rotations."""
+    """Return the rotation at a fraction, 0 to 1, of the way from one to another.
+
+    ``spin`` adds half rotations.
+    """
     begin, end = unit_vector(quat0), unit_vector(quat1)
     if fraction in {0.0, 1.0}:
         return end if fraction else begin

@@ -1,4 +1,7 @@
-"""How fast one frame moves as seen from another: the mean over some time, from the poses at its two ends."""
+"""How fast one frame moves as seen from another.
+
+The mean over some time, from the poses at its two ends.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ class Velocity(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Whose velocity it is, seen from where, in the axes of which frame, and of which point that moves along."""
+    """A velocity's subject, observer, axes, and the point that moves along."""
 
     tracking_frame: str
     observation_frame: str
@@ -41,7 +44,9 @@ class Moving(NamedTuple):
 def mean_velocity(
     pose_of: PoseOf, moving: Moving, begin_ns: int, end_ns: int, at_ns: int
 ) -> Velocity:
-    """Return the mean velocity from ``begin_ns`` to ``end_ns``, with the axes and the point of ``at_ns`` (0: newest).
+    """Return the mean velocity from ``begin_ns`` to ``end_ns``.
+
+    Axes and point are those at ``at_ns`` (0: newest).
 
     What would begin before 10 µs since the epoch begins there, and is the mean over the shorter
     time.
@@ -64,7 +69,7 @@ def mean_velocity(
 
 
 def _angular_velocity(first: PoseTuple, last: PoseTuple, seconds: float) -> Three:
-    """Return the angular velocity that rotates the first into the last the short way, in their parent's axes."""
+    """Return the angular velocity of the short rotation from first to last, parent's axes."""
     ax, ay, az, aw = first[3:]
     *_, x, y, z, w = product((0.0, 0.0, 0.0, *last[3:]), (0.0, 0.0, 0.0, -ax, -ay, -az, aw))
     length = sqrt(x * x + y * y + z * z)

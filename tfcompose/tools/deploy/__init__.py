@@ -1,4 +1,6 @@
-"""Releases of a robot on its computers: carried there by ssh, started and kept by systemd, judged by tfcompose there.
+"""Releases of a robot on its computers.
+
+Carried there by ssh, started and kept by systemd, judged by tfcompose there.
 
 Each host runs one unit for each robot, ``tfcompose up plan.json --host NAME``, and not one for
 each process, as ``export systemd`` writes them. Only then is there a launcher on the host: it

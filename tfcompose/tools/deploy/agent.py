@@ -104,7 +104,7 @@ class Agent:
     # What is asked before anything changes.
 
     def probe(self) -> dict[str, Any]:
-        """Return what the host has: Python, tfcompose, the environment of setup files, systemd, where it is."""
+        """Return the host's Python, tfcompose, environment, systemd and folders."""
         found: dict[str, Any] = {
             "tfcompose": None,
             "executable": sys.executable,
@@ -146,7 +146,7 @@ class Agent:
         return time.time()
 
     def state(self) -> dict[str, Any]:
-        """Return what is there: the releases, the current one's files by their digests, the unit, and what runs.
+        """Return the releases, the current one's digests, the unit, and what runs.
 
         ``unsettled`` says that somebody's trial was never ended: what runs is not the current
         release.
@@ -171,7 +171,10 @@ class Agent:
         }
 
     def texts(self, paths: list[str], *, any_size: bool = False) -> dict[str, str | None]:
-        """Return the texts of files of the current release; None for one that is absent, no text, or too large."""
+        """Return the texts of files of the current release.
+
+        None for one that is absent, no text, or too large.
+        """
         return {
             path: _text(self.base / "current" / path, None if any_size else MOST_TEXT)
             for path in paths
@@ -256,7 +259,7 @@ class Agent:
             self._must("stop", self.unit)
 
     def start(self, release: str) -> None:
-        """Start a release on trial: by a drop-in beside the unit of the release before, or else by its own unit."""
+        """Start a release on trial, by a drop-in of the old unit or its own unit."""
         self.running = folder = self.base / "releases" / release
         unit = self._unit_of(release).replace(f"{self.base}/current/", f"{folder}/")
         if (self.units / self.unit).is_file():
@@ -290,7 +293,9 @@ class Agent:
             return f"started anew: {error}"
 
     def _followed(self, release: str, host: str) -> str:
-        """Let the launcher follow a release; files that are not built are the same, and where they were.
+        """Let the launcher follow a release.
+
+        Files that are not built are the same, and where they were.
 
         Raises:
             HostError: if it does not.
@@ -329,7 +334,7 @@ class Agent:
         return self._status(self._shown())
 
     def _status(self, shown: dict[str, str]) -> dict[str, Any]:
-        """Return what the launcher says, None where none answers, and, where the unit has failed, its last lines."""
+        """Return the launcher's answer, or None and a failed unit's last lines."""
         done = self._tfcompose(["ps", "--format", "json", "--robot", self.name], PROGRAM_S)
         try:
             robots = json.loads(done.stdout)
@@ -368,7 +373,9 @@ class Agent:
         self.trial = None
 
     def back(self) -> dict[str, Any] | None:
-        """Return to the release before the trial, which runs again if it ran; also after ``commit``.
+        """Return to the release before the trial, which runs again if it ran.
+
+        Also after ``commit``.
 
         None where nothing is on trial.
         """
@@ -405,7 +412,10 @@ class Agent:
     # Everything else.
 
     def execute(self, words: list[str]) -> None:
-        """Become tfcompose with these words, where the robot runs: under the user's systemd, or the system's."""
+        """Become tfcompose with these words, where the robot runs.
+
+        Under the user's systemd, or the system's.
+        """
         system = (
             Path("/etc/systemd/system", self.unit).is_file()
             and not (self.units / self.unit).is_file()
@@ -473,7 +483,10 @@ class Agent:
         return self._program([*self._start(python), *words], seconds)
 
     def _environment(self) -> dict[str, str]:
-        """Return the environment in which the run is found: that of the unit, where it differs from a login's."""
+        """Return the environment in which the run is found.
+
+        That of the unit, where it differs from a login's.
+        """
         if not self.system:
             return dict(os.environ)
         return {
@@ -516,7 +529,10 @@ class Agent:
             return None
 
     def _manifest(self, release: str | None) -> dict[str, str]:
-        """Return the digests of the files of a release, by their paths; not those of what was installed of wheels."""
+        """Return the digests of the files of a release, by their paths.
+
+        Not those of what was installed of wheels.
+        """
         if release is None:
             return {}
         folder = self.base / "releases" / release
@@ -529,7 +545,10 @@ class Agent:
         }
 
     def _launched_from(self) -> Path | None:
-        """Return the folder of the plan that the running launcher was started with: it is given files below it."""
+        """Return the folder of the plan that the running launcher was started with.
+
+        It is given files below it.
+        """
         pid = self._shown().get("MainPID") or "0"
         try:
             words = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")

@@ -1,4 +1,4 @@
-"""``--all-hosts``: a command on every host of a robot, by ssh, and what it prints there, as one."""
+"""``--all-hosts``: run a command on every host over ssh and print the results together."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 def run_on_all_hosts(
     arguments: Namespace, command: str, *words: str, processes: Sequence[str] = ()
 ) -> int:
-    """Run the command with these words on every host, and print what it prints there; return the worst exit code.
+    """Run the command with these words on every host, and print what it prints there.
+
+    Return the worst exit code.
 
     With ``processes`` it is about these, and goes only to hosts that run any of them. Lines have
     their host before them. Objects of ``--format json`` have it as a key; ``ps`` gives one list.
@@ -49,7 +51,10 @@ def run_on_all_hosts(
 
 
 def _of_host(plan: Plan, host: str, processes: Sequence[str]) -> list[str]:
-    """Return those of the processes that a host may know; it knows what is unknown here, and says so."""
+    """Return those of the processes that a host may know.
+
+    It knows what is unknown here, and says so.
+    """
     elsewhere = {process.name for process in plan.processes if process.host not in (None, host)}
     return [name for name in processes if name not in elsewhere]
 

@@ -72,7 +72,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Deploy; exit code 0, 1 if it failed or --check found a change, 2 where something cannot be read."""
+    """Deploy; exit code 0, 1 on failure or a difference with --check, 2 if unreadable."""
     from importlib.util import find_spec
 
     from tfcompose.cli.compiling import compiled_without_errors
@@ -145,7 +145,10 @@ def _report(line: str) -> None:
 
 
 def _unchanged(rollout: Rollout) -> int:
-    """Say that the hosts have the release already, and what is not live there; exit code 1 in that case."""
+    """Say that the hosts have the release already, and what is not live there.
+
+    Exit code 1 in that case.
+    """
     print(f"nothing to change: {rollout.described()}")
     found = rollout.not_live()
     print_findings(found, sys.stderr)

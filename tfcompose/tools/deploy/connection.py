@@ -54,7 +54,10 @@ class Settings:
 
 
 def agent_command(python: str) -> str:
-    """Return the shell's command that starts the agent; it takes no module from a user's folder."""
+    """Return the shell's command that starts the agent.
+
+    It takes no module from a user's folder.
+    """
     word = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
     return f"exec {word} -I -c {shlex.quote(START)}"
 
@@ -134,7 +137,10 @@ class Host:
         return None
 
     async def clock_offset_s(self) -> float:
-        """Return by how much the host's clock is ahead of this one, in seconds: that of the quickest answer."""
+        """Return by how much the host's clock is ahead of this one, in seconds.
+
+        That of the quickest answer.
+        """
         readings: list[tuple[float, float]] = []
         for _ in range(CLOCK_READINGS):
             before = time.time()

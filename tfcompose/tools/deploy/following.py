@@ -1,4 +1,4 @@
-"""Whether launchers that run one plan can follow another, so that only what is different in it starts again."""
+"""Whether launchers of one plan can follow another without a full restart."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def can_follow(before: Plan, after: Plan) -> bool:
-    """Return whether the robot can go on while its hosts change from one plan to the other, one earlier than another.
+    """Return whether the robot can go on while hosts change plans one after another.
 
     It cannot where processes or edges move between hosts, because all have to end first; where
     frames vanish, because buffers of nodes that go on would keep them; where settings of all nodes
@@ -42,7 +42,10 @@ def _places(plan: Plan) -> dict[str, str | None]:
 
 
 def same_files(before: Mapping[str, str], after: Mapping[str, str]) -> bool:
-    """Return whether two releases, by their manifests, differ only in what is built: others' readers are unknown."""
+    """Return whether two releases, by their manifests, differ only in what is built.
+
+    Others' readers are unknown.
+    """
     kinds = (f"{NAMED}/", f"{WHEELS}/")
     named = [
         {path: digest for path, digest in one.items() if path.startswith(kinds)}

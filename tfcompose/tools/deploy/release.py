@@ -1,4 +1,4 @@
-"""A release: the built files of a robot and the files that they name, as they stand in its folder on each host."""
+"""A release: a robot's built files and what they name, in a folder on each host."""
 
 from __future__ import annotations
 
@@ -42,7 +42,9 @@ _WORD = re.compile(rb"[A-Za-z0-9_./ -]+\.[A-Za-z0-9]+")
 
 @dataclass(frozen=True, slots=True)
 class _Packing(Target):
-    """Addresses files by where they are in the release; ``places`` says where that is, by their absolute paths.
+    """Addresses files by where they are in the release.
+
+    ``places`` says where that is, by their absolute paths.
 
     What is not among ``places`` yet is noted there without one.
     """
@@ -50,19 +52,24 @@ class _Packing(Target):
     places: dict[str, str] = field(default_factory=dict)
 
     def address(self, asset: Asset) -> str:
-        """Return the address of a mesh or an image; packages are installed on the hosts by other means."""
+        """Return the address of a mesh or an image.
+
+        Packages are installed on the hosts by other means.
+        """
         is_file = bool(asset.path) and ("://" not in asset.uri or asset.uri.startswith("file://"))
         return self.from_folder(asset.path) if is_file else asset.uri
 
     def from_folder(self, path: str) -> str:
-        """Return the path of the file in the release, seen from the folder of the description that names it."""
+        """Return the file's path in the release, relative to the description that names it."""
         file = posixpath.normpath(posixpath.join(self.top, path))
         return posixpath.relpath(self.places.setdefault(file, NAMED), self.folder)
 
 
 @dataclass(frozen=True)
 class Release:
-    """The files of a release, by their paths in its folder; ``texts`` are built, ``copies`` are where they lie here.
+    """The files of a release, by their paths in its folder.
+
+    ``texts`` are built, ``copies`` are where they lie here.
 
     Its name is made of their content, so that the same content has the same name wherever it was
     built.
@@ -156,7 +163,7 @@ def packed(robot: Robot, wheels: Path | None = None) -> Release:
 
 
 def _with_named(named: Mapping[str, str]) -> list[str]:
-    """Return the files, those in named folders, and those that they name themselves, by absolute paths.
+    """Return the files, those in named folders, and those that they name.
 
     Raises:
         RejectedError: if one is not there, or they are too many.
@@ -200,7 +207,10 @@ def _named_in(path: Path) -> list[str]:
 
 
 def _places(files: list[str], named: Mapping[str, str]) -> dict[str, str]:
-    """Return where files and named folders are in the release: as they are below the folder that has all of them."""
+    """Return where files and named folders are in the release.
+
+    As they are below the folder that has all of them.
+    """
     everything = [*files, *named]
     folders = [posixpath.dirname(file) for file in files] + [
         folder for folder in named if is_folder(folder)

@@ -48,7 +48,7 @@ NAMED_AT_MOST = 8
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What is deployed to: the hosts of a plan by name, with their places in the robot file, and how.
+    """Targets of a deployment: the plan's hosts, their places in the file, and options.
 
     ``is_complete`` says that these are all hosts that have processes; ``clock_limit_s`` is by how
     much clocks may differ.
@@ -100,7 +100,10 @@ class Share:
         return f"Python {probe['python']}, {version}{logout}"
 
     def changes(self) -> list[str]:
-        """Return what is to change on the host, one line each; nothing if it runs the release as it is."""
+        """Return what is to change on the host, one line each.
+
+        Nothing if it runs the release as it is.
+        """
         if self.release is None:
             return [f"release {self.state['release']} → {self.goal}"]
         there, wanted = self.state["files"], self.wanted.manifest
@@ -223,7 +226,10 @@ class Rollout:
         ]
 
     def changes(self) -> dict[str, list[str]]:
-        """Return what is to change, by host, one line each; no host that has its goal, and runs it."""
+        """Return what is to change, by host, one line each.
+
+        No host that has its goal, and runs it.
+        """
         found = {share.name: share.changes() for share in self.shares}
         return {name: lines for name, lines in found.items() if lines}
 
@@ -315,7 +321,9 @@ class Rollout:
         ]
 
     async def activate(self) -> str:
-        """Start each host's goal on trial, and keep it once everything is live; return what there is to say.
+        """Start each host's goal on trial, and keep it once everything is live.
+
+        Return what there is to say.
 
         A host that has its goal already, and runs it, goes on; on one that can follow, only what
         is different starts again.
@@ -398,7 +406,10 @@ class Rollout:
         return [edge.name for edge in plan.edges if self.target.is_complete or edge.owner in own]
 
     def _missing(self, share: Share, state: dict[str, Any]) -> list[Finding]:
-        """Return what is not as it has to be on a host, as its launcher says; for some of the hosts, of theirs."""
+        """Return what is not as it has to be on a host, as its launcher says.
+
+        For some of the hosts, of theirs.
+        """
         plan, robot, at = self.target.plan, state["robot"], share.host.at
         notes = [Note(line) for line in state["lines"]]
         if robot is None or state["failed"]:
@@ -520,7 +531,9 @@ async def _probed(host: Host) -> dict[str, Any]:
 def target_of(
     plan: Plan, names: Sequence[str], places: Mapping[str, Span], **options: Any
 ) -> Target:
-    """Return what is deployed to: all hosts that have processes, or the named ones; ``options`` are a ``Target``'s.
+    """Return what is deployed to: all hosts that have processes, or the named ones.
+
+    ``options`` are a ``Target``'s.
 
     Raises:
         RejectedError: with what the robot file lacks.
@@ -581,7 +594,10 @@ _HOLDS = {
 
 
 def _settings_apart(shares: Sequence[Share], target: Target) -> Iterable[Finding]:
-    """Yield what keeps the hosts' nodes from finding each other: another domain, middleware, or no discovery."""
+    """Yield what keeps the hosts' nodes from finding each other.
+
+    Another domain, middleware, or no discovery.
+    """
     ros = target.plan.ros
     given = {"ROS_DOMAIN_ID": ros.domain_id, "RMW_IMPLEMENTATION": ros.rmw}
     for variable, default in _AGREED.items():

@@ -13,7 +13,9 @@ STOP_S = 90
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What the unit of a robot's share on a host is made of; paths are absolute, and those on the host.
+    """What the unit of a robot's share on a host is made of.
+
+    Paths are absolute, and those on the host.
 
     ``python`` is the host's; with ``has_wheels`` the release brings its own. ``name`` is
     ROBOT.HOST.

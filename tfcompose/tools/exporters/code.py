@@ -24,7 +24,10 @@ class Code:
         return f"{self.begin}{', '.join(map(str, self.parts))}{self.end}"
 
     def lines(self, indent: str = "", end: str = "") -> Iterator[str]:
-        """Yield it in lines, in one if that is short enough; each part on a line of its own otherwise."""
+        """Yield it in lines, in one if that is short enough.
+
+        Each part on a line of its own otherwise.
+        """
         if len(indent) + len(str(self)) + len(end) <= _WIDTH:
             yield f"{indent}{self}{end}"
             return

@@ -1,4 +1,4 @@
-"""A plan for Kubernetes: a ConfigMap with the plan, a workload for each process, and a kustomization of them all.
+"""A plan for Kubernetes: a ConfigMap, a workload per process, and a kustomization.
 
 What runs on is a StatefulSet of one pod, because only a StatefulSet promises at most one: it
 starts no second pod before the first has ended, in an update, after a deletion or when a node is
@@ -60,19 +60,25 @@ _CONTENT = "tfcompose/content"
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """Where the pods run: their image, and the plan's folder on each node; without ``folder`` a ConfigMap holds it."""
+    """Where the pods run: their image, and the plan's folder on each node.
+
+    Without ``folder`` a ConfigMap holds it.
+    """
 
     image: str
     folder: str = ""
 
 
 def cluster_name(name: str) -> str:
-    """Return the name as an RFC 1123 label, which is what Kubernetes takes for objects and labels."""
+    """Return the name as an RFC 1123 label, which Kubernetes requires."""
     return re.sub(r"[^a-z0-9]+", "-", plain_name(name).lower())[:_LONGEST].strip("-") or "robot"
 
 
 def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
-    """Return what the process reads of the plan's folder, by paths relative to it; the plan is first."""
+    """Return what the process reads of the plan's folder, by paths relative to it.
+
+    The plan is first.
+    """
     files = {found for word in process.texts for found in _IN_FOLDER.findall(word)}
     if process.params_file:
         files.add(process.params_file)
@@ -129,7 +135,10 @@ def _gaps(plan: Plan) -> list[str]:
 
 
 def _waiting_for(plan: Plan, name: str, what: str) -> list[str]:
-    """Return the command that succeeds when the process is as it is waited for; empty where a pod cannot see that."""
+    """Return the command that succeeds when the process is as it is waited for.
+
+    Empty where a pod cannot see that.
+    """
     process = plan.process(name)
     if seconds := waiting_s(process, what):
         return ["sleep", f"{seconds:g}"]
@@ -173,7 +182,10 @@ def _keys(texts: Mapping[str, str]) -> dict[str, str]:
 
 
 def _stateful_set(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
-    """Return a workload that runs on; with ``Parallel`` an update replaces a pod that never became ready, too."""
+    """Return a workload that runs on.
+
+    With ``Parallel`` an update replaces a pod that never became ready, too.
+    """
     spec = {
         "serviceName": robot,
         "replicas": 1,
@@ -185,7 +197,10 @@ def _stateful_set(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
 
 
 def _job(name: str, robot: str, pod: dict[str, Any], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return a workload that ends; its name changes with its content, because a job cannot be changed."""
+    """Return a workload that ends.
+
+    Its name changes with its content, because a job cannot be changed.
+    """
     content = pod["metadata"]["annotations"][_CONTENT]
     template = {**pod, "spec": {**pod["spec"], "restartPolicy": "OnFailure"}}
     spec = {**settings, "template": template}
@@ -199,7 +214,7 @@ def _pod(
     cluster: Cluster,
     texts: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Return the template of the process's pod, on the network and in the shared memory of its node, as DDS needs."""
+    """Return the process's pod template, on its node's network and shared memory for DDS."""
     process = exported.process
     common = {
         "image": cluster.image,
@@ -241,7 +256,10 @@ def _pod(
 
 
 def _node_selector(plan: Plan, host: str) -> dict[str, str]:
-    """Return the labels of the node that is the host: those that the robot file gives it, else its host name."""
+    """Return the labels of the node that is the host.
+
+    Those that the robot file gives it, else its host name.
+    """
     declared = plan.hosts.get(host)
     return (
         declared.node_selector
@@ -251,7 +269,10 @@ def _node_selector(plan: Plan, host: str) -> dict[str, str]:
 
 
 def _digest(plan: Plan, process: PlanProcess, texts: Mapping[str, str]) -> str:
-    """Return the digest of what the process is started with: its part of the plan, and the files that it reads."""
+    """Return the digest of what the process is started with.
+
+    Its part of the plan, and the files that it reads.
+    """
     files = [texts[path] for path in files_of(plan, process) if path != _PLAN]
     text = json.dumps([plan.started_with(process), files], default=encode)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -270,7 +291,10 @@ def _environment(plan: Plan) -> dict[str, str]:
 
 
 def _probes(plan: Plan, process: PlanProcess) -> dict[str, Any]:
-    """Return what tells the kubelet that the process has come up, and that it still lives: an edge of its own."""
+    """Return what tells the kubelet that the process has come up, and that it still lives.
+
+    An edge of its own.
+    """
     if not plan.edges_of(process.name):
         return {}
     probe = {"exec": {"command": probe_of(plan, process)}, "timeoutSeconds": 10}

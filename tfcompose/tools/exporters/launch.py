@@ -1,4 +1,4 @@
-"""A Python launch file: stock nodes for what is fixed and jointed, and each process as a node of its own."""
+"""A Python launch file: stock nodes for fixed edges and joints, a node per process."""
 
 from __future__ import annotations
 
@@ -133,7 +133,9 @@ def included(package, name, arguments, settings, **more):
 def launch(
     plan: Plan, machine: Machine, urdf: str, values: LaunchValues | None = None
 ) -> tuple[tuple[File, ...], list[str]]:
-    """Return the launch file, and what it does not keep of the plan. ``urdf`` is the text of the plan's robot.urdf.
+    """Return the launch file, and what it does not keep of the plan.
+
+    ``urdf`` is the text of the plan's robot.urdf.
 
     A stock robot_state_publisher sends what that URDF holds as fixed or jointed, and a
     static_transform_publisher each fixed edge elsewhere; where the URDF is not all of what
@@ -214,7 +216,10 @@ def _assigned(name: str, action: Code) -> Iterator[str]:
 
 
 class _Export:
-    """The actions of a launch file; ``gaps`` are what they do not keep, ``named`` those that others refer to."""
+    """The actions of a launch file.
+
+    ``gaps`` are what they do not keep, ``named`` those that others refer to.
+    """
 
     def __init__(self, plan: Plan, values: LaunchValues) -> None:
         self.plan, self.values = plan, values
@@ -226,7 +231,10 @@ class _Export:
         self._delays_s = _delays_s(self.known)
 
     def actions(self, stock: list[PlanEdge] | None) -> Iterator[Code]:
-        """Yield the actions in order; ``stock`` are the edges of static_transform_publishers, None without such."""
+        """Yield the actions in order.
+
+        ``stock`` are the edges of static_transform_publishers, None without such.
+        """
         plan = self.plan
         yield from (argument.code() for argument in self.values.arguments)
         yield from (
@@ -283,7 +291,10 @@ class _Export:
         ]
 
     def _comes_with_container(self, process: PlanProcess) -> bool:
-        """Return whether the action of its container loads it: it waits for nothing else, and launch starts that."""
+        """Return whether the action of its container loads it.
+
+        It waits for nothing else, and launch starts that.
+        """
         container = self.known.get(process.component.container) if process.component else None
         return (
             container is not None
@@ -322,7 +333,7 @@ class _Export:
         self.gaps += [f"{process.name} is started also when {name} fails" for name in before]
 
     def _texts_of(self, process: PlanProcess, place: str) -> dict[str, Text]:
-        """Return the texts of a place, args, env, params or remap, that the launch file makes itself."""
+        """Return the texts of a place (args, env, params, remap) that the launch file makes."""
         several = self.values.texts.get(process.name, {})
         return {
             key.removeprefix(f"{place}."): text
@@ -468,7 +479,10 @@ class _Export:
         return call("*managed", call("LifecycleNode", *parts), f"active={state == 'active'}")
 
     def _component(self, process: PlanProcess) -> Code:
-        """Return the description of a component; its condition is here if its container's action loads it."""
+        """Return the description of a component.
+
+        Its condition is here if its container's action loads it.
+        """
         if process.component is None:
             raise ValueError(f"{process.name} is no component")
         found = process.component
@@ -554,7 +568,10 @@ def _mapping(values: Mapping[str, Code | str]) -> Code:
 
 
 def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
-    """Return how long after the launch each is started: when all for which it waits so many seconds have had them."""
+    """Return how long after the launch each is started.
+
+    When all for which it waits so many seconds have had them.
+    """
     delays: dict[str, float] = {}
     waiting = {
         name: {other: what for other, what in process.after.items() if other in known}
@@ -596,7 +613,10 @@ def _variables(plan: Plan) -> Iterator[tuple[str, str]]:
 
 
 def published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
-    """Return the edges (parent, child) that a stock robot_state_publisher sends of this URDF: all but floating ones."""
+    """Return the edges (parent, child) that a stock robot_state_publisher sends of this URDF.
+
+    All but floating ones.
+    """
     joints = [
         joint
         for joint in ET.fromstring(urdf).iter("joint")  # noqa: S314
@@ -642,7 +662,7 @@ def _keywords(plan: Plan) -> Iterator[str | Code]:
 
 
 def _state_publisher(plan: Plan) -> Code:
-    """Return robot_state_publisher, which passes on as many joint states as the plan's publisher does."""
+    """Return robot_state_publisher, limited to the joint states of the plan's publisher."""
     joints = next((process for process in plan.started if process.kind == "joints"), None)
     given = _params(joints.argv) if joints else {}
     values = {"publish_frequency": min(given.pop("publish_frequency", MOST_HZ), MOST_HZ), **given}
@@ -702,7 +722,10 @@ def _is_command(process: PlanProcess) -> bool:
 
 
 def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
-    """Return the program's arguments and ROS's; names, remappings and parameter files are keywords of their own."""
+    """Return the program's arguments and ROS's.
+
+    Names, remappings and parameter files are keywords of their own.
+    """
     words = list(process.argv[1:])
     at = words.index("--ros-args") if "--ros-args" in words else len(words)
     kept, rest = [], iter(words[at + 1 :])
@@ -722,7 +745,10 @@ _WORDS = {
 
 
 def _filled(word: str, file: str) -> str:
-    """Return the word as Python that knows the plan's folder; ``file`` is Python that gives the parameter file."""
+    """Return the word as Python that knows the plan's folder.
+
+    ``file`` is Python that gives the parameter file.
+    """
     found = {mark: code.replace("{file}", file) for mark, code in _WORDS.items() if mark in word}
     if word in found:
         return found[word]

@@ -69,7 +69,7 @@ class _Uses:
 def launch_values(
     arguments: Namespace, plan: Plan
 ) -> tuple[LaunchValues, tuple[File, ...], list[str]]:
-    """Return what the launch file decides itself, files that it needs beside it, and what is fixed and why.
+    """Return what the launch file decides itself, the files it needs, and what is fixed.
 
     ``plan`` is the built one. The robot file has no errors.
     """
@@ -169,7 +169,7 @@ def _strings(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
 
 
 def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the process and the place in it, or None where launch cannot compute what stands there."""
+    """Return the process and the place in it, or None if launch cannot compute the value."""
     if len(path) < 3 or path[0] not in {  # noqa: PLR2004
         "processes",
         "containers",
@@ -209,7 +209,10 @@ def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
 def _settled(
     uses: _Uses, kinds: Mapping[str, str]
 ) -> tuple[dict[tuple[str, str], str], dict[str, str]]:
-    """Return the texts and conditions that launch computes: those of which nothing else needs an argument."""
+    """Return the texts and conditions that launch computes.
+
+    Those of which nothing else needs an argument.
+    """
     texts, conditions = dict(uses.texts), dict(uses.conditions)
     for at, text in uses.texts.items():
         if _parts(text, kinds) is None:
@@ -269,7 +272,9 @@ class _Combinations:
         self._built: dict[tuple[tuple[str, str], ...], tuple[Plan, tuple[File, ...]] | None] = {}
 
     def process(self, name: str, expression: str) -> tuple[PlanProcess, tuple[File, ...]] | None:
-        """Return a process as it is where its condition holds, with its parameter file; None where it cannot be added.
+        """Return a process as it is where its condition holds, with its parameter file.
+
+        None where it cannot be added.
 
         It cannot where the robot has errors or another tree then, or launch would need its plan.
         """

@@ -1,4 +1,6 @@
-"""What of a robot file a launch file decides at its own start: arguments, the environment, and conditions.
+"""What of a robot file a launch file decides at its own start.
+
+Arguments, the environment, and conditions.
 
 A plan has the values with which it was built. Where they decide no more than whether processes are
 started and what these are told, a launch file can have the arguments themselves.
@@ -30,7 +32,10 @@ _TRUTHS = ("true", "false")
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """A launch argument. ``kind`` is bool, int, float or string; ``env`` a variable that gives the default."""
+    """A launch argument. ``kind`` is bool, int, float or string.
+
+    ``env`` a variable that gives the default.
+    """
 
     name: str
     kind: str

@@ -1,4 +1,6 @@
-"""A plan for other supervisors: a unit for systemd, or a service for docker compose, for each process.
+"""A plan for other supervisors.
+
+A unit for systemd, or a service for docker compose, for each process.
 
 What they and ``kubernetes`` share comes first: names, the order of starts, restarts, probes and
 the YAML of the files.
@@ -34,7 +36,7 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_.]+")
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """Where an export runs: the plan's folder there, its Python, setup files to source, variables to set, and an image.
+    """Where an export runs: plan folder, Python, setup files, variables, image.
 
     ``folder`` is absolute for systemd, and relative to the written file for the others.
     """
@@ -52,12 +54,18 @@ def plain_name(name: str) -> str:
 
 
 def plain_names(plan: Plan, plain_of: Callable[[str], str] = plain_name) -> dict[str, str]:
-    """Return the plain name of each process, by its own: no two are the same, and one that is plain stays."""
+    """Return the plain name of each process, by its own.
+
+    No two are the same, and one that is plain stays.
+    """
     return distinct([process.name for process in plan.processes], plain_of)
 
 
 def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str, str]:
-    """Return the plain form of each name, by the name: no two are the same, and one that is plain stays."""
+    """Return the plain form of each name, by the name.
+
+    No two are the same, and one that is plain stays.
+    """
     made = {name: name for name in names if plain_of(name) == name}
     taken = set(made)
     for name in names:
@@ -89,7 +97,9 @@ def settings_of(dialects: Iterable[Dialect], exported: Exported) -> list[Setting
 
 
 def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
-    """Return which processes come first here, and what of them is waited for; a strict guard is among them.
+    """Return which processes come first here, and what of them is waited for.
+
+    A strict guard is among them.
 
     In place of a component comes its container.
     """
@@ -107,7 +117,7 @@ def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
 
 
 def waiting_s(process: PlanProcess, what: str) -> float:
-    """Return how many seconds after its start a process is ready, where that is known and waited for; else 0."""
+    """Return how many seconds after its start a process is ready, if known; else 0."""
     ready = process.ready
     return ready.number if what == "ready" and ready and ready.kind == "time" else 0.0
 
@@ -156,7 +166,7 @@ _SOURCED = (
 
 
 def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
-    """Return the command that succeeds in a container while the first edge of the process is live; it has to own one.
+    """Return the command that succeeds while the process's first edge is live.
 
     It looks at one edge, and not at all of them, because each look is a process that joins the
     robot's domain.
@@ -177,7 +187,7 @@ def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
 
 
 def outside_of(plan: Plan, folder: str) -> list[str]:
-    """Return what processes need that is not in a container, which has the plan's folder alone, a sentence each."""
+    """Return sentences about needs that a container with the plan's folder lacks."""
     gaps = []
     for process in plan.started:
         outside = [word for word in process.texts if "${build_dir}/.." in word]
@@ -310,7 +320,10 @@ def _unit_text(plan: Plan, exported: Exported, machine: Machine, names: Mapping[
 
 
 def _logs(plan: Plan, machine: Machine) -> list[str]:
-    """Return where ROS logs to, unless that is set: no node starts without, and a system's service has no home."""
+    """Return where ROS logs to, unless that is set.
+
+    No node starts without, and a system's service has no home.
+    """
     if {"ROS_LOG_DIR", "ROS_HOME"} & machine.env.keys():
         return []
     folder = f"tfcompose/{plain_name(plan.robot)}"
@@ -366,7 +379,10 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
 
 
 def _profile(plan: Plan, process: PlanProcess) -> str | None:
-    """Return the profile that a service is in: its host, unless the plan is one host's share already."""
+    """Return the profile that a service is in.
+
+    Its host, unless the plan is one host's share already.
+    """
     return plain_name(process.host) if process.host and plan.host is None else None
 
 

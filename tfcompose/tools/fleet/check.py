@@ -20,7 +20,10 @@ def check_fleet(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
 
 
 def _shared_twice(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
-    """Yield a finding for each frame that two edges give a parent: lookups would jump between them."""
+    """Yield a finding for each frame that two edges give a parent.
+
+    Lookups would jump between them.
+    """
     first: dict[str, tuple[str, Path]] = {}
     for robot in fleet.robots:
         for index, shared in enumerate(fleet.edges_of(robot)):

@@ -203,7 +203,10 @@ def _row(one: RobotStatus) -> tuple[str, ...]:
 
 
 def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespace) -> int:
-    """Print poses until a signal comes; a link that is stale is named instead, once, and so is its return."""
+    """Print poses until a signal comes.
+
+    A link that is stale is named instead, once, and so is its return.
+    """
     from tfcompose.compiler.render.pose import pose_json, pose_text
     from tfcompose.foundation.numbers import clean
     from tfcompose.tf.tf2 import TransformException

@@ -1,4 +1,7 @@
-"""Robot as a member of a fleet: the process that shares its edges, and whether the fleet's file fits."""
+"""Robot as a member of a fleet.
+
+The process that shares its edges, and whether the fleet's file fits.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,10 @@ def _name(section: ToolSection) -> str:
 
 
 def _below(spec: RobotSpec) -> tuple[str, ...]:
-    """Return what says where the robot's TF topics are: below its namespace, where they are isolated."""
+    """Return what says where the robot's TF topics are.
+
+    Below its namespace, where they are isolated.
+    """
     namespace = spec.ros.namespace.strip("/")
     return (
         ("--namespace", namespace) if spec.ros.isolate in {"topics", "both"} and namespace else ()
@@ -57,7 +63,10 @@ def _below(spec: RobotSpec) -> tuple[str, ...]:
 
 
 def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
-    """Return what is wrong with the fleet's file for this robot: it cannot be read, or names what the robot is not."""
+    """Return what is wrong with the fleet's file for this robot.
+
+    It cannot be read, or names what the robot is not.
+    """
     source, member = section.source, section.value
     at = section.at("file")
     path = path_named(member.file, at)
@@ -86,7 +95,7 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
 def _unknown_edges(
     robot: Robot, name: str, fleet: FleetSpec, fleet_source: Source, source: Source
 ) -> list[Finding]:
-    """Return a finding for each edge that the fleet's file has the robot share, and that the robot does not have.
+    """Return a finding for each edge that the fleet shares and the robot does not have.
 
     Where entries of the robot were refused, or a key stands twice, nobody knows which edges it was
     meant to have.

@@ -1,4 +1,7 @@
-"""The fleet as it is seen from anywhere: what each robot shares, how old it is, and poses between robots."""
+"""The fleet as it is seen from anywhere.
+
+What each robot shares, how old it is, and poses between robots.
+"""
 
 from __future__ import annotations
 
@@ -34,12 +37,17 @@ LinkState = Literal["live", "stale", "silent", "unreachable"]
 
 
 class StaleError(Exception):
-    """Raised where a pose needs a link or an edge that is stale, or never came; the message names the first of them."""
+    """Raised where a pose needs a link or an edge that is stale, or never came.
+
+    The message names the first of them.
+    """
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeStatus:
-    """A shared edge, by its names in the fleet; ages are in seconds since it was sent, None: it never came.
+    """A shared edge, by its names in the fleet.
+
+    Ages are in seconds since it was sent, None: it never came.
 
     ``delay_s`` is its last arrival here minus its stamp, by the two computers' clocks; None for a
     fixed edge.
@@ -71,7 +79,7 @@ class RobotStatus:
 
 @dataclass(slots=True)
 class _Link:
-    """What came of a robot; times are when it was sent, by the monotonic clock here, in seconds."""
+    """A robot's received transforms, with send times by this monotonic clock, in s."""
 
     last: float | None = None
     delay_s: float = 0.0
@@ -80,7 +88,10 @@ class _Link:
 
 
 class FleetObserver:
-    """Listens to all robots of a fleet until it is closed; ``buffer`` answers lookups between them."""
+    """Listens to all robots of a fleet until it is closed.
+
+    ``buffer`` answers lookups between them.
+    """
 
     def __init__(self, fleet: FleetSpec) -> None:
         self.fleet = fleet
@@ -130,7 +141,7 @@ class FleetObserver:
             return [self._status(robot, now) for robot in self.fleet.robots]
 
     def pose(self, target: str, source: str) -> tuple[Pose, int | None]:
-        """Return the newest pose of ``source`` in ``target``, and its stamp as ``PoseBuffer.latest`` does.
+        """Return the newest pose of ``source`` in ``target`` and its stamp.
 
         Raises:
             StaleError: if a link or an edge between the two is stale, of which the buffer still
@@ -195,7 +206,7 @@ class FleetObserver:
         return "silent" if age_s is None else "stale"
 
     def _connect(self, router: str) -> None:
-        """Connect to a router as soon as it is there, and listen to the robots that share on it."""
+        """Connect to a router once it is there, and listen to the robots on it."""
         while not self._ended.is_set():
             try:
                 session = connected(router)

@@ -12,7 +12,9 @@ _CONNECT_MS = 1000
 
 
 def connected(router: str) -> Any:
-    """Return a client's session with the router; it connects again by itself, and has to be closed.
+    """Return a client's session with the router.
+
+    It connects again by itself, and has to be closed.
 
     Raises:
         ConnectionError: if the router is not reached within a second.

@@ -1,4 +1,4 @@
-"""What leaves a robot: the edges that the fleet's file names, from its TF topics, at their rates, onto Zenoh."""
+"""What leaves a robot: its fleet file's edges, from TF topics, onto Zenoh."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SECOND_NS = 1_000_000_000
 
 
 class SharedEdges:
-    """Picks the edges that leave a robot, renamed, each in the first message of a period of its rate.
+    """Selects and renames the edges that leave a robot, one per period of their rate.
 
     Periods are counted from the epoch, so that robots send at the same times, and what is looked
     up between them is of about one time.
@@ -84,7 +84,10 @@ class SharedEdges:
 
 
 class Sender:
-    """Sends a robot's edges to its router, whenever that is reached; what comes meanwhile is dropped."""
+    """Sends a robot's edges to its router, whenever that is reached.
+
+    What comes meanwhile is dropped.
+    """
 
     def __init__(self, fleet: FleetSpec, robot: str, say: Callable[[str], None]) -> None:
         self.edges = SharedEdges(fleet, robot)

@@ -1,4 +1,7 @@
-"""Language of ``fleet.yaml``, version 1: robots, their Zenoh routers, and which edges leave them."""
+"""Language of ``fleet.yaml``, version 1.
+
+Robots, their Zenoh routers, and which edges leave them.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ class SharedEdge(Spec):
 
 
 def _by_name(value: Any) -> Any:
-    """Return ``parent → child``, or ``parent → child at 5 Hz``, as the mapping that it stands for."""
+    """Return ``parent → child at 5 Hz`` as the mapping that it abbreviates."""
     if not isinstance(value, str):
         return value
     edge, at, rate = value.partition(" at ")
@@ -126,7 +129,10 @@ class FleetSpec(Spec):
         )
 
     def key_of(self, robot: str) -> str:
-        """Return where on Zenoh a robot's edges are: this key, with ``/tf`` or ``/tf_static`` behind it."""
+        """Return where on Zenoh a robot's edges are.
+
+        This key, with ``/tf`` or ``/tf_static`` behind it.
+        """
         return f"tfcompose/fleet/{self.name}/{robot}"
 
 

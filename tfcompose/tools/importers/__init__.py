@@ -1,4 +1,4 @@
-"""Turns what robots are described and started by into the text of a robot file, for ``tfcompose import``.
+"""Turns descriptions and launch files into the text of a robot file.
 
 Of a URDF, ``sensors`` recognises presets, ``omitted`` lists what a robot file cannot hold, and
 ``robot_file`` writes the text. Readers of what starts processes (``shell``, ``launch``) fill a

@@ -91,7 +91,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Import; exit code 0, 1 with errors in the source, 2 after wrong use or where something cannot be read."""
+    """Import; exit code 0, 1 with errors in the source, 2 after wrong use.
+
+    Also 2 for what cannot be read.
+    """
     from tfcompose.cli.reading import quote
     from tfcompose.foundation.findings import RejectedError
 
@@ -134,7 +137,10 @@ def _import_urdf(arguments: Namespace) -> int:
 
 
 def _import_bringup(arguments: Namespace) -> int:
-    """Import what starts processes: everything that is understood is written, and the rest is named."""
+    """Import what starts processes.
+
+    Everything that is understood is written, and the rest is named.
+    """
     from tempfile import TemporaryDirectory
 
     from tfcompose.cli.reading import STDIN, read_text
@@ -254,7 +260,10 @@ def _import_observed(arguments: Namespace) -> int:
 
 
 def _with_root(text: str) -> str:
-    """Return lines of a launch file in XML as one: from its first line on, elements without ``<launch>`` around."""
+    """Return lines of a launch file in XML as one.
+
+    From its first line on, elements without ``<launch>`` around.
+    """
     return (
         f"<launch>{text}</launch>"
         if re.match(r"\s*<(node|include|arg|group|param|remap)\b", text)
@@ -325,7 +334,7 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
 
 
 def _disk(packages: Iterable[str], arguments: Namespace) -> Disk:
-    """Return the files of this machine, of which xacro may read the source's, and these packages."""
+    """Return the readable files here: the source's for xacro, and these packages."""
     from tfcompose.cli.compiling import disk
 
     sources = [arguments.file] if arguments.file else []

@@ -1,4 +1,7 @@
-"""What a robot_state_publisher is given, in the draft of a robot: a xacro file as a part, a URDF as links."""
+"""What a robot_state_publisher is given, in the draft of a robot.
+
+A xacro file as a part, a URDF as links.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ _TEXT = "robot_description.urdf"
 
 @dataclass(frozen=True, slots=True)
 class Workshop:
-    """What reads descriptions: the packages, folders of those that are named, and presets, None to match none."""
+    """Context for reading descriptions: packages, named folders, presets (None: no match)."""
 
     packages: Packages
     target: Target
@@ -38,7 +41,10 @@ class Workshop:
 def add_descriptions(
     draft: Draft, descriptions: Iterable[Description], workshop: Workshop
 ) -> None:
-    """Add what robot_state_publishers are given; of several URDFs the first becomes links, and each other is named."""
+    """Add what robot_state_publishers are given.
+
+    Of several URDFs the first becomes links, and each other is named.
+    """
     for described in descriptions:
         if described.file and not described.file.endswith(".urdf"):
             _add_part(draft, described, workshop)

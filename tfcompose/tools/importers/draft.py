@@ -1,4 +1,6 @@
-"""A robot file in the making: sections with entries, comments at them, and what could not be imported.
+"""A robot file in the making.
+
+Sections with entries, comments at them, and what could not be imported.
 
 Readers of launch files, scripts and running robots fill it in the order of their source; it writes
 the text.
@@ -109,7 +111,10 @@ class Draft:
         return {**self.sections["containers"], **self.sections["processes"]}
 
     def free_name(self, wanted: str) -> str:
-        """Return a name for a process or sensor, made of letters, digits and _; a number makes it one of its own."""
+        """Return a name for a process or sensor, made of letters, digits and _.
+
+        A number makes it one of its own.
+        """
         plain = _NO_NAME.sub("_", wanted).strip("_") or "process"
         plain = plain if plain[0].isalpha() else f"process_{plain}"
         taken = {
@@ -151,7 +156,7 @@ class Draft:
         return "\n".join([*lines, *comment(homeless), ""])
 
     def _with_roots(self) -> dict[str, dict[str, Any]]:
-        """Return the sections, with frames that are parents alone as roots above those that hang on them."""
+        """Return the sections, with frames that are only parents added as roots."""
         frames = self.sections["frames"]
         known = {*frames, *self.sections["links"], *self.brought}
         known |= {joint["child"] for joint in self.sections["joints"].values()}

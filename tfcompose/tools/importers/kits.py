@@ -69,7 +69,10 @@ def is_clearpath(source: Source) -> bool:
 
 
 def is_autoware(source: Source) -> bool:
-    """Return whether it is a calibration of Autoware's: frames below their parents, each with x, y, z and angles."""
+    """Return whether it is a calibration of Autoware's.
+
+    Frames below their parents, each with x, y, z and angles.
+    """
     return bool(source.data) and all(
         isinstance(children, dict)
         and bool(children)
@@ -119,7 +122,7 @@ def add_vehicles(
     given: Mapping[str, str],
     read: Callable[[str], Source],
 ) -> None:
-    """Add the calibrations of Autoware's individual parameters, in which each vehicle has a folder with its kits.
+    """Add calibrations of Autoware's individual parameters, a folder per vehicle.
 
     The folder of a kit's description has but those of the kit itself. The vehicle stays an
     argument of the robot file where there are several. ``given`` may choose ``vehicle_id`` and
@@ -340,7 +343,10 @@ class _Clearpath:
         return f"package://clearpath_platform_description/urdf/{self.platform}/{self.platform}.urdf.xacro"
 
     def _link(self, name: str, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
-        """Return a link's entry with its mesh as an address; what its macro does not take is named."""
+        """Return a link's entry with its mesh as an address.
+
+        What its macro does not take is named.
+        """
         own = dict(entry)
         mesh = own.get("visual")
         if isinstance(mesh, dict):
@@ -413,7 +419,7 @@ class _Clearpath:
             self.draft.todo(message, at, ("parts", name), advice)
 
     def _camera(self, model: str, entry: dict[str, Any]) -> dict[str, Any]:
-        """Return the parameter that says which camera of a family it is, where the macro's frames depend on it."""
+        """Return the parameter that selects a camera of a family, if frames depend on it."""
         if model != "stereolabs_zed":
             return {}
         node = (entry.get("ros_parameters") or {}).get(model)

@@ -1,4 +1,7 @@
-"""Launch files as a draft of a robot file: read in a process of their own, and put into the language's words."""
+"""Launch files as a draft of a robot file.
+
+Read in a process of their own, and put into the language's words.
+"""
 
 from __future__ import annotations
 
@@ -86,7 +89,9 @@ class Launch:
 
 
 def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
-    """Add what a launch file starts to the draft; return what its robot_state_publishers are given.
+    """Add what a launch file starts to the draft.
+
+    Return what its robot_state_publishers are given.
 
     Raises:
         RejectedError: if it is no launch file, or takes too long or too much memory.
@@ -109,7 +114,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
 
 
 def _read(draft: Draft, launch: Launch) -> dict[str, Any]:
-    """Return what ROS's launch records of the file where it is installed, what the stand-in does elsewhere.
+    """Return what ROS's launch records of the file, or else the stand-in.
 
     Raises:
         RejectedError: if neither can read it.
@@ -138,7 +143,10 @@ def _is_of_ros1(answer: dict[str, Any]) -> bool:
 
 
 def has_launch() -> bool:
-    """Return whether ROS's launch can be imported: folders of that name are often near launch files, and are not it."""
+    """Return whether ROS's launch can be imported.
+
+    Folders of that name are often near launch files, and are not it.
+    """
     several = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
     return all(spec is not None and spec.origin is not None for spec in several)
 
@@ -304,7 +312,10 @@ class _Work:
             self.draft.todo(record["text"], span)
 
     def finish(self, decided: list[str]) -> None:
-        """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
+        """Add what depends on all records.
+
+        ``decided`` are arguments whose values stand in what was added.
+        """
         self._args({*decided, *self._read})
         self._into_containers()
         started = self.draft.started()
@@ -426,7 +437,10 @@ class _Work:
             self._delays.append((name, record["period"]))
 
     def _component(self, record: dict[str, Any], span: Span) -> None:
-        """Add a node that a container loads; that of a stock publisher's class is what its program is."""
+        """Add a node that a container loads.
+
+        That of a stock publisher's class is what its program is.
+        """
         plugin = record["plugin"]
         if plugin in _PUBLISHERS:
             words = static_words(record["params"]) if plugin == STATIC_PLUGIN else []
@@ -439,7 +453,10 @@ class _Work:
         self._components.append((name, record["container"], span))
 
     def _into_containers(self) -> None:
-        """Let components name their containers; one that the launch file does not start runs already."""
+        """Let components name their containers.
+
+        One that the launch file does not start runs already.
+        """
         for name, wanted, span in self._components:
             if wanted not in self._containers:
                 namespace, _, node = wanted.strip("/").rpartition("/")
@@ -486,7 +503,10 @@ class _Work:
         )  # fmt: skip
 
     def _is_container(self, record: dict[str, Any]) -> bool:
-        """Return whether a node loads components: by its program, or because some are loaded into it."""
+        """Return whether a node loads components.
+
+        By its program, or because some are loaded into it.
+        """
         if record["kind"] != "node":
             return False
         is_stock = record["package"] == CONTAINERS and record["executable"].startswith(
@@ -654,7 +674,7 @@ def _seconds(value: float) -> Bare:
 
 
 def _without_texts(word: str, todo: list[str]) -> str:
-    """Return a word of a command in which files stand for what xacro makes of them, or for their texts."""
+    """Return a command's word with files in place of xacro output and file texts."""
     plain, files = without_marks(word)
     todo += [
         f"an argument is what is made of {shown(file)}, or its text: here it is the file's name"

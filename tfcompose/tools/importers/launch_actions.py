@@ -1,4 +1,6 @@
-"""A stand-in for launch's actions that starts nothing: they know where they were made, and are recorded.
+"""A stand-in for launch's actions that starts nothing.
+
+They know where they were made, and are recorded.
 
 Launch files import it under the names of ``launch`` and ``launch_ros`` in a process of its own
 (``launch_process``). How each action behaves was read in those packages' sources.
@@ -430,7 +432,10 @@ class RegisterEventHandler(Action):
 
 
 class EventHandler:
-    """What happens after an event of a process; ``AFTER`` is the language's word for it, empty without one."""
+    """What happens after an event of a process.
+
+    ``AFTER`` is the language's word for it, empty without one.
+    """
 
     AFTER = ""
 
@@ -637,7 +642,9 @@ _OUTPUTS = frozenset({"screen", "log", "both", "own_log", "full"})
 
 
 def _output(given: Any, context: Context) -> str | list[str]:
-    """Return launch's word for where the output goes; the places where the word is not one of launch's but a mapping.
+    """Return launch's word for where the output goes.
+
+    The places where the word is not one of launch's but a mapping.
 
     Raises:
         FailedError: if launch has no such word.
@@ -765,7 +772,7 @@ class ComposableNode(Action):
 
 
 def _visit_components(several: Any, container: str, context: Context) -> None:
-    """Record components; ``container`` is the id of the action that starts theirs, or the full name of its node."""
+    """Record components; ``container`` is their action's id or its node's full name."""
     before, context.container = context.container, container
     try:
         visit_all(list(several or ()), context)
@@ -812,7 +819,7 @@ class LoadComposableNodes(Action):
 
 
 class Unknown(Action):
-    """An action, substitution or whatever a launch file takes from launch that is not known here."""
+    """An action or substitution of a launch file that is not known here."""
 
     NAME = ""
 

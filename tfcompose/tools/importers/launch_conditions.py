@@ -1,4 +1,6 @@
-"""A stand-in for launch's conditions: whether they hold, and what they are as ``when`` of a robot file.
+"""A stand-in for launch's conditions.
+
+Whether they hold, and what they are as ``when`` of a robot file.
 
 How each behaves was read in launch's sources. Launch files import it in a process of its own
 (``launch_process``).
@@ -105,7 +107,7 @@ class LaunchConfigurationNotEquals(LaunchConfigurationEquals):
 
 
 def expression_of(value: Any, context: Context) -> str | None:
-    """Return what is true or false as an expression of a robot file, or None where it cannot be one."""
+    """Return a truth value as an expression of a robot file, or None."""
     one = _alone(value)
     if isinstance(one, (LaunchConfiguration, LaunchConfigAsBool)):
         name = plain([one.variable_name])
@@ -139,7 +141,7 @@ _SIGNS: dict[type[ast.cmpop], str] = {
 
 
 def _python_expression(given: PythonExpression, context: Context) -> str | None:
-    """Return a condition in Python as an expression of a robot file, or None where it cannot be one."""
+    """Return a Python condition as an expression of a robot file, or None."""
     pieces = (
         given.expression if isinstance(given.expression, (list, tuple)) else [given.expression]
     )

@@ -1,4 +1,6 @@
-"""A stand-in for ``moveit_configs_utils``: the parameters that MoveIt's builder reads from a configuration package.
+"""A stand-in for ``moveit_configs_utils``.
+
+The parameters that MoveIt's builder reads from a configuration package.
 
 What it reads, and under which names it hands it on, was read in MoveIt's sources. Files that are
 not there are named.
@@ -68,7 +70,7 @@ class MoveItConfigs:
 
 
 class MoveItConfigsBuilder:
-    """Builds them; ``find`` gives the folder of a package, or what stands for it, ``context`` takes what is missing."""
+    """Builds them; ``find`` locates packages, ``context`` collects what is missing."""
 
     def __init__(
         self, find: Callable[[str], str], context: Context, robot_name: str = "",

@@ -67,7 +67,7 @@ _INSTALLED = frozenset({"launch", "launch_ros", "launch_xml", "launch_yaml", "li
 
 
 class Reader:
-    """Reads launch files; ``context`` has what came of it, ``recorder`` is there where ROS's launch reads them."""
+    """Reads launch files into ``context``; ``recorder`` is set with ROS's launch."""
 
     def __init__(self, request: dict[str, Any]) -> None:
         self.packages: dict[str, str] = request["packages"]
@@ -81,7 +81,10 @@ class Reader:
         self._known: dict[str, str | None] = {}
 
     def find(self, name: str, file: str) -> str | None:
-        """Return the folder of a package: a named or an installed one, or one around the launch file."""
+        """Return the folder of a package.
+
+        A named or an installed one, or one around the launch file.
+        """
         key = f"{name} {Path(file).parent}"
         if key not in self._known:
             self._known[key] = self._find(name, file)
@@ -239,7 +242,10 @@ class _Transition:
 
 
 class _Rewritten(substitutions.Substitution):
-    """nav2_common's RewrittenYaml and ReplaceString: the file as it is, and what would be changed in it."""
+    """nav2_common's RewrittenYaml and ReplaceString.
+
+    The file as it is, and what would be changed in it.
+    """
 
     def perform(self, context: Context) -> str:
         file = substitutions.with_package(
@@ -261,7 +267,10 @@ class _Rewritten(substitutions.Substitution):
 
 
 class _RobotPoses:
-    """nav2_common's ParseMultiRobotPose: poses of robots, which it takes from the command line of ``ros2 launch``."""
+    """nav2_common's ParseMultiRobotPose.
+
+    Poses of robots, which it takes from the command line of ``ros2 launch``.
+    """
 
     def __init__(self, context: Context, argument: str) -> None:
         context.todo(
@@ -301,7 +310,10 @@ class _Document:
 
 
 class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Finds the stand-in's modules; at the end of all finders, also those that are not installed."""
+    """Finds the stand-in's modules.
+
+    At the end of all finders, also those that are not installed.
+    """
 
     def __init__(self, reader: Reader, *, last: bool) -> None:
         self.reader, self.last = reader, last
@@ -473,7 +485,10 @@ def _watch(  # noqa: C901 (one hook after another)
 
 
 def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dict[str, Any]:
-    """Return what came of reading a launch file: records, in order, and why and at which line it stopped if it did."""
+    """Return what came of reading a launch file.
+
+    Records, in order, and why and at which line it stopped if it did.
+    """
     try:
         reader = Reader(request)
     except FailedError as error:

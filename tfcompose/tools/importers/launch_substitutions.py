@@ -32,7 +32,10 @@ PACKAGE = "package://"
 
 
 class FailedError(Exception):
-    """Something of a launch file cannot be resolved; ``line`` is set where it is about a whole file, else 0."""
+    """Something of a launch file cannot be resolved.
+
+    ``line`` is set where it is about a whole file, else 0.
+    """
 
     def __init__(self, reason: str, line: int = 0) -> None:
         super().__init__(f"line {line}: {reason}" if line else reason)
@@ -50,7 +53,7 @@ def marks(text: str) -> list[dict[str, Any]]:
 
 
 def symbolic_text(value: Any, context: Context) -> str:
-    """Return the text of a value in which launch arguments stand for themselves, where the robot file has them."""
+    """Return a value's text in which launch arguments stand for themselves."""
     before, context.symbolic = context.symbolic, True
     try:
         return with_package(text_of(value, context))
@@ -59,7 +62,10 @@ def symbolic_text(value: Any, context: Context) -> str:
 
 
 def _parameter_text(value: Any, context: Context) -> str:
-    """Return the same for a parameter: an argument that is all of it has a type, and may be 10.0, which texts lose."""
+    """Return the same for a parameter.
+
+    An argument that is all of it has a type, and may be 10.0, which texts lose.
+    """
     context.typed = True
     try:
         text = symbolic_text(value, context)
@@ -82,13 +88,16 @@ def scalar_of(text: str) -> Any:
 
 
 def with_package(path: str) -> str:
-    """Return a path below a package that is not found as an address: pathlib takes one slash for two."""
+    """Return a path below a package that is not found as an address.
+
+    Pathlib takes one slash for two.
+    """
     is_path = "package:/" in path and BEGIN not in path
     return re.sub(r"^.*?package:/+", PACKAGE, path) if is_path else path
 
 
 class Context:
-    """What actions change: launch configurations, the environment, and what holds for all nodes of a group.
+    """State changed by actions: configurations, environment, and group settings.
 
     ``records`` is what came of it, in order; ``todo`` what could not be resolved.
     """
@@ -214,12 +223,12 @@ def without_marks(text: str) -> tuple[str, list[str]]:
 
 
 def shown(text: str) -> str:
-    """Return a text for people: the path of a file or folder from the folder that the import was called in."""
+    """Return a text for people, with paths relative to the folder of the import."""
     return os.path.relpath(text) if os.path.isabs(text) and os.path.exists(text) else text  # noqa: PTH110, PTH117
 
 
 def text_of(value: Any, context: Context) -> str:
-    """Return the text of a value, of a substitution, or of a list of them, which belong together."""
+    """Return the text of a value, substitution or list of them."""
     if isinstance(value, (Substitution, ParameterValue)):
         if context.symbolic and not isinstance(
             value, (LaunchConfiguration, TextSubstitution, PathJoinSubstitution)
@@ -567,7 +576,7 @@ class ParameterValue:
     evaluate = perform
 
     def _symbolic(self, context: Context) -> str | None:
-        """Return the text in which arguments stand for themselves, if these have the value's type."""
+        """Return the text with arguments as themselves, if they have the value's type."""
         text = _parameter_text(self.value, context)
         names = arguments_in(text)
         alone = [name for name in names if text == argument(name, with_values(text))]
@@ -600,7 +609,10 @@ def _typed(text: str) -> Any:
 
 
 def _typed_or_symbolic(value: Any, context: Context) -> Any:
-    """Return the value that YAML reads in a text; arguments stand for themselves where they are read alike."""
+    """Return the value that YAML reads in a text.
+
+    Arguments stand for themselves where they are read alike.
+    """
     text = _parameter_text(value, context)
     plain_value, names = with_values(text), arguments_in(text)
     if marks(plain_value) or plain_value == text:
@@ -616,7 +628,10 @@ def _typed_or_symbolic(value: Any, context: Context) -> Any:
 
 
 def parameters_of(given: Any, context: Context, at: Any) -> list[Any]:
-    """Return parameters as mappings and names of files, in order; what cannot be resolved is said."""
+    """Return parameters as mappings and names of files, in order.
+
+    What cannot be resolved is said.
+    """
     several: list[Any] = []
     for one in given or ():
         try:
@@ -641,7 +656,7 @@ def _parameters(one: Any, context: Context) -> Any:
 def _flat(
     params: Mapping[Any, Any], context: Context, above: str, at: Any
 ) -> Iterable[tuple[str, Any]]:
-    """Yield parameters by their full names, without those that cannot be resolved, which are named."""
+    """Yield parameters by full name, without those that cannot be resolved."""
     for key, value in params.items():
         name = f"{above}{text_of(key, context)}"
         if isinstance(value, Mapping):
@@ -654,7 +669,10 @@ def _flat(
 
 
 def parameter_value(value: Any, context: Context) -> Any:
-    """Return a parameter's value as launch hands it on: what a substitution gives is read as YAML."""
+    """Return a parameter's value as launch hands it on.
+
+    What a substitution gives is read as YAML.
+    """
     if isinstance(value, ParameterValue):
         return value.perform(context)
     if isinstance(value, (bool, int, float, str)):
@@ -675,7 +693,10 @@ def parameter_value(value: Any, context: Context) -> Any:
 
 
 class Missing:
-    """What a module that is not installed here would give: whatever is done with it gives the same."""
+    """What a module that is not installed here would give.
+
+    Whatever is done with it gives the same.
+    """
 
     def __init__(self, name: str) -> None:
         self.name = name

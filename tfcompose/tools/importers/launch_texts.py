@@ -234,7 +234,9 @@ def _several(words: list[Any]) -> list[Any]:
 
 
 def command_line(text: Any) -> list[Any]:
-    """Return a command line's words: it is split where it has spaces, and not where a substitution's value has.
+    """Return a command line's words.
+
+    It is split where it has spaces, and not where a substitution's value has.
 
     Quotes around a substitution, as ROS 1 has them, are taken off.
     """
@@ -401,7 +403,10 @@ def _parameter(one: Entity) -> tuple[Any, Any]:
 
 
 def _made_by_ros1(one: Entity) -> Any:
-    """Return what a parameter of ROS 1 is the output of, or the text of; None where it has a value."""
+    """Return what a parameter of ROS 1 is the output of, or the text of.
+
+    None where it has a value.
+    """
     if one.get("command") is not None:
         return substitutions.Command(substituted(one.get("command")))
     return (

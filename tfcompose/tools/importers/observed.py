@@ -1,4 +1,7 @@
-"""A tree that was observed, live or in a bag, as a draft: what is published, by which nodes, how often."""
+"""A tree that was observed, live or in a bag, as a draft.
+
+What is published, by which nodes, how often.
+"""
 
 from __future__ import annotations
 
@@ -82,12 +85,12 @@ class Observed:
         frames[edge.child] = keys
 
     def _is_own(self, edge: EdgeState) -> bool:
-        """Return whether tfcompose's publisher of fixed edges sends the edge, or a stock node in its place."""
+        """Return whether tfcompose's static publisher or a stock node sends the edge."""
         below = f"/{self.namespace}/" if self.namespace else "/"
         return len(edge.nodes) == 1 and edge.nodes[0] in {below + STATIC, below + STATE_PUBLISHER}
 
     def recognise(self, library: Library) -> None:
-        """Put sensors in the place of the fixed frames that a preset has, if at most one driver publishes these."""
+        """Replace fixed frames by sensors whose presets have them, with one driver at most."""
         frames = self.draft.sections["frames"]
         for publisher in (DRIVER, TFCOMPOSE):
             sensors, undecided = recognised(self._fixed(), library, publisher)
@@ -127,7 +130,10 @@ class Observed:
         )
 
     def _sensor(self, sensor: Recognised, driver: str) -> None:
-        """Put a sensor in the place of its frames; ``driver`` is the process that publishes those inside of it."""
+        """Put a sensor in the place of its frames.
+
+        ``driver`` is the process that publishes those inside of it.
+        """
         frames, mount = self.draft.sections["frames"], sensor.mount.child
         taken = sensor.name in self.draft.sections["processes"]
         new = self._renamed(sensor.name) if taken else ""
@@ -223,7 +229,10 @@ def _parents_first(edges: Sequence[EdgeState]) -> list[EdgeState]:
 
 
 def round_rate(rate_hz: float | None) -> float | None:
-    """Return the rate (Hz) that was meant by one that was measured: a round one near it, or what is surely reached."""
+    """Return the rate (Hz) that was meant by one that was measured.
+
+    A round one near it, or what is surely reached.
+    """
     if not rate_hz or not math.isfinite(rate_hz) or rate_hz <= 0:
         return None
     scale = 10.0 ** math.floor(math.log10(rate_hz))
@@ -234,7 +243,9 @@ def round_rate(rate_hz: float | None) -> float | None:
 
 
 def started_by(words: Sequence[str]) -> dict[str, Any]:
-    """Return the package, executable and arguments of a command line; nothing where it is no package's program.
+    """Return the package, executable and arguments of a command line.
+
+    Nothing where it is no package's program.
 
     A program of a Python package has the interpreter in front.
     """

@@ -42,7 +42,10 @@ _MATERIAL = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def omitted(document: Document) -> Notes:
-    """Return what is left out of each link and joint, by reading or by import; of the robot itself under no name."""
+    """Return what is left out of each link and joint, by reading or by import.
+
+    Of the robot itself under no name.
+    """
     notes: Notes = {}
     entries: list[tuple[Span, Entry]] = []
     colours = _described_materials(document.root)
@@ -130,7 +133,7 @@ def _elements_in(element: Element) -> Iterator[Element]:
 
 
 def angles(root: Element) -> dict[Quaternion, Vector]:
-    """Return roll, pitch and yaw (rad) of each origin as the source has them, by the rotation that they are."""
+    """Return each origin's roll, pitch and yaw (rad) from the source, by rotation."""
     rpy: dict[Quaternion, Vector] = {}
     for top in root.children:
         for one in _elements_in(top) if top.tag in {"link", "joint"} else ():
@@ -145,7 +148,7 @@ def angles(root: Element) -> dict[Quaternion, Vector]:
 
 
 def without_unused_blocks(robot: Robot) -> tuple[Robot, list[str]]:
-    """Return the robot without blocks about links and joints that it does not have, with a note for each."""
+    """Return the robot without blocks about missing links and joints, with notes."""
     joints = {edge.joint_name: None for edge in robot.edges}
     blocks, notes = [], []
     for block in robot.blocks:
@@ -168,7 +171,7 @@ def _named(element: Element) -> str:
 
 
 def with_material_names(robot: Robot) -> tuple[Robot, list[str]]:
-    """Return the robot whose materials have names of letters, digits and _, with what each was called before.
+    """Return the robot with plain material names, and what each was called.
 
     Parts of colours beyond 0 to 1 are taken as the nearest that there is, and that is noted too.
     """

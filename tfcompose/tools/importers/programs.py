@@ -67,7 +67,9 @@ _SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "dis
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What a robot_state_publisher is given: a xacro ``file`` with ``args``, or the text of a URDF.
+    """What a robot_state_publisher is given.
+
+    A xacro ``file`` with ``args``, or the text of a URDF.
 
     ``prefix`` is written in front of its frames.
     """
@@ -127,7 +129,7 @@ def add_program(draft: Draft, program: Program, target: Target) -> str | None:
 
 
 def one_clock(draft: Draft) -> None:
-    """Let the robot's clock be what parameters of nodes say, or the argument that they name, if they all agree."""
+    """Set the robot's clock from node parameters or their argument, if all agree."""
     several = [process["params"] for process in draft.started().values() if "params" in process]
     found = {params["use_sim_time"] for params in several if "use_sim_time" in params}
     if found == {True}:
@@ -142,7 +144,10 @@ def one_clock(draft: Draft) -> None:
 
 
 def is_setting(draft: Draft, name: str, value: str) -> bool:
-    """Return whether a variable is a setting of the whole robot, which then has it: the first value counts."""
+    """Return whether a variable is a setting of the whole robot, which then has it.
+
+    The first value counts.
+    """
     if name not in _SETTINGS:
         return False
     known = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
@@ -154,7 +159,10 @@ def is_setting(draft: Draft, name: str, value: str) -> bool:
 
 
 def path_from(target: Target, path: str) -> str:
-    """Return a path as the robot file has it: from its folder, or absolute where they have but the root in common."""
+    """Return a path as the robot file has it.
+
+    From its folder, or absolute where they have but the root in common.
+    """
     begin = posixpath.normpath(posixpath.join(target.top, target.folder))
     is_near = posixpath.commonpath([begin, posixpath.join(target.top, path)]) != "/"
     return (
@@ -201,7 +209,10 @@ def _of_command(program: Program) -> Program:
 
 
 def _without_ros_arguments(program: Program) -> Program:
-    """Return the program with what ``--ros-args`` says as its keys; what has no key stays an argument."""
+    """Return the program with what ``--ros-args`` says as its keys.
+
+    What has no key stays an argument.
+    """
     own: list[str] = []
     kept: list[str] = []
     params, remap = list(program.params), list(program.remap)
@@ -288,7 +299,7 @@ def _add_transform(draft: Draft, program: Program) -> None:
 
 
 def isolated(draft: Draft, moved: Mapping[str, str], namespace: str | None) -> bool:
-    """Return whether remappings leave TF where it is, or put it below the namespace, which the draft then says."""
+    """Return whether remappings keep TF, or move it below the draft's namespace."""
     new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
     if any(name != topic.strip("/") for topic, name in new.items()):
         return False
@@ -298,7 +309,10 @@ def isolated(draft: Draft, moved: Mapping[str, str], namespace: str | None) -> b
 
 
 def _add_joint_publisher(draft: Draft, program: Program) -> str:
-    """Add a stand-in for joint states: all joints at 0, as joint_state_publisher has them unless it is told."""
+    """Add a stand-in for joint states.
+
+    All joints at 0, as joint_state_publisher has them unless it is told.
+    """
     params: dict[str, Any] = {}
     for one in program.params:
         params |= one if isinstance(one, dict) else {}
@@ -390,7 +404,10 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
 
 
 def remappings(rules: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """Return remappings as a robot file has them: ROS takes the first of several rules for one name."""
+    """Return remappings as a robot file has them.
+
+    ROS takes the first of several rules for one name.
+    """
     return dict(reversed(list(dict(reversed(rules)).items())))
 
 
@@ -414,7 +431,10 @@ _MULTI = "--use_multi_threaded_executor"
 
 
 def _container_keys(program: Program) -> dict[str, Any]:
-    """Return what a container is: by its isolation and executor if it is a stock one, else by its program."""
+    """Return what a container is.
+
+    By its isolation and executor if it is a stock one, else by its program.
+    """
     words = list(program.argv)
     stock = _CONTAINERS.get(program.executable or "") if program.package == CONTAINERS else None
     if stock is None:
@@ -430,7 +450,10 @@ def _container_keys(program: Program) -> dict[str, Any]:
 
 
 def _named_in_files(params: Sequence[Mapping[str, Any] | str], reach: Reach) -> str | None:
-    """Return the node that parameter files are written for, where that is one alone; None where none is named."""
+    """Return the node that parameter files are written for, where that is one alone.
+
+    None where none is named.
+    """
     files = [file for file in params if isinstance(file, str)]
     keys = [key for file in files for key in _nodes_in(file, reach) or ()]
     names = {key.rpartition("/")[2] for key in keys if "*" not in key}
@@ -495,7 +518,7 @@ def _plain(program: Program) -> str:
 def _params(
     given: Sequence[Mapping[str, Any] | str], target: Target, node: str, reach: Reach
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the parameters as a robot file has them, files first, and what cannot be said of them.
+    """Return the parameters as a robot file has them, files first, and the rest.
 
     What a file lays over the parameters before it is left to the file.
     """

@@ -137,7 +137,10 @@ class _Writer:
         return self.notes.get((title, name), [])
 
     def _homeless(self, sections: dict[str, dict[str, Any]]) -> list[str]:
-        """Return the notes of what has no entry of its own; a frame with a body has its notes there."""
+        """Return the notes of what has no entry of its own.
+
+        A frame with a body has its notes there.
+        """
         homeless = []
         for (title, name), notes in list(self.notes.items()):
             if title == "frames" and name not in sections["frames"] and name in sections["links"]:
@@ -151,7 +154,10 @@ class _Writer:
             self.notes.setdefault((title, name), []).extend(notes)
 
     def _fixed(self) -> dict[str, Edge]:
-        """Return the edges that do not move and are no sensor's, by child; of several to one child, the first."""
+        """Return the edges that do not move and are no sensor's, by child.
+
+        Of several to one child, the first.
+        """
         fixed: dict[str, Edge] = {}
         for edge in self.robot.edges:
             moves = edge.joint or edge.free
@@ -228,7 +234,9 @@ class _Writer:
 def sensor_keys(
     sensor: Recognised, pose: Mapping[str, Any], rpy: Mapping[Quaternion, Vector], driver: str = ""
 ) -> dict[str, Any]:
-    """Return the keys of a sensor; ``pose`` are those of its mount, ``rpy`` the angles of rotations in the source.
+    """Return the keys of a sensor.
+
+    ``pose`` are those of its mount, ``rpy`` the angles of rotations in the source.
 
     ``driver`` is the process that publishes the frames inside of it, empty where tfcompose does.
     """
@@ -258,7 +266,7 @@ def sensor_keys(
 
 
 def _joint_name(edge: Edge) -> dict[str, str]:
-    """Return the name of the joint that a fixed edge is, where it is not what ``build`` calls it."""
+    """Return the joint name of a fixed edge, if ``build`` names it otherwise."""
     return (
         {"joint": edge.joint_name}
         if edge.joint_name not in {"", f"{edge.parent}_to_{edge.child}"}
@@ -339,7 +347,7 @@ def imported(
 def with_findings(
     robot: Imported, source: str, lint: Callable[[str], Compiled]
 ) -> tuple[str, list[Finding]]:
-    """Return the robot file with what ``lint`` finds in it as comments, and the errors that only a robot file has.
+    """Return the robot file with lint's findings as comments, and its own errors.
 
     ``source`` is the file that the robot was imported from. Names that the source has are no
     errors.

@@ -49,7 +49,9 @@ _MOST_NAMED = 8
 
 @dataclass(frozen=True, slots=True)
 class Recognised:
-    """A sensor that a preset describes: ``mount`` is its edge, ``inside`` the edges to the frames that it brings.
+    """A sensor that a preset describes.
+
+    ``mount`` is its edge, ``inside`` the edges to the frames that it brings.
 
     ``own_xyz`` and ``own_rotation`` are those of its frames whose position, or rotation, is not
     the preset's to the last digit. ``body`` is the frame on which the preset has a body, empty
@@ -84,14 +86,16 @@ class _Fit:
 
     @property
     def quality(self) -> tuple[int, int, int, int]:
-        """How well it fits: frames explained, the preset's own names and values to the last digit, default options."""
+        """How well a preset fits: frames, names and values to the last digit, defaults."""
         own = len(self.sensor.own_xyz) + len(self.sensor.own_rotation)
         return (len(self.sensor.inside), -len(self.sensor.names), -own, self.usual)
 
 
 @dataclass(frozen=True, slots=True)
 class _Match:
-    """A frame of a preset in the robot: its edge, and whether its position and rotation are its own.
+    """A frame of a preset in the robot.
+
+    Its edge, and whether its position and rotation are its own.
 
     ``tells`` is whether its pose is one that not every sensor has.
     """
@@ -105,7 +109,7 @@ class _Match:
 def recognised(
     robot: Robot, library: Library, publisher: str = TFCOMPOSE
 ) -> tuple[list[Recognised], dict[str, str]]:
-    """Return the sensors of the robot, and for each mount where none could be decided on a note with the reason.
+    """Return the sensors, and a note for each mount where none was decided on.
 
     ``publisher`` says whether frames are looked for as tfcompose publishes them, or as drivers do.
     """
@@ -158,7 +162,10 @@ def _sensor_name(mount: str) -> str:
 
 
 def _words(*texts: str) -> frozenset[str]:
-    """Return the words of some names, each also joined to its neighbours: of ``VLP-16_base`` also ``vlp16``."""
+    """Return the words of some names, each also joined to its neighbours.
+
+    Of ``VLP-16_base`` also ``vlp16``.
+    """
     joined: set[str] = set()
     for text in texts:
         words = re.findall("[a-z0-9]+", text.lower())
@@ -197,7 +204,7 @@ class _Search:
                 continue  # lint reports what is wrong with it
 
     def chosen(self, rivals: list[_Fit]) -> Recognised | None:
-        """Return the one of several equally good fits that something tells from the others, or None."""
+        """Return the equally good fit that other facts single out, or None."""
         rivals = [one for one in rivals if not self.other_model(one.sensor)]
         if not rivals:
             return None
@@ -216,7 +223,9 @@ class _Search:
         return generic[0] if generic and not named else None
 
     def named(self) -> list[tuple[Edge, list[str]]]:
-        """Return the edges whose frame, or a mesh on it, names presets, with these; the most exact names first.
+        """Return the edges whose frame, or a mesh on it, names presets, with these.
+
+        The most exact names first.
 
         It may be a model, or else a family, or else a vendor.
         """
@@ -234,7 +243,7 @@ class _Search:
         return [(edge, presets) for _, edge, presets in sorted(found, key=itemgetter(0))]
 
     def other_model(self, sensor: Recognised) -> list[str]:
-        """Return the presets whose models are named at the sensor's frames, if none of them is the sensor's.
+        """Return the presets named at the frames, if none of them is the sensor's.
 
         The mesh of a D435i may be that of a D435.
         """
@@ -342,7 +351,10 @@ class _Search:
             )
 
     def _as_sent(self, frame: PresetFrame) -> PresetFrame:
-        """Return the frame as its publisher sends it: a driver may have another parent or pose for it."""
+        """Return the frame as its publisher sends it.
+
+        A driver may have another parent or pose for it.
+        """
         if self.publisher != DRIVER or frame.by_driver is None:
             return frame
         own = frame.by_driver
@@ -356,7 +368,10 @@ class _Search:
         self, preset: PresetSpec, sensor: str, wanted: Mapping[str, PresetFrame], names: dict[str, str],
         *, has_own_names: bool,
     ) -> dict[str, _Match]:  # fmt: skip
-        """Return where the robot has the preset's frames; ``names`` gets those that they have in the robot."""
+        """Return where the robot has the preset's frames.
+
+        ``names`` gets those that they have in the robot.
+        """
         found: dict[str, _Match] = {}
         waiting = dict(wanted)
         while waiting:
@@ -450,7 +465,7 @@ def _choices(preset: PresetSpec) -> Iterator[dict[str, str]]:
 
 
 def _options(preset: PresetSpec) -> Iterator[dict[str, Any]]:
-    """Yield the values that its other options can have, of which only those matter that frames depend on."""
+    """Yield the values of other options that change the frames."""
     used = {option for frame in preset.frames.values() for option in frame.when}
     several: dict[str, list[Any]] = {}
     for key, option in preset.options.items():

@@ -1,4 +1,6 @@
-"""Commands in a shell script, or in lines of a terminal: what they start, as far as no shell has to run for it.
+"""Commands in a shell script, or in lines of a terminal.
+
+What they start, as far as no shell has to run for it.
 
 Words are split as a POSIX shell does; variables that the script sets to plain texts are filled in.
 What only a shell can know, as ``$(…)`` and arithmetic, is not guessed.
@@ -336,7 +338,7 @@ class _Script:
 
 
 def _without_prompt(words: list[str]) -> list[str]:
-    """Return the words of a command without what a terminal, or ``history``, puts in front of them."""
+    """Return the command without what a terminal or ``history`` prints before it."""
     if len(words) > 1 and _NUMBER.fullmatch(words[0]):
         words = words[1:]
         while len(words) > 1 and _TIME.fullmatch(words[0]):
@@ -347,7 +349,7 @@ def _without_prompt(words: list[str]) -> list[str]:
 
 
 def _program_at(words: list[str]) -> int:
-    """Return where in a command the program of ROS begins that it starts, 0 for any other command."""
+    """Return where in a command its ROS program begins, 0 for other commands."""
     for index, word in enumerate(words):
         if word in {"rosrun", "roslaunch"} or (
             word == "ros2" and words[index + 1 : index + 2] in (["run"], ["launch"])

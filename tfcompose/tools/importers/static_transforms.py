@@ -1,4 +1,6 @@
-"""What a ``static_transform_publisher`` is told by its arguments: of ROS 2 by name or in order, of ROS 1 in order.
+"""What a ``static_transform_publisher`` is told by its arguments.
+
+Of ROS 2 by name or in order, of ROS 1 in order.
 
 Read in geometry2 (``static_transform_broadcaster_program.cpp``) and in ROS 1's ``tf`` and
 ``tf2_ros``: all orders have yaw first, all angles are radians about fixed axes, and nothing is
@@ -48,7 +50,9 @@ class RefusedError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class StaticTransform:
-    """A fixed edge as its publisher is told it. ``rpy`` (rad) is None where it is told a quaternion.
+    """A fixed edge as its publisher is told it.
+
+    ``rpy`` (rad) is None where it is told a quaternion.
 
     ``order`` says in which order the arguments stand, empty where they have names.
     """
@@ -107,7 +111,10 @@ def static_words(params: Sequence[Any]) -> list[str]:
 
 
 def _without_ros_arguments(words: Sequence[str]) -> list[str]:
-    """Return the words outside ``--ros-args … --``; those of ROS 1, as in ``__name:=a``, are left out too."""
+    """Return the words outside ``--ros-args … --``.
+
+    Those of ROS 1, as in ``__name:=a``, are left out too.
+    """
     own, inside = [], False
     for word in words:
         if word == "--ros-args":
@@ -207,7 +214,10 @@ def _number(word: str, what: str) -> float:
 
 
 def reader_of(words: Sequence[str]) -> Reader:
-    """Return who reads the arguments of a program whose package is not given: tf's have a period behind two frames."""
+    """Return who reads the arguments of a program whose package is not given.
+
+    Tf's have a period behind two frames.
+    """
     own = _without_ros_arguments(words)
     return (
         "tf"

@@ -1,4 +1,6 @@
-"""Bodies, joints and poses in the words of the robot file, as plain data; what is the default is left out.
+"""Bodies, joints and poses in the words of the robot file, as plain data.
+
+What is the default is left out.
 
 Angles are in degrees where that is exact, and else in radians with all digits.
 """
@@ -156,7 +158,10 @@ def _clashing(robot: Robot) -> frozenset[str]:
 
 
 def _axis(joint: Joint) -> list[float]:
-    """Return the axis at the length that it has in the source, if that is nearly 1: its digits are fewer."""
+    """Return the axis at the length that it has in the source, if that is nearly 1.
+
+    Its digits are fewer.
+    """
     near = 0.98 < joint.axis_length < 1.02  # noqa: PLR2004 (another length is a finding of its own)
     return [float(f"{part * joint.axis_length:.15g}") if near else part for part in joint.axis]
 

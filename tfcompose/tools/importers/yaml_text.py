@@ -1,4 +1,7 @@
-"""YAML as people write robot files: an entry on a line where it fits, numbers and names bare, all else in quotes."""
+"""YAML as people write robot files.
+
+An entry on a line where it fits, numbers and names bare, all else in quotes.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +96,10 @@ def flow(value: Any) -> str:
 
 
 def parameter(value: Any) -> Any:
-    """Return a node's parameter such that it is written with its type: 20.0 is a double, and 20 an integer."""
+    """Return a node's parameter such that it is written with its type.
+
+    20.0 is a double, and 20 an integer.
+    """
     if isinstance(value, list):
         return [parameter(item) for item in value]
     if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -105,7 +111,10 @@ def parameter(value: Any) -> Any:
 
 
 def _as_people_write(value: float) -> float:
-    """Return the number without what computing left in its last digits: 0.010267499999999999 was 0.0102675."""
+    """Return the number without what computing left in its last digits.
+
+    0.010267499999999999 was 0.0102675.
+    """
     near = float(f"{value:.{_DIGITS}g}")
     return near if abs(near - value) <= _LEFT_BEHIND * abs(value) else value
 
@@ -179,7 +188,7 @@ def section(
 def without_expressions(
     sections: dict[str, dict[str, Any]],
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """Return sections in which no text is taken for an expression, and the lines of the variable that they need."""
+    """Return sections without accidental expressions, and the variable they need."""
     lines = (
         entry("vars", {"dollar": "$"}) if any("${" in value for value in _texts(sections)) else []
     )
@@ -192,7 +201,10 @@ _ARGUMENT = re.compile("\x04([^\x05]*)\x05([^\x06]*)\x06")
 
 
 def argument(name: str, value: str) -> str:
-    """Return what stands for an argument that has this value: ``${args.name}`` in the written file."""
+    """Return what stands for an argument that has this value.
+
+    ``${args.name}`` in the written file.
+    """
     return f"\x04{name}\x05{value}\x06"
 
 

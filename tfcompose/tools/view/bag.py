@@ -1,4 +1,6 @@
-"""A recording as it is shown: where frames were at a time, in any order of times, and what is wrong with it.
+"""A recording as it is shown.
+
+Where frames were at a time, in any order of times, and what is wrong with it.
 
 All of a bag's transforms are kept as numbers, 64 bytes each. At a time, each frame has the pose
 that was recorded last until then; a fixed edge holds at any time, as in tf2, so that before its
@@ -36,7 +38,10 @@ _SECOND_NS = 1_000_000_000
 
 @dataclass(slots=True)
 class _Track:
-    """What was recorded of one frame, in the order of recording; of each the parent, and whether it was fixed."""
+    """What was recorded of one frame, in the order of recording.
+
+    Of each the parent, and whether it was fixed.
+    """
 
     times_ns: array[int] = field(default_factory=lambda: array("q"))
     poses: array[float] = field(default_factory=lambda: array("d"))
@@ -155,7 +160,7 @@ class BagTree(ShownTree):
         return {name: row for name, (_, _, row) in found.items()}
 
     def about(self, frame: str) -> list[str]:
-        """Return what is known of the edge above a frame at the time, then what is wrong in the recording."""
+        """Return the edge above a frame at the time, then what is wrong in the recording."""
         if frame in self._rows:
             track, index, row = self._rows[frame]
             rate = self._rates.get(frame)

@@ -1,4 +1,7 @@
-"""What somebody chose to see of a robot, by names: it outlives the panel that is made anew when a file changes."""
+"""What somebody chose to see of a robot, by names.
+
+It outlives the panel that is made anew when a file changes.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class Choices:
-    """What was chosen; names may be those of frames, owners or sensors that the robot has no more, or not yet.
+    """Choices in the view; they may name frames, owners or sensors that are gone.
 
     Attributes:
         selected: the selected frame; empty: none was.

@@ -81,7 +81,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Serve the view until Ctrl-C, or write it; exit code 1 if the file gives no robot, 2 if it cannot be shown."""
+    """Serve the view until Ctrl-C, or write it.
+
+    Exit code 1 if the file gives no robot, 2 if it cannot be shown.
+    """
     try:
         from tfcompose.tools.view.reload import Files
     except ImportError as error:
@@ -192,7 +195,10 @@ def _write(session: Session, path: Path) -> None:
 
 
 def _running_plan(arguments: Namespace) -> str | None:
-    """Return the plan that the robot runs with that is in this ROS domain; None if there is none, or none is meant."""
+    """Return the plan that the robot runs with that is in this ROS domain.
+
+    None if there is none, or none is meant.
+    """
     if (
         not arguments.live
         or arguments.profiles
@@ -211,7 +217,10 @@ def _running_plan(arguments: Namespace) -> str | None:
 
 
 def _check_output(path: Path, files: Sequence[str]) -> None:
-    """Refuse a page that cannot be written, or that would replace one of the robot's files; ends then."""
+    """Refuse a page that cannot be written, or that would replace one of the robot's files.
+
+    Ends then.
+    """
     from tfcompose.foundation.reading import is_folder
 
     if not is_folder(path.parent):
@@ -255,7 +264,7 @@ def _trouble(host: str, port: int) -> str:
 
 
 def _address(host: str, port: int, token: str) -> str:
-    """Return what to open; from elsewhere a machine that listens at all its addresses is reached by its name."""
+    """Return the address to open; a server on all addresses is reached by its host name."""
     import socket
 
     name = socket.gethostname() if host in _EVERYWHERE else f"[{host}]" if ":" in host else host

@@ -1,4 +1,4 @@
-"""From a new pose of a mount to the edits of the robot file that give it that pose, and leave every other byte.
+"""From a mount's new pose to edits of the robot file that change nothing else.
 
 The number is changed where it stands, in the unit in which it stands, through ``place`` and
 ``relative_to``. A value that is not a mount's own (a variable's, an included file's, a
@@ -61,7 +61,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """Why the pose is not edited where it stands, where that is, and the values that an overlay can give instead.
+    """Why the pose is not edited at its place, and the values for an overlay.
 
     ``entry`` leads to the mapping that they belong to; it is empty where no overlay reaches. None
     removes a key.
@@ -79,7 +79,9 @@ class Elsewhere:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """The pose that a file gives for one edge: that of a frame, the ``place``, in a frame it is ``relative_to``.
+    """The pose that a file gives for one edge.
+
+    That of a frame, the ``place``, in a frame it is ``relative_to``.
 
     ``parent_from_base`` is the pose of the latter in the edge's parent, ``child_from_place`` that
     of the former in the edge's child.
@@ -147,7 +149,7 @@ def mount_of(robot: Robot, source: Source, child: str) -> Mount:
 def change_of(
     robot: Robot, source: Source, texts: Mapping[str, str], child: str, parent_from_child: Pose
 ) -> Change | Elsewhere:
-    """Return the edits after which the frame has this pose in its parent, or where the value is that forbids them.
+    """Return the edits that give the frame this pose, or the value that forbids them.
 
     ``source`` is what the robot was made from, overlays merged over it; ``texts`` are the files
     that may be edited, by the names that spans have.
@@ -254,7 +256,10 @@ class _Change:
     def _or_inserted(
         self, key: str, complete: str | None, before: Numbers, after: Numbers
     ) -> list[Edit]:
-        """Return the edits of a key's numbers; where the entry has the key through ``<<``, it gets one of its own."""
+        """Return the edits of a key's numbers.
+
+        Where the entry has the key through ``<<``, it gets one of its own.
+        """
         try:
             return list(self._renumbered(key, before, after))
         except _SharedError:
@@ -264,7 +269,7 @@ class _Change:
             return [self._inserted({key: complete}, ("parent", "xyz"))]
 
     def _complete(self, key: str, rotation: Quaternion, numbers: Numbers) -> str | None:
-        """Return the YAML of a rotation under a key of its own, or None where it has no short form."""
+        """Return the YAML of a rotation under its own key, or None without a short form."""
         if key == "rpy":
             return self._rpy(rotation)
         if key == "look":
@@ -333,7 +338,10 @@ class _Change:
         return Edit(span, self._short(value, found[3] or "", found[2]))
 
     def _own(self, path: Path) -> Span:
-        """Return the span of a value below the entry, without an anchor or a tag; it belongs to this entry alone."""
+        """Return the span of a value below the entry, without an anchor or a tag.
+
+        It belongs to this entry alone.
+        """
         at = (*self.mount.entry, *path)
         span = self.source.exactly_at(at)
         if span is None:
@@ -357,7 +365,7 @@ class _Change:
         return self._raw[file]
 
     def _place_in_text(self, path: Path) -> Place:
-        """Return the place of a mapping as it stands in its file, before anything was merged over it."""
+        """Return the place of a mapping in its file, before anything was merged over it."""
         span = self.source.at(path)
         return next(place for _, place in self._places(span.file).walk() if place.span == span)
 

@@ -24,7 +24,7 @@ def numbers(pose: Pose) -> str:
 
 
 def facts_of(robot: Robot, sources: Sequence[Source], frame: str) -> list[str]:
-    """Return where a frame hangs and whose it is, its pose there, and where in the files its values stand."""
+    """Return a frame's parent and owner, its pose, and the places of its values."""
     edge = robot.parent_edge(frame)
     if edge is None:
         return [f"{frame} is a root ({robot.frames[frame]})"]

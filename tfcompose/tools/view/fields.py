@@ -1,4 +1,4 @@
-"""What the sensors see: the field of view of each stream, and the rays in it that the robot's own bodies block."""
+"""What sensors see: each stream's field of view, and rays blocked by the robot."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ _REACH_M = 0.5
 
 
 def rims(optics: Optics) -> list[Any]:
-    """Return what bounds the field of view: polylines, arrays (n, 3) in the stream's frame; none if it is not known.
+    """Return what bounds the field of view: polylines, arrays (n, 3) in the stream's frame.
+
+    None if it is not known.
 
     A camera's points are at a depth of 1 (along its optical axis), those of all others at a
     distance of 1. A polyline that comes round ends where it begins.
@@ -97,7 +99,9 @@ def _directions(azimuths: Any, elevations: Any) -> Any:
 
 
 def outline(optics: Optics, reach: float) -> Any:
-    """Return the lines that show a field of view as far as ``reach`` metres: an array (n, 2, 3) in the stream's frame.
+    """Return the lines that show a field of view as far as ``reach`` metres.
+
+    An array (n, 2, 3) in the stream's frame.
 
     They are the rims where the stream begins to see and where the drawing ends, and lines from one
     to the other.
@@ -114,7 +118,10 @@ def outline(optics: Optics, reach: float) -> Any:
 
 
 def _corners(optics: Optics, rim: Any) -> list[int]:
-    """Return which points of a rim a line leads to: the corners of an image, four of a circle, the ends of an arc."""
+    """Return which points of a rim a line leads to.
+
+    The corners of an image, four of a circle, the ends of an arc.
+    """
     if optics.kind == "camera" and optics.projection != "fisheye":
         return [0, 1, 2, 3]
     if np.allclose(rim[0], rim[-1]):
@@ -123,7 +130,7 @@ def _corners(optics: Optics, rim: Any) -> list[int]:
 
 
 def surface(optics: Optics, reach: float) -> tuple[Any, Any]:
-    """Return the sides of a field of view as triangles, (vertices, faces), from the stream's origin to ``reach``."""
+    """Return a field of view's sides as triangles (vertices, faces) up to ``reach``."""
     far = min(reach, optics.far or reach)
     vertices, faces = [np.zeros((1, 3))], [np.zeros((0, 3), int)]
     for rim in rims(optics):
@@ -135,7 +142,7 @@ def surface(optics: Optics, reach: float) -> tuple[Any, Any]:
 
 
 def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
-    """Yield the streams whose field of view is known, of those of a sensor that see the same the first."""
+    """Yield the streams with a known field of view, one of those that see the same."""
     for sensor in robot.sensors:
         for optics in different_streams(sensor):
             if optics.frame in robot.frames and rims(optics):
@@ -143,7 +150,9 @@ def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
 
 
 class FieldsOfView:
-    """The fields of view in a scene, hidden at first but for those of cameras; ``update`` moves them.
+    """The fields of view in a scene, hidden at first but for those of cameras.
+
+    ``update`` moves them.
 
     They are drawn as far as ``reach``, in metres, which begins at a ``scale``.
     """
@@ -204,13 +213,15 @@ class FieldsOfView:
         self.hide(self._hidden)
 
     def hide(self, frames: frozenset[str]) -> None:
-        """Hide the fields of view of these frames, and show those of all others whose sensor is shown."""
+        """Hide the fields of view of these frames, and show those of other shown sensors."""
         self._hidden = frames
         for handle, (sensor, optics) in zip(self._frames, self._streams, strict=True):
             handle.visible = self.shown[sensor.name] and optics.frame not in frames
 
     def show_blocked(self, robot: Robot | None) -> list[str]:
-        """Draw the rays of the shown sensors that bodies of the robot block, as TF641 counts them; None: draw none.
+        """Draw the rays of the shown sensors that bodies of the robot block, as TF641 counts them.
+
+        None: draw none.
 
         Returns:
             what is blocked, by stream: ``front (depth): 12 % by mast``.

@@ -1,4 +1,7 @@
-"""Findings, and what a save did, as HTML: names in them come from files, and from whoever publishes."""
+"""Findings, and what a save did, as HTML.
+
+Names in them come from files, and from whoever publishes.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,10 @@ _COLOURS = {"error": "rgb(220, 30, 30)", "warning": "rgb(200, 120, 20)"}
 
 
 def findings_html(found: Sequence[Finding], none: str = "") -> str:
-    """Return findings as lines of HTML, the codes of errors in red; ``none`` is what to say where there are none."""
+    """Return findings as lines of HTML, the codes of errors in red.
+
+    ``none`` is what to say where there are none.
+    """
     lines = [_line(one) for one in found[:MOST]] or [escape(none)]
     return paragraphs([*lines, *([f"and {len(found) - MOST} more"] if len(found) > MOST else [])])
 
@@ -38,7 +44,10 @@ def paragraphs(lines: Sequence[str]) -> str:
 
 
 def saved_html(saved: Saved) -> str:
-    """Return what a save did as HTML: the diff, what is found in the result, and what no edit can give."""
+    """Return what a save did as HTML.
+
+    The diff, what is found in the result, and what no edit can give.
+    """
     if saved.refused:
         return paragraphs(["not saved, there would be errors:"]) + findings_html(saved.refused)
     text = paragraphs(["saved:" if saved.diff else "nothing to save"])

@@ -22,7 +22,10 @@ IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Forest:
-    """The trees that frames form by their parents; where they form a loop, one of its frames counts as a root."""
+    """The trees that frames form by their parents.
+
+    Where they form a loop, one of its frames counts as a root.
+    """
 
     def __init__(self, frames: Sequence[str], parents: Mapping[str, str]) -> None:
         self.frames = tuple(frames)
@@ -43,7 +46,7 @@ class Forest:
             self._root_of[rows] = self._root_of[above]
 
     def in_roots(self, local: Rows) -> Rows:
-        """Return the pose of each frame in its root from those in the parents, shape (frames, 7)."""
+        """Return the pose of each frame in its root, shape (frames, 7)."""
         composed: Rows = local.copy()
         composed[self._roots] = IDENTITY
         for rows, above in self._levels:
@@ -51,7 +54,10 @@ class Forest:
         return composed
 
     def in_frame(self, frame: str, in_roots: Rows, others: Rows) -> Rows:
-        """Return ``others`` with those in the frame's tree as poses in the frame, whose own pose is in ``in_roots``."""
+        """Return ``others`` in the frame's tree as poses in the frame.
+
+        Its own pose is in ``in_roots``.
+        """
         same = self._root_of == self._root_of[self.index[frame]]
         inverse = np.array([row_of(pose_of(in_roots[self.index[frame]].tolist()).inverse())])
         found: Rows = others.copy()

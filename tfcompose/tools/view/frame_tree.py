@@ -1,4 +1,4 @@
-"""The frames of a robot as the rows of a tree, of which some are closed, and some hidden with all below them."""
+"""A robot's frames as rows of a tree, with closed and hidden subtrees."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ _OPEN_ROWS = 40
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of the tree; the root is at depth 0. ``is_open`` is None where nothing is below the frame."""
+    """A row of the tree; the root is at depth 0.
+
+    ``is_open`` is None where nothing is below the frame.
+    """
 
     frame: str
     depth: int
@@ -33,7 +36,7 @@ class Row:
 
 
 class FrameTree:
-    """The frames of a robot from top to bottom, each below its first parent that closes no loop."""
+    """A robot's frames from top to bottom, below their first parent without a loop."""
 
     def __init__(self, robot: Robot) -> None:
         self._parents: dict[str, str] = {}
@@ -70,12 +73,15 @@ class FrameTree:
         return dict.fromkeys(way_up(frame, self._parents.get)[1:], True)
 
     def matches(self, search: str) -> set[str]:
-        """Return the frames whose names have each word of the search in them, in any case of letters."""
+        """Return the frames whose names contain each word of the search, in any case."""
         words = search.lower().split()
         return {frame for frame in self.frames if all(word in frame.lower() for word in words)}
 
     def rows(self, chosen: Mapping[str, bool], search: str = "") -> Iterator[Row]:
-        """Yield the rows from top to bottom: below frames that are open, or what a search finds and all above that."""
+        """Yield the rows from top to bottom.
+
+        Below frames that are open, or what a search finds and all above that.
+        """
         searches = bool(search.strip())
         found = self.matches(search)
         wanted = (
@@ -93,7 +99,10 @@ class FrameTree:
             yield Row(frame, depth, is_open if has_more else None)
 
     def hidden(self, chosen: Mapping[str, bool]) -> set[str]:
-        """Return the frames that are not shown: the nearest one above, or the frame itself, was chosen to be hidden."""
+        """Return the frames that are not shown.
+
+        The nearest one above, or the frame itself, was chosen to be hidden.
+        """
         is_shown: dict[str, bool] = {}
         for frame in self._depths:  # parents come first
             is_shown[frame] = chosen.get(frame, is_shown.get(self._parents.get(frame, ""), True))

@@ -1,4 +1,4 @@
-"""Sends joint states from sliders, in place of joint_state_publisher_gui, and only where nobody else sends them."""
+"""Sends joint states from sliders, only where nobody else sends them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ class Publisher(Protocol):
 
 
 def joint_topics(robot: Robot, plan: Plan) -> dict[str, dict[str, str]]:
-    """Return the topics from which the plan's processes take joint states: the joints by their names there.
+    """Return the topics from which the plan's processes take joint states.
+
+    The joints by their names there.
 
     In the robot a joint of a part may have the part's prefix.
     """
@@ -87,7 +89,9 @@ class JointSender:
     def step(
         self, now: float, stamp_ns: int | None, robot: Robot, positions: Mapping[str, float]
     ) -> None:
-        """Do what is due at ``now``, seconds of any clock: look for others, or send positions with this stamp.
+        """Do what is due at ``now``, seconds of any clock.
+
+        Look for others, or send positions with this stamp.
 
         ``positions`` are those of sliders, in rad or m; joints that mimic others follow.
         """

@@ -1,4 +1,7 @@
-"""What is wrong with a tree that was observed: the verdicts of ``verify``, by the frames of a scene."""
+"""What is wrong with a tree that was observed.
+
+The verdicts of ``verify``, by the frames of a scene.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What is wrong: all findings, those of each frame, and how far frames are from where the robot has them."""
+    """What is wrong: all findings, those of each frame, and distances from the plan."""
 
     found: tuple[Finding, ...] = ()
     of_frame: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
@@ -59,7 +62,10 @@ class Judgement:
 
 
 class Judge:
-    """Judges a robot by its plan; poses may be off by the tolerance. Frames have the names of the robot's file."""
+    """Judges a robot by its plan; poses may be off by the tolerance.
+
+    Frames have the names of the robot's file.
+    """
 
     def __init__(self, robot: Robot, plan: Plan, tolerance: Offset) -> None:
         self._plan = plan
@@ -74,7 +80,7 @@ class Judge:
         counts: Callable[[Difference], bool],
         holds: Callable[[EdgeState], bool] = lambda _: False,
     ) -> Judgement:
-        """Return what is wrong with the states on the plan's topics, of the differences that count.
+        """Return what is wrong with states on the plan's topics.
 
         Frames are also off where those are that do not count, if what was sent ``holds``: nothing
         came after it.

@@ -31,7 +31,10 @@ def joint_positions(robot: Robot, positions: Mapping[str, float]) -> dict[str, f
 
 
 def poses_in_roots(robot: Robot, positions: Mapping[str, float]) -> dict[str, Pose]:
-    """Return the pose of each frame in the root of its tree; ``positions`` are as for ``joint_positions``."""
+    """Return the pose of each frame in the root of its tree.
+
+    ``positions`` are as for ``joint_positions``.
+    """
     above = {edge.child: edge for edge in reversed(robot.edges)}  # of several parents the first
     joints = joint_positions(robot, positions)
     poses: dict[str, Pose] = {}

@@ -1,4 +1,6 @@
-"""A running tree as it is shown: where its frames are, which edges are wrong, and who publishes them.
+"""A running tree as it is shown.
+
+Where its frames are, which edges are wrong, and who publishes them.
 
 A ``LiveTree`` is given observers, which somebody feeds, and returns data for a scene and a panel;
 it reads no clock, no topic and knows no browser. Frames have the names of the robot file; on the
@@ -55,7 +57,10 @@ class LiveTree(ShownTree):
         return {child: stream.row for child, stream in self._streams().items()}
 
     def _streams(self) -> dict[str, EdgeStream]:
-        """Return the stream from which came what is newest of each frame, as tf2 has it: without what it refuses."""
+        """Return the stream from which came what is newest of each frame, as tf2 has it.
+
+        Without what it refuses.
+        """
         newest: dict[str, EdgeStream] = {}
         for observer in self._observers.values():
             for stream in observer.streams:
@@ -84,7 +89,10 @@ class LiveTree(ShownTree):
         return self.judgement
 
     def about(self, frame: str) -> list[str]:
-        """Return what is known of the edge above a frame: a line for each publisher, then what is wrong."""
+        """Return what is known of the edge above a frame.
+
+        A line for each publisher, then what is wrong.
+        """
         edges = self._pictures.edges
         lines = [line for one in self._states.get(frame, ()) for line in _published(one)]
         if not lines and frame in edges:
@@ -93,7 +101,10 @@ class LiveTree(ShownTree):
 
 
 def _counts(one: Difference, listened_s: float) -> bool:
-    """Return whether it is so now: neither of somebody who has left, nor of what may still come."""
+    """Return whether it is so now.
+
+    Neither of somebody who has left, nor of what may still come.
+    """
     if one.fault is not None and one.live is not None and one.live.present is False:
         return False
     return listened_s >= FOUND_S or one.code not in _MISSING

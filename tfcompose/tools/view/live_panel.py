@@ -1,4 +1,7 @@
-"""The panel and the scene of a running tree: frames as published, ghosts, what is wrong, and the robot's processes."""
+"""The panel and the scene of a running tree.
+
+Frames as published, ghosts, what is wrong, and the robot's processes.
+"""
 
 from __future__ import annotations
 

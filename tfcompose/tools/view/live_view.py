@@ -51,7 +51,9 @@ def observers_of(plan: Plan) -> dict[Topics, TreeObserver]:
 
 
 class Following:
-    """Moves the scene, judges and asks, each as often as it is due; of a file that changed it shows the new robot.
+    """Moves the scene, judges and asks, each as often as it is due.
+
+    Of a file that changed it shows the new robot.
 
     With ``joints`` the panel's sliders publish joint states.
     """
@@ -213,7 +215,9 @@ def follow(
     *,
     joints: bool,
 ) -> int:
-    """Show the running tree until a signal comes, in a process that is set up for its ROS; return the exit code.
+    """Show the running tree until a signal comes, in a process that is set up for its ROS.
+
+    Return the exit code.
 
     Raises:
         SystemExit: after saying why ROS cannot be started.

@@ -1,4 +1,7 @@
-"""A scene as one page for a pull request or a ticket: with the tree of its frames, their owners and poses."""
+"""A scene as one page for a pull request or a ticket.
+
+With the tree of its frames, their owners and poses.
+"""
 
 from __future__ import annotations
 

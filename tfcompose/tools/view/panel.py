@@ -1,4 +1,7 @@
-"""The panel next to the scene: a selected frame, the owners, joints to move, and the pose of a mount to edit."""
+"""The panel next to the scene.
+
+A selected frame, the owners, joints to move, and the pose of a mount to edit.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,10 @@ class Window:
 
 
 def _snapped(pose: Pose, before: Pose) -> Pose:
-    """Return a pose in whole mm and degrees; a number that is less than half of one off keeps the value before."""
+    """Return a pose in whole mm and degrees.
+
+    A number that is less than half of one off keeps the value before.
+    """
 
     def snap(new: float, old: float, step: float) -> float:
         return old if abs(new - old) < step / 2 else round(new / step) * step
@@ -84,11 +90,13 @@ def _phase(slider: Any) -> float:
 
 
 class Panel:
-    """Shows a session on a server; with ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
+    """Shows a session on a server.
+
+    With ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
 
     ``server`` may be one client of it, whose ``window`` it then is. ``choices`` are what somebody
-    chose to see, which the panel changes. ``published`` are the poses of frames in their roots where something else
-    than the session says where they are.
+    chose to see, which the panel changes. ``published`` are the poses of frames in their roots
+    where something else than the session says where they are.
     """
 
     def __init__(  # noqa: PLR0913 (where, what and how it is shown)
@@ -295,7 +303,7 @@ class Panel:
             self.refresh()
 
     def _sweep(self, sliders: list[Any]) -> None:
-        """Move each joint to and fro between its limits, until that is switched off or the panel is gone."""
+        """Sweep each joint between its limits until switched off or closed."""
         if self._sweeps.value and not self.is_sweeping:
             self.is_sweeping = True
             threading.Thread(target=self._sweep_until_over, args=(sliders,), daemon=True).start()
@@ -348,7 +356,7 @@ class Panel:
         self._show_blocked()
 
     def _show_mount(self) -> None:
-        """Show the numbers that the file has for the selected frame, and a gizmo where they put it."""
+        """Show the file's numbers for the selected frame, and a gizmo there."""
         if self.gizmo is not None:
             self.gizmo.remove()
             self.gizmo = None

@@ -1,4 +1,7 @@
-"""Where everything is that a scene shows, from the newest transforms of each frame: a ``Picture``, as data."""
+"""Where everything is that a scene shows, from the newest transforms of each frame.
+
+A ``Picture``, as data.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,9 @@ class Picture:
 
 
 class Pictures:
-    """Makes pictures of a robot; frames have the names of its file, which may be others on the tree.
+    """Makes pictures of a robot.
+
+    Frames have the names of its file, which may be others on the tree.
 
     What is in one tree with the ``fixed`` frame is shown as seen from there; empty: from its root.
     """
@@ -63,7 +68,7 @@ class Pictures:
         return self._names.get(frame, frame)
 
     def next(self, newest: Mapping[str, Row], judgement: Judgement) -> Picture | None:
-        """Return the picture of the newest transforms by frame, or None where it is the one before."""
+        """Return the newest transforms by frame, or None if nothing changed."""
         parents = {edge.child: edge.parent for edge in self.edges.values()}
         parents |= {child: self.name(row[0].removeprefix("/")) for child, row in newest.items()}
         if parents != self._parents or not self._rows.keys() <= newest.keys():
@@ -129,7 +134,10 @@ class Pictures:
         return {one: pose_of(placed[self._forest.index[one]].tolist()) for one in sorted(frames)}
 
     def _meant(self, child: str, live: Pose) -> Pose:
-        """Return where the robot has the frame in its parent; what a joint moves is where it was published."""
+        """Return where the robot has the frame in its parent.
+
+        What a joint moves is where it was published.
+        """
         edge = self.edges[child]
         if edge.joint is None:
             return edge.pose
@@ -157,7 +165,7 @@ class ShownTree(ABC):
         self._pictures.fixed = frame
 
     def moved(self) -> Picture | None:
-        """Return where everything is if something moved, or is judged otherwise, since the last time; else None."""
+        """Return all poses if something moved or its judgement changed; else None."""
         return self._pictures.next(self._newest(), self.judgement)
 
     @abstractmethod

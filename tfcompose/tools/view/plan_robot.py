@@ -1,4 +1,7 @@
-"""A built plan as a robot that can be shown: its edges, with the bodies and joint limits of the description."""
+"""A built plan as a robot that can be shown.
+
+Its edges, with the bodies and joint limits of the description.
+"""
 
 from __future__ import annotations
 

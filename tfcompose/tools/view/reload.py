@@ -1,4 +1,7 @@
-"""Shows a file again when it changes on disk; while it is broken the last good scene stays, with what is found."""
+"""Shows a file again when it changes on disk.
+
+While it is broken the last good scene stays, with what is found.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,10 @@ _TOGETHER_MS = 100
 
 
 class Files:
-    """Reads files, and knows which it has read, and what was in them; of meshes, when they were changed."""
+    """Reads files, and knows which it has read, and what was in them.
+
+    Of meshes, when they were changed.
+    """
 
     def __init__(self, read: Callable[[str], str]) -> None:
         self._read = read
@@ -80,7 +86,7 @@ def _changed_ns(file: str) -> int:
 
 
 class Watcher:
-    """Sets ``changed`` when something changes beside the files, in a thread of its own, within a ``with`` block."""
+    """Sets ``changed`` when watched files change, in its own thread, within ``with``."""
 
     def __init__(self, files: Files) -> None:
         self.changed = threading.Event()
@@ -153,13 +159,16 @@ class ReloadedPanel:
         self.panel.end()
 
     def reload(self) -> bool:
-        """Read the files again; return whether there is another panel now, that of the robot which they describe."""
+        """Read the files again; return whether the panel is a new one."""
         return self.files.differ() and self.accept(  # they do not after a save
             *self.session.read_again(self.files)
         )
 
     def accept(self, texts: Mapping[str, str], state: Compiled) -> bool:
-        """Show the files as they are now, or what is wrong with them; return whether there is another panel."""
+        """Show the files as they are now, or what is wrong with them.
+
+        Return whether there is another panel.
+        """
         if not self.session.accepts(state):
             self.show(state.found)
             return False
@@ -179,7 +188,10 @@ class ReloadedPanel:
 
     @property
     def found(self) -> str:
-        """What is said to be wrong with the files as they are now, as HTML; empty where nothing is."""
+        """What is said to be wrong with the files as they are now, as HTML.
+
+        Empty where nothing is.
+        """
         return self._broken.content if self._broken else ""
 
     def show(self, found: tuple[Finding, ...]) -> None:

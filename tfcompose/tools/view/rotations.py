@@ -38,7 +38,10 @@ _SAME_AXIS = 1e-9
 
 
 def rpy_near(rotation: Quaternion, old: Vector, tolerance: float) -> Vector:
-    """Return roll, pitch and yaw of a rotation: those in which the fewest numbers differ from the old ones."""
+    """Return roll, pitch and yaw of a rotation.
+
+    Those in which the fewest numbers differ from the old ones.
+    """
 
     def changes(rpy: Vector) -> tuple[int, float]:
         differences = [abs(new - was) for new, was in zip(rpy, old, strict=True)]
@@ -48,7 +51,7 @@ def rpy_near(rotation: Quaternion, old: Vector, tolerance: float) -> Vector:
 
 
 def _all_rpy(rotation: Quaternion, old: Vector) -> Iterator[Vector]:
-    """Yield the angles that make the rotation, each as near to the old one as whole revolutions bring it."""
+    """Yield the angles of the rotation, each nearest to the old one."""
     exact = rpy_from_quat(rotation)
     found = [exact, clean_rpy(rotation)]
     roll, pitch, yaw = exact
@@ -112,7 +115,10 @@ def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) ->
 
 
 def direction_numbers(rotation: Quaternion, old: Numbers, tolerance: float) -> Numbers:
-    """Return the numbers of ``look`` with angles: in the keys that are there, and in others where they are needed."""
+    """Return the numbers of ``look`` with angles.
+
+    In the keys that are there, and in others where they are needed.
+    """
     up, left = ("up",) in old, ("right",) not in old
     pitch_key, yaw_key = "up" if up else "down", "left" if left else "right"
     pitch_sign, yaw_sign = (-1 if up else 1), (1 if left else -1)

@@ -1,4 +1,7 @@
-"""A robot as a scene of viser: bodies, frames as axes, and edges as lines in the colour of their owner."""
+"""A robot as a scene of viser.
+
+Bodies, frames as axes, and edges as lines in the colour of their owner.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,7 @@ def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
 def _add_shape(
     scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int, int, int], opacity: float
 ) -> Any:
-    """Add a shape to the scene; return its mesh in its own frame, and its handle, or None if it has nothing to show."""
+    """Add a shape to the scene; return its mesh and handle, or None if it is empty."""
     mesh = mesh_of(shape)
     if mesh is None or mesh.is_empty:
         return None
@@ -131,7 +134,10 @@ class RobotScene:
         self.fields = FieldsOfView(scene, robot, self.scale)
 
     def add_meshes(self) -> None:
-        """Show visual meshes in the place of collision shapes; a mesh that cannot be read leaves them."""
+        """Show visual meshes in the place of collision shapes.
+
+        A mesh that cannot be read leaves them.
+        """
         for frame, name, shapes, before in self._later:
             if any(mesh_of(shape) is None for shape in shapes):
                 continue
@@ -143,7 +149,10 @@ class RobotScene:
                     handle.remove()
 
     def end(self) -> None:
-        """Let ``add_meshes`` change nothing any more: another scene takes this one's place, or none."""
+        """Let ``add_meshes`` change nothing any more.
+
+        Another scene takes this one's place, or none.
+        """
         with self._lock:
             self._is_gone = True
 
@@ -208,7 +217,7 @@ class RobotScene:
     def frame_camera(
         self, server: viser.ViserServer | viser.ClientHandle, poses: Mapping[str, Pose]
     ) -> None:
-        """Let the camera of a new client begin where the robot fills the picture, with a grid below all of it."""
+        """Start a new client's camera where the robot fills the picture, above a grid."""
         bodies = [
             (poses[frame] @ Pose(xyz)).xyz
             for frame, corners in self._corners.items()
@@ -231,7 +240,7 @@ class RobotScene:
         )
 
     def hide(self, frames: Iterable[str]) -> None:
-        """Hide these frames with their bodies, labels and the edges to them, and show all others again."""
+        """Hide these frames with bodies, labels and edges, and show all others."""
         self._hidden = frozenset(frames)
         for frame, handle in (*self._bodies.items(), *self._labels.items()):
             handle.visible = frame not in self._hidden
@@ -281,7 +290,7 @@ class RobotScene:
         return bool(self._lines[owner].visible)
 
     def bounds(self, frame: str) -> tuple[Vector, Vector]:
-        """Return the least and the most of what the scene shows of a frame's body, in the frame and in metres."""
+        """Return the bounds of a frame's shown body, in the frame, in metres."""
         columns = list(zip(*self._corners[frame], strict=True))
         (x0, y0, z0), (x1, y1, z1) = (tuple(map(one, columns)) for one in (min, max))
         return (x0, y0, z0), (x1, y1, z1)

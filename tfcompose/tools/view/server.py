@@ -1,4 +1,7 @@
-"""Server of the browser view: it admits only windows that know its token, and only messages of viser's."""
+"""Server of the browser view.
+
+It admits only windows that know its token, and only messages of viser's.
+"""
 
 from __future__ import annotations
 
@@ -88,7 +91,10 @@ def _admit(
     connection: Any,
     request: Request,
 ) -> Response | None:
-    """Answer a request with the token, in its address or in the cookie; refuse others, and pages of other sites."""
+    """Answer a request with the token, in its address or in the cookie.
+
+    Refuse others, and pages of other sites.
+    """
     headers = request.headers
     port = urlsplit(f"//{headers.get('Host', '')}").netloc.rpartition(":")[2]
     cookie = f"tfcompose_view_{port}"  # browsers send cookies of a host to all of its ports

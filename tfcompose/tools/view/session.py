@@ -1,4 +1,7 @@
-"""One robot file that is shown and edited: poses that were moved, what undoes them, and how they are saved."""
+"""One robot file that is shown and edited.
+
+Poses that were moved, what undoes them, and how they are saved.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """What saving did: the diff, the findings of the result, and the poses that no edit of the files can give.
+    """The result of saving: the diff, findings, and poses that no edit can give.
 
     Nothing is saved where ``refused`` findings are new errors.
     """
@@ -36,7 +39,9 @@ class Saved:
 
 @dataclass(slots=True)
 class Session:
-    """A robot with moved mounts. ``texts`` are the files that may be edited, the robot's own one first.
+    """A robot with moved mounts.
+
+    ``texts`` are the files that may be edited, the robot's own one first.
 
     ``compiled`` compiles texts that are not written yet, ``write`` replaces a file's old text by
     the new one. ``known`` is what the texts compile to, if that is known.
@@ -74,7 +79,10 @@ class Session:
         return Session(self.texts, self.compiled, self.write, self.state)
 
     def read_again(self, read: Callable[[str], str]) -> tuple[dict[str, str], Compiled]:
-        """Return the files as they are now, and what they compile to; no files where one cannot be read."""
+        """Return the files as they are now, and what they compile to.
+
+        No files where one cannot be read.
+        """
         try:
             texts = {file: read(file) for file in self.texts}
             return texts, self.compiled(texts)
@@ -82,12 +90,18 @@ class Session:
             return {}, Compiled(None, error.findings)
 
     def accepts(self, state: Compiled) -> bool:
-        """Return whether files that changed can be shown: they give a robot, and did not get wrong."""
+        """Return whether files that changed can be shown.
+
+        They give a robot, and did not get wrong.
+        """
         got_worse = bool(state.errors and not self.state.errors)
         return state.robot is not None and bool(state.robot.frames) and not got_worse
 
     def replace(self, texts: Mapping[str, str], state: Compiled) -> None:
-        """Go on with files that changed on disk, and what they compile to; moves of frames that are gone are lost."""
+        """Go on with files that changed on disk, and what they compile to.
+
+        Moves of frames that are gone are lost.
+        """
         self.texts, self.state = texts, state
         frames = state.robot.frames if state.robot else {}
         self.moved = {child: pose for child, pose in self.moved.items() if child in frames}
@@ -164,7 +178,7 @@ class Session:
         return Saved(diff, state.found, elsewhere=tuple(elsewhere.values()))
 
     def _keep_undo(self, saved: AbstractSet[str]) -> None:
-        """Have undo and redo lead to where these frames were before the save, which the files no longer say."""
+        """Let undo and redo lead to where frames were before the save."""
         edges = self.state.robot.edges if self.state.robot else ()
         before = {edge.child: edge.pose for edge in reversed(edges) if edge.child in saved}
         for step in (*self._undo, *self._redo):

@@ -1,4 +1,6 @@
-"""The panel of frames, at the left of the scene: a tree to search, select, open and close, and hide parts of.
+"""The panel of frames, at the left of the scene.
+
+A tree to search, select, open and close, and hide parts of.
 
 A control of viser for each of a thousand frames would take seconds. The tree is one element of
 HTML; what is clicked in it comes back as the text of a field below it, which is not shown.
@@ -93,7 +95,7 @@ _NO_OWNER = (134, 142, 150)
 
 
 class TreePanel:
-    """Shows the frames of a robot as a tree, and keeps in ``choices`` what somebody does with them.
+    """Shows a robot's frames as a tree, and keeps choices in ``choices``.
 
     Args:
         gui: where it is shown.
@@ -155,7 +157,10 @@ class TreePanel:
             call()
 
     def search(self, search: str) -> None:
-        """Show the frames with these words in their names and all above them; select the one that is meant, if any."""
+        """Show the frames with these words in their names and all above them.
+
+        Select the one that is meant, if any.
+        """
         with self._lock:
             self._choices.search = search
             if self._search.value != search:
@@ -218,7 +223,7 @@ class TreePanel:
         self._html.content = self.content(scrolls=scrolls)
 
     def content(self, *, scrolls: bool = False) -> str:
-        """Return the tree as HTML; it ``scrolls`` to the frame that is selected, or found, when it comes to a page."""
+        """Return the tree as HTML; it ``scrolls`` to the selected or found frame."""
         choices, hidden = self._choices, self.hidden
         words = re.compile(
             "|".join(map(re.escape, choices.search.split())) or r"(?!)", re.IGNORECASE

@@ -1,4 +1,4 @@
-"""What ``view`` shows: the robot of a file, or of a built plan, as a session that can be compiled again."""
+"""The robot that ``view`` shows: a file or built plan, as a session that recompiles."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def session_of(file: str, arguments: Namespace, files: Files) -> Session:
-    """Return the robot of the file, a built plan or a folder with one, with what is merged over it, read by ``files``.
+    """Return the robot of a file, built plan or folder, with overlays, read by ``files``.
 
     Raises:
         SystemExit: after saying why there is none to show.

@@ -1,4 +1,6 @@
-"""Windows of browsers on one robot: each has a panel, a selection, joints and unsaved moves of its own.
+"""Windows of browsers on one robot.
+
+Each has a panel, a selection, joints and unsaved moves of its own.
 
 All of them show the same files. What one saves the others show, and a pose that one has moved and
 another one saved is said before it is saved again.

@@ -1,4 +1,7 @@
-"""Inserting values into YAML text: a key into a mapping that is there, in the style of that mapping."""
+"""Inserting values into YAML text.
+
+A key into a mapping that is there, in the style of that mapping.
+"""
 
 from __future__ import annotations
 
@@ -47,14 +50,17 @@ class Keys:
 
     @property
     def _opening(self) -> int:
-        """Where the brace opens in the mapping's text, behind an anchor or a tag; −1: it is no flow mapping."""
+        """Where the brace opens in the mapping's text, behind an anchor or a tag.
+
+        −1: it is no flow mapping.
+        """
         text = text_at(self.text, self.mapping.span)
         brace = text.find("{")
         words = text[:brace].split() if brace >= 0 else [""]
         return brace if all(word[:1] in {"&", "!"} for word in words) else -1
 
     def insertion(self, values: Mapping[str, str], after: tuple[str, ...] = ()) -> Edit:
-        """Return the edit that puts new keys with their YAML behind the last of the keys ``after`` that is there."""
+        """Return the edit that adds keys after the last of the keys ``after`` that exists."""
         own = self.own
         known = [name for name in own if name in after] or [
             name for name in own if name in self.mapping.inside
@@ -102,7 +108,7 @@ class Keys:
 
 
 def with_value(text: str, file: str, path: Path, values: Mapping[str, str | None]) -> str:
-    """Return the text with YAML values at the keys of the mapping at ``path``, which is made where it is missing.
+    """Return the text with YAML values in the mapping at ``path``, made if missing.
 
     Those that are there are replaced; None stands for ``null``, which removes the key in an
     overlay. The text is an overlay's, or empty.

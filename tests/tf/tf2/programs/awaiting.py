@@ -1,4 +1,4 @@
-"""A node whose callback awaits a transform, with the module's own name, and tf2's exceptions from tf2_py."""
+"""A node whose callback awaits a transform, with tf2's exceptions from tf2_py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A node that sends a camera's frames, mounted as its parameters say, its optical frames turned by Euler angles."""
+"""A node that sends a camera's frames from parameters, with Euler angles."""
 
 from __future__ import annotations
 

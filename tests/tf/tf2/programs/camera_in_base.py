@@ -1,4 +1,7 @@
-"""A program without a class that looks up once a second where the camera is, with an own thread for its listener."""
+"""A program without a class that looks up a camera's pose once a second.
+
+Its listener has its own thread.
+"""
 
 from __future__ import annotations
 

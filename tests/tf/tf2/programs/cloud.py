@@ -1,4 +1,7 @@
-"""A node that looks up where each point cloud was taken, and moves the cloud; its waits are in the callback."""
+"""A node that looks up where each point cloud was taken, and moves the cloud.
+
+Its waits are in the callback.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A listener as tutorials of tf2 teach it: a node, a timer, a lookup, a wait in the callback, a point."""
+"""A listener as tutorials of tf2 teach it.
+
+A node, a timer, a lookup, a wait in the callback, a point.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A node that sends where two sensors are bolted to a robot, one of them tilted, and spins for those who come later."""
+"""A node that sends two sensors' mounts, one tilted, and spins for late listeners."""
 
 from __future__ import annotations
 

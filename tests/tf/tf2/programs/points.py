@@ -1,4 +1,4 @@
-"""A node that looks up where each cloud of a depth camera was taken, with a wait, and moves it with numpy."""
+"""A node that looks up where each cloud was taken, with a wait, and moves it by numpy."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def package(folder: Path, name: str, *codes: str) -> Path:
     return folder / name / "codes"
 
 
-def test_folders_that_come_later_are_looked_up_only_for_what_is_not_found_before(
+def test_later_folders_are_read_only_for_codes_that_are_in_none_before(
     tmp_path: Path,
 ) -> None:
     folder = package(tmp_path, "acme_pumps", "ACME101", "ACME102")

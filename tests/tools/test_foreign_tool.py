@@ -208,7 +208,7 @@ def test_a_command_whose_module_does_not_load_is_one_finding(tmp_path: Path) -> 
     assert "Traceback" not in done.stderr
 
 
-def test_tools_of_other_packages_are_looked_up_only_where_something_is_unknown(
+def test_tools_of_other_packages_are_loaded_only_where_something_is_unknown(
     acme: Path, tmp_path: Path
 ) -> None:
     code = "import sys; from tfcompose.cli import main; main(sys.argv[1:]); print('acme_tool' in sys.modules)"

@@ -5,11 +5,13 @@ No process runs: what judges is given what it would have seen.
 
 import asyncio
 import os
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import ModuleType
 from typing import Any
 from unittest import mock
 
@@ -55,6 +57,8 @@ from tfcompose.compiler.urdf.inertia import UnmeasurableError
 from tfcompose.compiler.urdf.packages import Disk
 from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose
+from tfcompose.foundation.tool import Command as ToolCommand
+from tfcompose.foundation.tool import Key, Tool, installed
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.drivers import SentPoses, not_taken
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
@@ -81,6 +85,7 @@ from tfcompose.model.plan.hosts import share_of
 from tfcompose.model.robot import Robot
 from tfcompose.model.robot.body import Asset
 from tfcompose.spec.language import set_value
+from tfcompose.spec.language.tool_keys import problems_with
 from tfcompose.spec.load import Source, load
 from tfcompose.tf.bags import BagError
 from tfcompose.tf.live.publishers import Message, OtherRun, Publisher, Senders
@@ -840,6 +845,26 @@ def imported() -> Iterator[Finding]:
 # Hosts.
 
 
+def foreign_tools() -> Iterator[Finding]:
+    """Yield what is found about tools of other packages."""
+    module = ModuleType("tools_of_others")
+    vars(module).update(
+        command=Tool("second", "second", commands=(ToolCommand("lint", "Lint", "second"),)),
+        key=Tool("third", "third", keys=(Key("fleet", "third:FleetSpec", "a fleet"),)),
+        code=Tool("fourth", "fourth", codes="tfcompose.tools.importers"),
+        model=Tool("fifth", "fifth", keys=(Key("fifth", "no_such_module:Spec", "nothing"),)),
+    )
+    entries = [("first", "no_such_module:TOOL"), ("text", "tools_of_others:__name__")]
+    entries += [(name, f"tools_of_others:{name}") for name in ("command", "key", "code", "model")]
+    with (
+        mock.patch.dict(sys.modules, {module.__name__: module}),
+        mock.patch("tfcompose.foundation.tool._entry_points", return_value=entries),
+    ):
+        tools = installed.__wrapped__()
+    with mock.patch("tfcompose.spec.language.tool_keys.installed", return_value=tools):
+        yield from problems_with({"fifth"})
+
+
 def deployed() -> Iterator[Finding]:
     """Deploy to hosts that lack something, are apart, are lost or do not come up."""
     hosted = compiled_plan(HOSTED)
@@ -917,5 +942,6 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     compiled,
     recordings,
     imported,
+    foreign_tools,
     deployed,
 )

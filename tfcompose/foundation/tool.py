@@ -236,12 +236,14 @@ def installed() -> Toolset:
 
 def _clashes(tool: Tool, owners: Mapping[tuple[str, str], str]) -> Iterator[Problem]:
     reserved = {name: owner for name, (owner, _) in _reserved().items()}
-    for name in tool.names():
-        owner = owners.get(name) or reserved.get(name)
+    for kind, name in tool.names():
+        owner = reserved.get((kind, name)) or owners.get((kind, name))
         if owner:
-            kind = " ".join(name)
-            message = f"the tool {tool.name} is left out: {owner} has the {kind}"
-            yield Problem("TF922", message, f"uninstall one of them, or rename the {name[0]}")
+            message = f"the tool {tool.name} is left out: {owner} has the {kind} {name}"
+            advice = f"uninstall one of them, or rename the {kind}"
+            if (kind, name) in reserved:
+                advice = f"uninstall it, or rename its {kind}"
+            yield Problem("TF922", message, advice)
 
 
 def _wrong_codes(tool: Tool) -> Iterator[Problem]:

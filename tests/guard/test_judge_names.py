@@ -580,6 +580,12 @@ def test_the_publishers_of_one_process_are_one(running: History) -> None:
     assert (running.over(), len(running.found())) == ([], 1)
 
 
+def test_publishers_of_unknown_processes_on_two_topics_may_be_of_one(running: History) -> None:
+    moving, fixed = (running.joins("/rogue", static=static) for static in (False, True))
+    running.send(fixed, "base lidar").send(moving, "map odom").wait(1.0)
+    expect(running.only(), "TF801", "base → lidar and 1 more", "by /rogue;")
+
+
 @pytest.mark.parametrize(("owner", "process"), [("slam", "slam"), ("drive", None)])
 def test_who_remains_is_known_to_the_guard_that_follows(
     running: History, owner: str, process: str | None

@@ -554,12 +554,25 @@ class Ledger:
     # Publishers.
 
     def _publishers(self, entries: Sequence[Entry]) -> list[bytes | None]:
-        """Return who is there of the publishers of these entries: an id of each process."""
-        gids = [gid for entry in entries for gid in self._gids_of(entry)]
-        if not all(map(self._senders.is_sure, gids)):
+        """Return who is there of the publishers of these entries: an id of each process.
+
+        A process may have a publisher on each topic. Where it is not known by its pid, only
+        publishers of one edge on one topic are surely several.
+        """
+        sent = [(gid, entry.fault) for entry in entries for gid in self._gids_of(entry)]
+        if not all(self._senders.is_sure(gid) for gid, _ in sent):
             return [entries[0].gid]
-        present = [gid for gid in gids if self._senders.is_present(gid)] or gids
-        return list({self._process_of(gid): gid for gid in present}.values())
+        present = [(gid, fault) for gid, fault in sent if self._senders.is_present(gid)]
+        located: dict[str, bytes | None] = {}
+        others: dict[tuple[Ends, bool], dict[str | bytes, bytes | None]] = {}
+        for gid, fault in present or sent:
+            if where := self._senders.where(gid):
+                located[where] = gid
+            else:
+                processes = others.setdefault((fault.ends, fault.static), {})
+                processes[self._process_of(gid)] = gid
+        most = max(others.values(), key=len, default={})
+        return [*located.values(), *most.values()]
 
     def _runs_of(self, publishers: Sequence[bytes | None]) -> list[str]:
         return [self._senders.where(gid) for gid in publishers]
@@ -573,7 +586,8 @@ class Ledger:
 
     def _process_of(self, gid: bytes | None) -> str | bytes:
         """Return what distinguishes the publisher's process from others."""
-        return self._senders.where(gid) or (gid or b"")[:PARTICIPANT]
+        known = self._senders.where(gid) or self._senders.process(gid)
+        return known or (gid or b"")[:PARTICIPANT]
 
     def _is_known_robot(
         self,

@@ -134,6 +134,7 @@ def lines_run(words: list[str]) -> int:
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @for_each(CASES)
 def test_a_command_takes_in_proportion_to_the_size(
     make: Callable[[int], str], words: list[str]

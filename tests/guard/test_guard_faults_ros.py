@@ -420,6 +420,7 @@ GUARDS = ["mode: watch", "mode: strict, fence: partition", "mode: strict, fence:
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize("guard", GUARDS)
 def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_plain_listener(
     up: Callable[[str], Running], guard: str
@@ -458,6 +459,7 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_p
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize("guard", GUARDS)
 def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_received(
     up: Callable[[str], Running], guard: str

@@ -179,6 +179,7 @@ def program(name: str, code: str, **more: Any) -> PlanProcess:
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_a_flood_blocks_neither_its_writer_nor_anybody_else_and_takes_little_memory_and_disk(
     launch: Callable[..., Run], tmp_path: Path
 ) -> None:
@@ -329,6 +330,7 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(
     launch: Callable[..., Run],
 ) -> None:
@@ -343,6 +345,7 @@ def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(
     launch: Callable[..., Run],
 ) -> None:

@@ -58,6 +58,7 @@ def steady_red_pixels(page: Page) -> int:
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_a_rogue_publisher_makes_its_edge_red_within_a_second(tmp_path: Path, nodes: Any) -> None:
     (tmp_path / "r.yaml").write_text(EXTERNAL, "utf-8")
     nodes.latched(

@@ -173,9 +173,15 @@ def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Com
     try:
         overlays = overlays_of(arguments)
         compiled = compile_robot(
-            read_text(file), file, library(), arguments.profiles,
-            overlays=overlays, read=read_text, disk=disk_of(file, arguments), given=given_by(arguments),
-        )  # fmt: skip
+            read_text(file),
+            file,
+            library(),
+            arguments.profiles,
+            overlays=overlays,
+            read=read_text,
+            disk=disk_of(file, arguments),
+            given=given_by(arguments),
+        )
     except RejectedError as error:
         reject(error.findings)
     if compiled.robot is None or compiled.errors:

@@ -76,10 +76,9 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     yield f"robot {plan.robot}: {processes}, {counted(len(plan.edges), 'edge')}, domain: {domain}"
     yield from describe_share(plan)
     for name, argument in plan.args.items():
-        yield (
-            "  arg     "
-            f" {name}:={str(argument).lower() if isinstance(argument, bool) else _quoted(str(argument))}"
-        )
+        is_bool = isinstance(argument, bool)
+        value = str(argument).lower() if is_bool else _quoted(str(argument))
+        yield f"  arg      {name}:={value}"
     for name, value in plan.environment.items():
         yield f"  env      {name}={_quoted(value)}, when it was built"
     for process in plan.processes:

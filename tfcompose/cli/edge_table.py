@@ -97,11 +97,16 @@ def _row(state: EdgeState, several: set[str]) -> tuple[str, ...]:
     if stream.static:
         return (name, who, "static", "", "", "", "", "", ", ".join(remarks))
     return (
-        name, who, "dynamic",
+        name,
+        who,
+        "dynamic",
         f"{timing.rate:.1f} Hz" if timing.rate is not None else "–",
-        duration(timing.jitter_s), duration(timing.longest_gap_s), duration(state.data_age_s), duration(timing.delay_s),
+        duration(timing.jitter_s),
+        duration(timing.longest_gap_s),
+        duration(state.data_age_s),
+        duration(timing.delay_s),
         ", ".join(remarks),
-    )  # fmt: skip
+    )
 
 
 def duration(seconds: float | None) -> str:

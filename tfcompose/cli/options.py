@@ -44,13 +44,22 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         help=f"{text}; repeatable",
     )
     parser.add_argument(
-        "-f", "--overlay", action="append", default=[], metavar="FILE", dest="overlays",
+        "-f",
+        "--overlay",
+        action="append",
+        default=[],
+        metavar="FILE",
+        dest="overlays",
         help="merge this file over it, after the profiles; repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
+        "--set",
+        action="append",
+        default=[],
+        metavar="PATH=VALUE",
+        dest="settings",
         help="set one value, applied last: sensors.camera.tf=driver; repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--show-args", action="store_true", help="print the robot file's arguments and exit"
     )
@@ -67,9 +76,10 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
 def add_trust(parser: ArgumentParser) -> None:
     """Add --trust."""
     parser.add_argument(
-        "--trust", action="store_true",
+        "--trust",
+        action="store_true",
         help="run xacro and launch files of your own without the sandbox: see help sandbox",
-    )  # fmt: skip
+    )
 
 
 def pairs(words: list[str], between: str) -> dict[str, str]:
@@ -128,9 +138,14 @@ TOLERANCE = "1mm,0.1deg"
 def add_tolerance(parser: ArgumentParser) -> None:
     """Add --tolerance."""
     parser.add_argument(
-        "--tolerance", type=tolerance, default=TOLERANCE, metavar="T",
-        help=f"how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: {TOLERANCE}",
-    )  # fmt: skip
+        "--tolerance",
+        type=tolerance,
+        default=TOLERANCE,
+        metavar="T",
+        help=(
+            f"how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: {TOLERANCE}"
+        ),
+    )
 
 
 def tolerance(text: str) -> Offset:

@@ -132,9 +132,9 @@ def main(argv: list[str] | None = None) -> int:
 
 
 #: What the disk says of a path that somebody named: no command is at fault.
-_OF_A_PATH = frozenset({
-    errno.EACCES, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EROFS
-})  # fmt: skip
+_OF_A_PATH = frozenset(
+    {errno.EACCES, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EROFS}
+)
 
 
 def _refuse_path(error: OSError) -> int:
@@ -163,7 +163,8 @@ def _run(name: str, command: CommandModule, words: list[str]) -> int:
         try:
             code = _run_command(name, command, words)
         except BaseException:
-            if take_interrupt():  # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load
+            # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load.
+            if take_interrupt():
                 return INTERRUPTED
             raise
     return INTERRUPTED if take_interrupt() else code

@@ -28,10 +28,25 @@ if TYPE_CHECKING:
 
 #: Keys that send more than one byte, in the forms that terminals use.
 _NAMED = {
-    "A": "up", "B": "down", "C": "right", "D": "left", "H": "home", "F": "end",
-    "1~": "home", "4~": "end", "7~": "home", "8~": "end", "5~": "pgup", "6~": "pgdn",
-    "\r": "enter", "\n": "enter", "\033": "esc", "\x7f": "backspace", "\b": "backspace", " ": "pgdn",
-}  # fmt: skip
+    "A": "up",
+    "B": "down",
+    "C": "right",
+    "D": "left",
+    "H": "home",
+    "F": "end",
+    "1~": "home",
+    "4~": "end",
+    "7~": "home",
+    "8~": "end",
+    "5~": "pgup",
+    "6~": "pgdn",
+    "\r": "enter",
+    "\n": "enter",
+    "\033": "esc",
+    "\x7f": "backspace",
+    "\b": "backspace",
+    " ": "pgdn",
+}
 _KEY = re.compile(r"\033[\[O]([0-9;]*[~A-Za-z])|([^\033]|\033)", re.DOTALL)
 _BEGUN = re.compile(r"\033(?:[\[O][0-9;]*)?\Z")
 

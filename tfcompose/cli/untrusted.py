@@ -31,11 +31,27 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Source
 
 #: Variables that programs need to run and to write to a terminal, and where packages are.
-_NEEDED = frozenset({
-    "AMENT_PREFIX_PATH", "COLUMNS", "FORCE_COLOR", "HOME", "LANG", "LC_ALL", "LC_CTYPE",
-    "LD_LIBRARY_PATH", "LINES", "NO_COLOR", "PATH", "PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING",
-    "PYTHONPATH", "PYTHONUTF8", "TERM", "TMPDIR",
-})  # fmt: skip
+_NEEDED = frozenset(
+    {
+        "AMENT_PREFIX_PATH",
+        "COLUMNS",
+        "FORCE_COLOR",
+        "HOME",
+        "LANG",
+        "LC_ALL",
+        "LC_CTYPE",
+        "LD_LIBRARY_PATH",
+        "LINES",
+        "NO_COLOR",
+        "PATH",
+        "PYTHONDONTWRITEBYTECODE",
+        "PYTHONIOENCODING",
+        "PYTHONPATH",
+        "PYTHONUTF8",
+        "TERM",
+        "TMPDIR",
+    }
+)
 #: A value that is no secret: a switch or a number.
 _PLAIN = re.compile(r"true|false|yes|no|on|off|[-+]?[0-9]{0,9}(?:\.[0-9]{0,9})?", re.IGNORECASE)
 

@@ -76,10 +76,15 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
         os.fdopen(to_child, "wb", buffering=0) as sink,
         os.fdopen(from_child, "rb") as source,
         subprocess.Popen(
-            [sys.executable, "-c", program], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, pass_fds=inherited, start_new_session=True, env=environment,
+            [sys.executable, "-c", program],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            pass_fds=inherited,
+            start_new_session=True,
+            env=environment,
         ) as process,
-    ):  # fmt: skip
+    ):
         os.close(reads)
         os.close(writes)
         reader = threading.Thread(target=_collect, args=(process.stdout, printed), daemon=True)

@@ -16,22 +16,44 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 #: Folders of the system, and those that programs put unrelated files into.
-_SHARED: Final = frozenset({
-    "/", "/bin", "/boot", "/etc", "/home", "/lib", "/lib64", "/opt", "/root", "/sbin", "/srv",
-    "/usr", "/usr/local", "/usr/share", "/var",
-    "/tmp", "/var/tmp",  # noqa: S108 (nothing is written there)
-})  # fmt: skip
+_SHARED: Final = frozenset(
+    {
+        "/",
+        "/bin",
+        "/boot",
+        "/etc",
+        "/home",
+        "/lib",
+        "/lib64",
+        "/opt",
+        "/root",
+        "/sbin",
+        "/srv",
+        "/usr",
+        "/usr/local",
+        "/usr/share",
+        "/var",
+        "/tmp",  # noqa: S108 (nothing is written there)
+        "/var/tmp",  # noqa: S108 (the same)
+    }
+)
 #: What libraries of the system read: themselves, the time zone, and what is no file.
 _SYSTEM: Final = (
-    "/usr/lib", "/usr/lib64", "/lib", "/lib64", "/usr/local/lib", "/usr/share/zoneinfo",
-    "/etc/ld.so.cache", "/etc/localtime", "/dev/null", "/dev/urandom",
-)  # fmt: skip
+    "/usr/lib",
+    "/usr/lib64",
+    "/lib",
+    "/lib64",
+    "/usr/local/lib",
+    "/usr/share/zoneinfo",
+    "/etc/ld.so.cache",
+    "/etc/localtime",
+    "/dev/null",
+    "/dev/urandom",
+)
 _OF_KERNEL: Final = re.compile(r"/(dev|proc|run|sys)(/|$)")
 _HOME: Final = re.compile(r"/home/[^/]+")
 #: Files that lie beside a robot file, and are about it.
-_DESCRIPTIONS: Final = (
-    ".launch", ".py", ".srdf", ".urdf", ".xacro", ".xml", ".yaml", ".yml"
-)  # fmt: skip
+_DESCRIPTIONS: Final = (".launch", ".py", ".srdf", ".urdf", ".xacro", ".xml", ".yaml", ".yml")
 _PACKAGE_NAME: Final = re.compile(r"<name>\s*[^<\s]+\s*</name>")
 _MANIFEST: Final = "package.xml"
 #: Git keeps credentials there: actions/checkout writes a token into .git/config.

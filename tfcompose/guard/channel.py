@@ -54,8 +54,19 @@ if TYPE_CHECKING:
 
 #: What a guard reports that is switched off: it looks, and judges nobody.
 _OBSERVATIONS = (
-    Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember, Silent, Loaded, NotLoaded, Unloaded,
-)  # fmt: skip
+    Alive,
+    Clear,
+    Live,
+    OwnerReady,
+    Complete,
+    GateOpen,
+    GateShut,
+    Remember,
+    Silent,
+    Loaded,
+    NotLoaded,
+    Unloaded,
+)
 #: How often the launcher hears that the guard looks, in seconds.
 ALIVE_EVERY_S = 1.0
 #: A longer part of the memory is not handed on: the launcher takes no longer lines; characters.

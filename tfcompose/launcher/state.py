@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 class Times:
     """How long the launcher waits, in seconds."""
 
+    #: For the guard's report that no planned edge is published yet, besides its observation.
     clear_s: float = 20.0
-    """for the guard's report that no planned edge is published yet, besides the time that it observes"""
     interrupt_s: float = 5.0
     """between SIGINT and SIGTERM"""
     terminate_s: float = 5.0

@@ -20,14 +20,21 @@ def arguments(parser: ArgumentParser) -> None:
     add_variant(parser)
     parser.add_argument("-o", "--output", metavar="DIR", help="default: build/ROBOT")
     parser.add_argument(
-        "--mesh", choices=("package", "file", "relative"), default="as-written",
-        help="how to address meshes: package://…, file:///…, or relative to DIR; default: as written",
-    )  # fmt: skip
+        "--mesh",
+        choices=("package", "file", "relative"),
+        default="as-written",
+        help=(
+            "how to address meshes: package://…, file:///…, or relative to DIR; default: as "
+            "written"
+        ),
+    )
     parser.add_argument(
-        "--read-back", action="store_true",
-        help="parse the URDF again with yourdfpy, and write nothing if links, joints, poses, limits, masses, shapes or "
+        "--read-back",
+        action="store_true",
+        help="parse the URDF again with yourdfpy, and write nothing if links, joints, poses, "
+        "limits, masses, shapes or "
         "materials differ from the robot's; needs tfcompose[view]",
-    )  # fmt: skip
+    )
 
 
 def run(arguments: Namespace) -> int:

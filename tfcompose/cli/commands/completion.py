@@ -21,8 +21,8 @@ SCRIPTS = {
 _tfcompose() {
     local found
     COMPREPLY=()
-    found=$(tfcompose completion --line "${COMP_LINE:0:COMP_POINT}" --breaks "$COMP_WORDBREAKS" 2>/dev/null) &&
-        compopt +o default
+    found=$(tfcompose completion --line "${COMP_LINE:0:COMP_POINT}" \\
+        --breaks "$COMP_WORDBREAKS" 2>/dev/null) && compopt +o default
     [[ $found == *= ]] && compopt -o nospace
     [[ $found ]] && mapfile -t COMPREPLY <<< "$found"
 }

@@ -64,9 +64,14 @@ def arguments(parser: ArgumentParser) -> None:
         help="show each frame's pose in its parent, in metres and degrees",
     )
     parser.add_argument(
-        "--direction", choices=("auto", "right", "down", "columns"), default="auto",
-        help="where children are; default: auto, which is right unless that is too wide or too tall for a page",
-    )  # fmt: skip
+        "--direction",
+        choices=("auto", "right", "down", "columns"),
+        default="auto",
+        help=(
+            "where children are; default: auto, which is right unless that is too wide or too "
+            "tall for a page"
+        ),
+    )
     parser.add_argument(
         "--collapse",
         action="store_true",

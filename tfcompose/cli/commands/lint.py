@@ -74,9 +74,13 @@ def arguments(parser: ArgumentParser) -> None:
         ),
     )
     parser.add_argument(
-        "--urdf", action="append", default=[], metavar="FILE", dest="urdfs",
+        "--urdf",
+        action="append",
+        default=[],
+        metavar="FILE",
+        dest="urdfs",
         help="check FILE as a URDF or xacro file, whatever its suffix; repeatable",
-    )  # fmt: skip
+    )
     add_variant(parser, "check only this combination")
     add_format(parser, "json", "sarif", "github", "junit")
     parser.add_argument(
@@ -94,9 +98,16 @@ def arguments(parser: ArgumentParser) -> None:
         help="lowest severity that exits 1; default: error",
     )
     parser.add_argument(
-        "--select", action="extend", type=codes, default=[], metavar="CODES",
-        help="report only these codes, or codes that begin so: TF401,TF7; what prevents a build is always reported",
-    )  # fmt: skip
+        "--select",
+        action="extend",
+        type=codes,
+        default=[],
+        metavar="CODES",
+        help=(
+            "report only these codes, or codes that begin so: TF401,TF7; what prevents a build "
+            "is always reported"
+        ),
+    )
     parser.add_argument(
         "--ignore",
         action="extend",
@@ -111,9 +122,13 @@ def arguments(parser: ArgumentParser) -> None:
         help="skip named YAML files that are not robot files",
     )
     parser.add_argument(
-        "--untrusted", action="store_true",
-        help="for files of strangers, as in CI: read nothing but a robot's own tree, and no environment",
-    )  # fmt: skip
+        "--untrusted",
+        action="store_true",
+        help=(
+            "for files of strangers, as in CI: read nothing but a robot's own tree, and no "
+            "environment"
+        ),
+    )
     parser.add_argument(
         "-w",
         "--watch",

@@ -51,8 +51,8 @@ STOP = ProcessCommand(
     "stopping",
     """Stop processes of a running robot.
 
-Stop processes as the plan says; they stay stopped until started again. The others keep running, and the guard does not
-warn about the missing edges.
+Stop processes as the plan says; they stay stopped until started again. The others keep running,
+and the guard does not warn about the missing edges.
 """,
 )
 RESTART = ProcessCommand(

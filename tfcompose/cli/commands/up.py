@@ -35,9 +35,10 @@ def arguments(parser: ArgumentParser) -> None:
         help="run in the background; see tfcompose ps, logs and down",
     )
     parser.add_argument(
-        "--wait", action="store_true",
+        "--wait",
+        action="store_true",
         help="run in the background, and return once every process is ready and every edge live",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--update",
         action="store_true",
@@ -49,24 +50,37 @@ def arguments(parser: ArgumentParser) -> None:
         help="with --update: where the plan's paths begin; default: beside the plan",
     )
     parser.add_argument(
-        "--timeout", type=positive, default=60.0, metavar="S",
+        "--timeout",
+        type=positive,
+        default=60.0,
+        metavar="S",
         help="with --wait: exit 1 after S seconds, while the robot keeps running; default: 60",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--host", metavar="NAME",
-        help="start this host's share and expect the rest elsewhere; default: this machine, if the robot names it",
-    )  # fmt: skip
+        "--host",
+        metavar="NAME",
+        help=(
+            "start this host's share and expect the rest elsewhere; default: this machine, if "
+            "the robot names it"
+        ),
+    )
     parser.add_argument(
-        "--no-live", dest="live", action="store_false",
+        "--no-live",
+        dest="live",
+        action="store_false",
         help="print lines, as into a pipe, instead of the live view of a terminal",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--dry-run", action="store_true", help="print what would be started and exit"
     )
     parser.add_argument(
-        "--guard", choices=("off", "watch", "strict"),
-        help="off: report live edges, no checks; strict: hold back what a process does not own; default: the file's",
-    )  # fmt: skip
+        "--guard",
+        choices=("off", "watch", "strict"),
+        help=(
+            "off: report live edges, no checks; strict: hold back what a process does not own; "
+            "default: the file's"
+        ),
+    )
     parser.add_argument(
         "--settle",
         type=not_negative,
@@ -74,9 +88,15 @@ def arguments(parser: ArgumentParser) -> None:
         help="how long to look for conflicting publishers first; default: 0.5",
     )
     parser.add_argument(
-        "--for", dest="duration", type=positive, metavar="S",
-        help="end S seconds after the settle time; exit 1 if the tree was not complete or an error was found",
-    )  # fmt: skip
+        "--for",
+        dest="duration",
+        type=positive,
+        metavar="S",
+        help=(
+            "end S seconds after the settle time; exit 1 if the tree was not complete or an "
+            "error was found"
+        ),
+    )
 
 
 def run(arguments: Namespace) -> int:

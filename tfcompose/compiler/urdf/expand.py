@@ -59,8 +59,13 @@ _PLACE = ([int], None)
 _MADE = {"text": str, "files": [str], "places": [_PLACE], "comments": [[int]]}
 _MARK = ([(str, int)], None)
 _STOPPED = {
-    "kind": str, "reason": str, "files": [str], "macros": [[(str, None)]], "error": _MARK, "at": _MARK
-}  # fmt: skip
+    "kind": str,
+    "reason": str,
+    "files": [str],
+    "macros": [[(str, None)]],
+    "error": _MARK,
+    "at": _MARK,
+}
 _PAIR, _IN_PLACE = 2, 3
 #: Characters of a reason.
 _LONGEST = 4000
@@ -102,15 +107,22 @@ def expand(
     trusted = sandbox.reach.everything
     wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
-        "file": file, "arguments": given, "call": _document(use) if use and use.macro else None,
-        "is_trusted": trusted, "is_strict": sandbox.is_strict, "wall_s": wall_s,
-    }  # fmt: skip
+        "file": file,
+        "arguments": given,
+        "call": _document(use) if use and use.macro else None,
+        "is_trusted": trusted,
+        "is_strict": sandbox.is_strict,
+        "wall_s": wall_s,
+    }
     with tempfile.TemporaryFile() as noted:
         noted.truncate(_NOTED)
         outcome = run_confined(
-            PROCESS, request, files.answers,
-            wall_s=wall_s, shared=[noted.fileno()],
-        )  # fmt: skip
+            PROCESS,
+            request,
+            files.answers,
+            wall_s=wall_s,
+            shared=[noted.fileno()],
+        )
         sandbox.print_output(file, outcome.printed)
         sandbox.report_missing(outcome.missing)
         answer = outcome.answer
@@ -164,8 +176,10 @@ class _Files:
             if not reach.allows(name):
                 reach.add_package_around(name)
         self.answers: dict[str, Callable[[str], tuple[Any, bytes]]] = {
-            "find": self._find, "read": self._read, "list": self._list
-        }  # fmt: skip
+            "find": self._find,
+            "read": self._read,
+            "list": self._list,
+        }
 
     def has_served(self, name: str) -> bool:
         """Return whether the process has read a file: it may not have any other one shown."""

@@ -60,8 +60,9 @@ def macro(robot: Robot, target: Target = AS_IN_SOURCE) -> str:
         if more
         else ""
     )
+    example = f'<xacro:{name} prefix="left_" parent="tool0" xyz="0 0 0.1" rpy="0 0 0"/>'
     return f"""<?xml version="1.0"?>
-<!-- Include this file, then: <xacro:{name} prefix="left_" parent="tool0" xyz="0 0 0.1" rpy="0 0 0"/>
+<!-- Include this file, then: {example}
      Each may be left out; without a parent, {base} is a root.{help_} -->
 <robot {NAMESPACE}>
 <xacro:macro name="{name}" params="prefix:='' parent:='' xyz:='0 0 0' rpy:='0 0 0'{more}">

@@ -385,10 +385,24 @@ def _suffixes(chain: list[Any]) -> list[str]:
 
 
 #: Attributes by which generators and tracebacks lead to the functions that evaluate them.
-_FRAMES = frozenset({
-    "ag_code", "ag_frame", "cr_code", "cr_frame", "f_back", "f_builtins", "f_code", "f_globals",
-    "f_locals", "gi_code", "gi_frame", "gi_yieldfrom", "tb_frame", "tb_next",
-})  # fmt: skip
+_FRAMES = frozenset(
+    {
+        "ag_code",
+        "ag_frame",
+        "cr_code",
+        "cr_frame",
+        "f_back",
+        "f_builtins",
+        "f_code",
+        "f_globals",
+        "f_locals",
+        "gi_code",
+        "gi_frame",
+        "gi_yieldfrom",
+        "tb_frame",
+        "tb_next",
+    }
+)
 
 
 def _with_safe_names(evaluate: Callable[..., Any]) -> Callable[..., Any]:

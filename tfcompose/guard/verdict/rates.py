@@ -218,7 +218,8 @@ def fell_silent(state: TreeState) -> Iterator[Finding]:
         if not is_silent(edge) or edge.child in rated or (edge.parent, edge.child) in alive:
             continue
         if edge.child in elsewhere and edge.present is not False:
-            continue  # the frame hangs on another parent now, which is a finding of its own, or right
+            # The frame hangs on another parent now, which is a finding of its own, or right.
+            continue
         yield _silence(who(edge), who(edge), [edge.name], edge.age_s, gone=edge.present is False)
 
 

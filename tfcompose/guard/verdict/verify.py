@@ -170,9 +170,15 @@ class _Comparison:
     ) -> Difference:
         stream = one.stream
         fault = Fault(
-            code, stream.parent, stream.child, nodes=one.nodes, static=stream.static, edge=edge,
-            namesake=namesake, recorded=self.state.recorded,
-        )  # fmt: skip
+            code,
+            stream.parent,
+            stream.child,
+            nodes=one.nodes,
+            static=stream.static,
+            edge=edge,
+            namesake=namesake,
+            recorded=self.state.recorded,
+        )
         return Difference(code, edge, one, fault)
 
     def _twice(self, edge: PlanEdge, some: Sequence[EdgeState]) -> Iterator[Difference]:

@@ -54,7 +54,8 @@ try:
     from tfcompose import __version__ as version
 except ImportError:
     version = None
-names = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_DISTRO")
+names = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE",
+         "ROS_LOCALHOST_ONLY", "ROS_DISTRO")
 env = {name: os.environ[name] for name in names if os.environ.get(name)}
 print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env,
                   "zenoh": find_spec("zenoh") is not None}))
@@ -632,9 +633,24 @@ def _link(link: Path, target: str) -> None:
 
 #: What may be asked.
 _REQUESTS = (
-    "probe", "clock", "state", "texts", "take_lock", "chunk", "unpack", "rehearse", "discard", "stop", "start",
-    "follow", "wait", "commit", "settle", "back", "execute",
-)  # fmt: skip
+    "probe",
+    "clock",
+    "state",
+    "texts",
+    "take_lock",
+    "chunk",
+    "unpack",
+    "rehearse",
+    "discard",
+    "stop",
+    "start",
+    "follow",
+    "wait",
+    "commit",
+    "settle",
+    "back",
+    "execute",
+)
 
 
 def serve() -> None:

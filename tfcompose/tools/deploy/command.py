@@ -53,13 +53,19 @@ def arguments(parser: ArgumentParser) -> None:
         "--wait", action="store_true", help="wait for the edges, which is the default"
     )
     parser.add_argument(
-        "--timeout", type=positive, default=60.0, metavar="S",
+        "--timeout",
+        type=positive,
+        default=60.0,
+        metavar="S",
         help="go back if not every edge is live S seconds after the start; default: 60",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--clock-limit", type=positive, default=0.1, metavar="S",
+        "--clock-limit",
+        type=positive,
+        default=0.1,
+        metavar="S",
         help="refuse hosts whose clocks differ by more than S seconds; default: 0.1",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--wheels",
         metavar="FOLDER",
@@ -96,9 +102,14 @@ def run(arguments: Namespace) -> int:
     try:
         places = {name: host.at for name, host in robot.hosts.items()}
         target = target_of(
-            plan_of(robot.with_final_names()), arguments.hosts, places, system=arguments.system,
-            clock_limit_s=arguments.clock_limit, timeout_s=arguments.timeout, waits=arguments.wait,
-        )  # fmt: skip
+            plan_of(robot.with_final_names()),
+            arguments.hosts,
+            places,
+            system=arguments.system,
+            clock_limit_s=arguments.clock_limit,
+            timeout_s=arguments.timeout,
+            waits=arguments.wait,
+        )
         release = None if arguments.rollback else packed(robot, wheels)
         return asyncio.run(_deploy(target, release, arguments))
     except RejectedError as error:

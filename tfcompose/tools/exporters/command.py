@@ -26,10 +26,23 @@ KINDS = ("systemd", "compose", "k8s", "launch")
 #: What ROS's setup files set, and what people set for ROS: units start without a shell that has
 #: it.
 ROS_VARIABLES = (
-    "AMENT_PREFIX_PATH", "CYCLONEDDS_URI", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE",
-    "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_DISTRO",
-    "ROS_DOMAIN_ID", "ROS_HOME", "ROS_LOG_DIR", "ROS_PYTHON_VERSION", "ROS_STATIC_PEERS", "ROS_VERSION",
-)  # fmt: skip
+    "AMENT_PREFIX_PATH",
+    "CYCLONEDDS_URI",
+    "FASTDDS_DEFAULT_PROFILES_FILE",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "LD_LIBRARY_PATH",
+    "PATH",
+    "PYTHONPATH",
+    "RMW_IMPLEMENTATION",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_DISTRO",
+    "ROS_DOMAIN_ID",
+    "ROS_HOME",
+    "ROS_LOG_DIR",
+    "ROS_PYTHON_VERSION",
+    "ROS_STATIC_PEERS",
+    "ROS_VERSION",
+)
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -40,32 +53,47 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_variant(parser)
     parser.add_argument(
-        "-o", "--output", metavar="DIR",
-        help="where to build FILE; the export is a folder in it; default: build/ROBOT, or PLAN's folder",
-    )  # fmt: skip
+        "-o",
+        "--output",
+        metavar="DIR",
+        help=(
+            "where to build FILE; the export is a folder in it; default: build/ROBOT, or PLAN's "
+            "folder"
+        ),
+    )
     parser.add_argument(
         "--host",
         metavar="NAME",
         help="export only this host's share; '': processes without a host; default: all",
     )
     parser.add_argument(
-        "--at", metavar="DIR",
-        help="the plan's folder on the robot; default: systemd: as here; k8s: none, a ConfigMap holds the plan",
-    )  # fmt: skip
+        "--at",
+        metavar="DIR",
+        help=(
+            "the plan's folder on the robot; default: systemd: as here; k8s: none, a ConfigMap "
+            "holds the plan"
+        ),
+    )
     parser.add_argument(
         "--python",
         metavar="FILE",
         help="systemd: Python on the robot; default: that of the host under hosts, or this one",
     )
     parser.add_argument(
-        "--setup", action="append", default=[], metavar="FILE",
-        help="systemd: source it first, as /opt/ros/jazzy/setup.bash; repeatable; default: as the host under hosts, or "
+        "--setup",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="systemd: source it first, as /opt/ros/jazzy/setup.bash; repeatable; default: as "
+        "the host under hosts, or "
         "this shell's variables",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--image", default="", metavar="NAME",
+        "--image",
+        default="",
+        metavar="NAME",
         help="compose: the image; default: $TFCOMPOSE_IMAGE at start; k8s: required",
-    )  # fmt: skip
+    )
 
 
 def run(arguments: Namespace) -> int:

@@ -41,19 +41,38 @@ _MOVED = ("-r", "--params-file")
 #: What the launch file needs of which module.
 _IMPORTS = {
     "launch.actions": (
-        "DeclareLaunchArgument", "EmitEvent", "ExecuteProcess", "GroupAction", "IncludeLaunchDescription",
-        "OpaqueFunction", "RegisterEventHandler", "SetEnvironmentVariable", "Shutdown", "TimerAction",
+        "DeclareLaunchArgument",
+        "EmitEvent",
+        "ExecuteProcess",
+        "GroupAction",
+        "IncludeLaunchDescription",
+        "OpaqueFunction",
+        "RegisterEventHandler",
+        "SetEnvironmentVariable",
+        "Shutdown",
+        "TimerAction",
     ),
     "launch.conditions": ("IfCondition", "UnlessCondition"),
     "launch.event_handlers": ("OnProcessExit", "OnProcessStart"),
     "launch.events": ("matches_action",),
     "launch.launch_description_sources": ("AnyLaunchDescriptionSource",),
     "launch.substitutions": (
-        "AndSubstitution", "EnvironmentVariable", "EqualsSubstitution", "LaunchConfiguration",
-        "NotEqualsSubstitution", "NotSubstitution", "OrSubstitution", "PythonExpression",
+        "AndSubstitution",
+        "EnvironmentVariable",
+        "EqualsSubstitution",
+        "LaunchConfiguration",
+        "NotEqualsSubstitution",
+        "NotSubstitution",
+        "OrSubstitution",
+        "PythonExpression",
     ),
     "launch_ros.actions": (
-        "ComposableNodeContainer", "LifecycleNode", "LoadComposableNodes", "Node", "PushRosNamespace", "SetParameter",
+        "ComposableNodeContainer",
+        "LifecycleNode",
+        "LoadComposableNodes",
+        "Node",
+        "PushRosNamespace",
+        "SetParameter",
         "SetRemap",
     ),
     "launch_ros.descriptions": ("ComposableNode",),
@@ -61,7 +80,7 @@ _IMPORTS = {
     "launch_ros.events.lifecycle": ("ChangeState",),
     "launch_ros.parameter_descriptions": ("ParameterValue",),
     "lifecycle_msgs.msg": ("Transition",),
-}  # fmt: skip
+}
 #: Functions that a launch file has where it calls them.
 _HELPERS = {
     "process": (
@@ -97,7 +116,8 @@ def fixed(name, parent, child, xyz, quat_xyzw, **more):
     "managed": (
         '''
 def change(node, transition):
-    return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(node), transition_id=transition))
+    matcher = matches_action(node)
+    return EmitEvent(event=ChangeState(lifecycle_node_matcher=matcher, transition_id=transition))
 
 
 def managed(node, active):
@@ -107,7 +127,10 @@ def managed(node, active):
     if active:
         activate = change(node, Transition.TRANSITION_ACTIVATE)
         then = OnStateTransition(
-            target_lifecycle_node=node, start_state="configuring", goal_state="inactive", entities=[activate]
+            target_lifecycle_node=node,
+            start_state="configuring",
+            goal_state="inactive",
+            entities=[activate],
         )
         yield RegisterEventHandler(then)
     yield RegisterEventHandler(OnProcessStart(target_action=node, on_start=[configure]))
@@ -116,13 +139,14 @@ def managed(node, active):
     "included": (
         '''
 def included(package, name, arguments, settings, **more):
-    """A package's launch file, in its share folder or anywhere below, in a group with what holds for all its nodes."""
+    """A package's launch file, anywhere in its share folder, grouped with its settings."""
 
     def found(context):
         share = Path(get_package_share_directory(package))
         direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
         file = (direct or sorted(share.rglob(name)) or [share / name])[0]
-        return [IncludeLaunchDescription(AnyLaunchDescriptionSource(str(file)), launch_arguments=arguments)]
+        source = AnyLaunchDescriptionSource(str(file))
+        return [IncludeLaunchDescription(source, launch_arguments=arguments)]
 
     return GroupAction([*settings, OpaqueFunction(function=found)], **more)
 '''
@@ -314,18 +338,24 @@ class _Export:
             if what == "done"
         }
         return [
-            process.name for process in self.processes
-            if process.name in names and process.kind not in {"guard", *own}
-            and not _is_launch(process) and not process.lifecycle
-        ]  # fmt: skip
+            process.name
+            for process in self.processes
+            if process.name in names
+            and process.kind not in {"guard", *own}
+            and not _is_launch(process)
+            and not process.lifecycle
+        ]
 
     def _waits(self, process: PlanProcess, before: list[str]) -> None:
         """Say for what the process does not wait as it does under ``up``."""
         container = process.component.container if process.component else ""
         rest = [
-            name for name, what in process.after.items()
-            if name in self.known and name not in {*before, container} and not waiting_s(self.known[name], what)
-        ]  # fmt: skip
+            name
+            for name, what in process.after.items()
+            if name in self.known
+            and name not in {*before, container}
+            and not waiting_s(self.known[name], what)
+        ]
         if rest:
             self.gaps.append(
                 f"{process.name} does not wait for {', '.join(rest)}: launch knows no readiness"
@@ -405,7 +435,7 @@ class _Export:
         """Return the process's variables, as Python."""
         env: dict[str, Code | str] = {
             name: _filled(value, self._file(process)) for name, value in process.env.items()
-        }  # fmt: skip
+        }
         return env | {
             name: text_code(text) for name, text in self._texts_of(process, "env").items()
         }
@@ -457,13 +487,16 @@ class _Export:
             else [f"exec_name={process.name!r}"]
         )
         parts: list[Code | str] = [
-            f"package={package[1]!r}" if package else "", f"executable={package[2]!r}" if package else "",
-            *_named(process), *named, *self._remapped(process),
+            f"package={package[1]!r}" if package else "",
+            f"executable={package[2]!r}" if package else "",
+            *_named(process),
+            *named,
+            *self._remapped(process),
             *([items(words, "arguments")] if words else []),
             *([items(self._filled(process, ros_words), "ros_arguments")] if ros_words else []),
             *([items(given, "parameters")] if given else []),
             *more,
-        ]  # fmt: skip
+        ]
         if loaded := self._loaded_by(process):
             components = [
                 self._component(one) for one in loaded if self._comes_with_container(one)
@@ -496,10 +529,15 @@ class _Export:
         needed = also and conditions.get(process.name) != conditions.get(found.container)
         condition = self._condition(process) if needed else []
         return call(
-            "ComposableNode", f"package={found.package!r}", f"plugin={found.plugin!r}", *_named(process),
-            *self._remapped(process), *([items([_mapping(params)], "parameters")] if params else []),
-            *more, *condition,
-        )  # fmt: skip
+            "ComposableNode",
+            f"package={found.package!r}",
+            f"plugin={found.plugin!r}",
+            *_named(process),
+            *self._remapped(process),
+            *([items([_mapping(params)], "parameters")] if params else []),
+            *more,
+            *condition,
+        )
 
     def _remapped(self, process: PlanProcess) -> Iterator[Code]:
         remap: dict[str, Code | str] = {old: repr(new) for old, new in process.remap.items()}
@@ -576,7 +614,7 @@ def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
     waiting = {
         name: {other: what for other, what in process.after.items() if other in known}
         for name, process in known.items()
-    }  # fmt: skip
+    }
     for name in graphlib.TopologicalSorter(waiting).static_order():
         waits = (
             delays[other] + waiting_s(known[other], what) for other, what in waiting[name].items()

@@ -75,8 +75,10 @@ def launch_values(
     """
     source = composed(
         with_includes(load(read_text(arguments.file), arguments.file), read_text),
-        arguments.profiles, overlays_of(arguments), given_by(arguments),
-    )  # fmt: skip
+        arguments.profiles,
+        overlays_of(arguments),
+        given_by(arguments),
+    )
     validated = validate(source, profiles_in(source), given_by(arguments))
     specs, values = validated.spec.args, validated.args
     kinds = {name: spec.kind for name, spec in specs.items()}
@@ -99,8 +101,13 @@ def launch_values(
     for (process, place), text in kept.items():
         if process in there or process in more:
             texts[process][place] = _text(text, kinds)
-    used = {part.name for several in texts.values() for text in several.values() for part in text
-            if isinstance(part, ArgumentValue)}  # fmt: skip
+    used = {
+        part.name
+        for several in texts.values()
+        for text in several.values()
+        for part in text
+        if isinstance(part, ArgumentValue)
+    }
     used |= {
         name.removeprefix("args.")
         for text in conditions.values()
@@ -117,8 +124,11 @@ def launch_values(
     declared = tuple(
         _argument(name, spec, defaults[name]) for name, spec in specs.items() if name in used
     )
-    lines = [f"{name} is {as_given(value)}: something depends on it that a launch file does not decide"
-             for name, value in values.items() if name not in used and f"args.{name}" in uses.fixed]  # fmt: skip
+    lines = [
+        f"{name} is {as_given(value)}: something depends on it that a launch file does not decide"
+        for name, value in values.items()
+        if name not in used and f"args.{name}" in uses.fixed
+    ]
     added = {name: found for name, found in more.items() if name in conditions}
     files = tuple(file for _, several in added.values() for file in several)
     return (
@@ -130,9 +140,13 @@ def launch_values(
 
 def _argument(name: str, spec: ArgSpec, value: Any) -> Argument:
     return Argument(
-        name, spec.kind, as_given(value), choices=tuple(map(as_given, spec.choices)),
-        description=" ".join((spec.description or "").split()), env=spec.env,
-    )  # fmt: skip
+        name,
+        spec.kind,
+        as_given(value),
+        choices=tuple(map(as_given, spec.choices)),
+        description=" ".join((spec.description or "").split()),
+        env=spec.env,
+    )
 
 
 def _uses(source: Source, kinds: Mapping[str, str]) -> _Uses:
@@ -336,10 +350,15 @@ class _Combinations:
             for name, value in (self.values | values).items()
         }
         compiled: Compiled = compile_robot(
-            read_text(arguments.file), arguments.file, library(), arguments.profiles,
-            overlays=overlays_of(arguments), read=read_text, disk=disk_of(arguments.file, arguments),
+            read_text(arguments.file),
+            arguments.file,
+            library(),
+            arguments.profiles,
+            overlays=overlays_of(arguments),
+            read=read_text,
+            disk=disk_of(arguments.file, arguments),
             given=Given(args, os.environ),
-        )  # fmt: skip
+        )
         if compiled.robot is None or compiled.errors:
             return None
         files = emit(compiled.robot, destination(arguments, compiled.robot)[1])
@@ -351,5 +370,6 @@ def _own_edges(plan: Plan) -> set[tuple[Any, ...]]:
     own = {process.name for process in plan.started if process.kind in OWN_KINDS}
     return {
         (edge.parent, edge.child, edge.kind, edge.pose.xyz, edge.pose.quat_xyzw)
-        for edge in plan.edges if edge.owner in own
-    }  # fmt: skip
+        for edge in plan.edges
+        if edge.owner in own
+    }

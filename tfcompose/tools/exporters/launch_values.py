@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 _EQUALITY = {ast.Eq: "EqualsSubstitution", ast.NotEq: "NotEqualsSubstitution"}
 _ORDER: dict[type[ast.cmpop], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
 _FLIPPED: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE
-}  # fmt: skip
+    ast.Lt: ast.Gt,
+    ast.LtE: ast.GtE,
+    ast.Gt: ast.Lt,
+    ast.GtE: ast.LtE,
+}
 _TYPES = {"bool": "bool", "int": "int", "float": "float", "string": "str"}
 _TRUTHS = ("true", "false")
 

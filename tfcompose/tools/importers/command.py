@@ -45,7 +45,8 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
         "file", nargs="?", metavar="FILE",
-        help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml, calibrations of Autoware's or the "
+        help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml, calibrations "
+        "of Autoware's or the "
         "folder of its individual_params; -: a script's lines or a launch file from stdin",
     )  # fmt: skip
     parser.add_argument("more", nargs="*", metavar="FILE", help="further calibrations")

@@ -61,9 +61,14 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_bag(parser)
     parser.add_argument(
-        "--at", type=_seconds, metavar="S",
-        help="with --bag: the time to begin with, in seconds after its first transform, or since the epoch; default: 0",
-    )  # fmt: skip
+        "--at",
+        type=_seconds,
+        metavar="S",
+        help=(
+            "with --bag: the time to begin with, in seconds after its first transform, or since "
+            "the epoch; default: 0"
+        ),
+    )
     add_tolerance(parser)
     parser.set_defaults(tolerance=None)
     parser.add_argument(
@@ -73,9 +78,11 @@ def arguments(parser: ArgumentParser) -> None:
         "--html", metavar="FILE", help="write one HTML file that needs nothing else, and end"
     )
     parser.add_argument(
-        "--host", default=_HOST, metavar="ADDRESS",
+        "--host",
+        default=_HOST,
+        metavar="ADDRESS",
         help=f"listen there; the printed address has the token that lets in (default: {_HOST})",
-    )  # fmt: skip
+    )
     parser.add_argument("--port", type=int, default=_PORT, help=f"the port (default: {_PORT})")
     parser.add_argument("--open", action="store_true", help="open the browser")
 

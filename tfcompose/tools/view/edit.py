@@ -289,7 +289,8 @@ class _Change:
         return Edit(at, self._angles(FORMS["look"](rotation, {}, self.tolerance)))
 
     def _angles(self, numbers: Numbers) -> str:
-        return f"{{{', '.join(f'{step}: {self._new_angle(value)}' for (step,), value in numbers.items())}}}"
+        angles = [f"{step}: {self._new_angle(value)}" for (step,), value in numbers.items()]
+        return f"{{{', '.join(angles)}}}"
 
     def _numbers(self, key: str) -> Numbers:
         """Return the numbers below the key, in SI, those that variables make among them."""

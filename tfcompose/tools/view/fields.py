@@ -189,9 +189,15 @@ class FieldsOfView:
             )
             vertices, faces = surface(optics, reach)
             self._scene.add_mesh_simple(
-                f"/fields/{index}/sides", vertices, faces, color=colour, opacity=_OPACITY, side="double",
-                cast_shadow=False, receive_shadow=False,
-            )  # fmt: skip
+                f"/fields/{index}/sides",
+                vertices,
+                faces,
+                color=colour,
+                opacity=_OPACITY,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
 
     def update(self, poses: Mapping[str, Pose]) -> None:
         """Put every field of view where its frame is, in the root of its tree."""

@@ -19,10 +19,16 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Source
 
 _STYLE = """<style>
-.tf-frames { position: fixed; left: 0; top: 0; z-index: 1000; max-width: 24em; max-height: 100vh; overflow: auto;
-  box-sizing: border-box; padding: 0.6em 0.9em; background: #fffe; color: #222; font: 13px/1.5 sans-serif }
-.tf-frames summary { cursor: pointer; white-space: nowrap } .tf-frames p { margin: 0.2em 0 0.4em 2.2em; color: #555 }
-.tf-frames i { display: inline-block; width: 0.8em; height: 0.8em; margin: 0 0.5em; border-radius: 0.2em }
+.tf-frames {
+  position: fixed; left: 0; top: 0; z-index: 1000; max-width: 24em; max-height: 100vh;
+  overflow: auto; box-sizing: border-box; padding: 0.6em 0.9em; background: #fffe; color: #222;
+  font: 13px/1.5 sans-serif
+}
+.tf-frames summary { cursor: pointer; white-space: nowrap }
+.tf-frames p { margin: 0.2em 0 0.4em 2.2em; color: #555 }
+.tf-frames i {
+  display: inline-block; width: 0.8em; height: 0.8em; margin: 0 0.5em; border-radius: 0.2em
+}
 .tf-frames div { padding: 0.3em 0 0.5em }
 </style>"""
 _TITLE = "<title>Viser</title>"

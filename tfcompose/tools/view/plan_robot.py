@@ -60,6 +60,15 @@ def _edge(edge: PlanEdge, limit: Limit | None) -> Edge:
     at = Span(*edge.source)
     joint = Joint(**asdict(edge.joint), at=at, limit=limit) if edge.joint else None
     return Edge(
-        edge.parent, edge.child, edge.kind, edge.owner, edge.pose,
-        node=edge.node, rate=edge.rate, joint=joint, switched=edge.switched, pose_known=edge.pose_known, at=at,
-    )  # fmt: skip
+        edge.parent,
+        edge.child,
+        edge.kind,
+        edge.owner,
+        edge.pose,
+        node=edge.node,
+        rate=edge.rate,
+        joint=joint,
+        switched=edge.switched,
+        pose_known=edge.pose_known,
+        at=at,
+    )

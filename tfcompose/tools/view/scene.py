@@ -192,9 +192,13 @@ class RobotScene:
         rotations, positions = rows[:, [6, 3, 4, 5]], rows[:, :3]
         if self._axes is None:
             self._axes = self._scene.add_batched_axes(
-                "/frames", rotations, positions, axes_length=self._axes_m, axes_radius=self._axes_m / 20,
+                "/frames",
+                rotations,
+                positions,
+                axes_length=self._axes_m,
+                axes_radius=self._axes_m / 20,
                 batched_scales=self._scales(),
-            )  # fmt: skip
+            )
         else:
             self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
         self._draw_edges()

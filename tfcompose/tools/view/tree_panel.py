@@ -37,12 +37,17 @@ div:has(> .tf-frames) + div { display: none }
 .tf-frames:focus { outline: none }
 .tf-frames button { all: unset; cursor: pointer; box-sizing: border-box }
 .tf-frames button:focus-visible { outline: 2px solid #228be6 }
-.tf-frames header { color: #868e96; padding: 0 0.3em 0.4em } .tf-frames header button { color: #1971c2 }
+.tf-frames header { color: #868e96; padding: 0 0.3em 0.4em }
+.tf-frames header button { color: #1971c2 }
 .tf-frames header button:hover { text-decoration: underline }
-.tf-row { display: flex; align-items: center; border-radius: 0.25em } .tf-row:hover { background: #8080801c }
+.tf-row { display: flex; align-items: center; border-radius: 0.25em }
+.tf-row:hover { background: #8080801c }
 .tf-row[aria-selected=true] { background: #228be62e; font-weight: 600 }
-.tf-row > i { flex: none; width: 1.2em; text-align: center; font-style: normal } .tf-row > i button { width: 100% }
-.tf-row > input { flex: none; width: 0.95em; height: 0.95em; margin: 0 0.4em 0 0.1em; cursor: pointer }
+.tf-row > i { flex: none; width: 1.2em; text-align: center; font-style: normal }
+.tf-row > i button { width: 100% }
+.tf-row > input {
+  flex: none; width: 0.95em; height: 0.95em; margin: 0 0.4em 0 0.1em; cursor: pointer
+}
 .tf-row > button { flex: 1; overflow: hidden; text-overflow: ellipsis; white-space: nowrap }
 .tf-row.tf-hidden > button { opacity: 0.45 } .tf-row.tf-wrong > button { color: #dc1e1e }
 .tf-row button b { color: #e8590c }
@@ -67,7 +72,8 @@ if (clicked) send(clicked.dataset.does, row ? row.dataset.frame : '');"""
 _PRESSED = (
     _SEND
     + """
-const rows = [...this.querySelectorAll('[data-frame]')], at = rows.findIndex(row => row.ariaSelected === 'true');
+const rows = [...this.querySelectorAll('[data-frame]')];
+const at = rows.findIndex(row => row.ariaSelected === 'true');
 const step = {ArrowDown: 1, ArrowUp: -1}[event.key];
 const opens = {ArrowRight: 'false', ArrowLeft: 'true'}[event.key];
 if (step || opens) {
@@ -90,7 +96,8 @@ const tree = this.closest('.tf-frames'), selected = tree.querySelector('[aria-se
 const row = this.dataset.scrolls === 'true' && (selected || tree.querySelector('mark'));
 if (row) row.scrollIntoView({block: 'nearest'});
 const isFree = document.activeElement === document.body;
-if (isFree && 'hasKeys' in tree.parentElement.dataset) tree.focus({preventScroll: true})" data-scrolls="SCROLLS">"""
+if (isFree && 'hasKeys' in tree.parentElement.dataset) tree.focus({preventScroll: true})"
+ data-scrolls="SCROLLS">"""
 _NO_OWNER = (134, 142, 150)
 
 

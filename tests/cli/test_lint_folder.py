@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tfcompose.cli import main
-from tfcompose.cli.commands.lint import robots_in
+from tfcompose.cli.robot_search import robots_in
 from tfcompose.foundation.reading import MOST_BYTES
 
 ROBOT = "# a robot\ntfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
@@ -62,8 +62,8 @@ def test_other_file_systems_and_what_the_kernel_shows_as_files_are_not_searched(
         found[2] += path.endswith("mounted")
         return os.stat_result(found)
 
-    monkeypatch.setattr("tfcompose.cli.commands.lint._OF_KERNEL", {str(tmp_path / "proc")})
-    monkeypatch.setattr("tfcompose.cli.commands.lint.os.stat", stat)
+    monkeypatch.setattr("tfcompose.cli.robot_search._OF_KERNEL", {str(tmp_path / "proc")})
+    monkeypatch.setattr("tfcompose.cli.robot_search.os.stat", stat)
     assert robots_in(str(tmp_path)) == [str(tmp_path / "here" / "robot.yaml")]
     assert robots_in(str(tmp_path / "mounted")) == [str(tmp_path / "mounted" / "robot.yaml")]
 
@@ -76,7 +76,7 @@ def test_a_long_search_says_once_what_it_does(
         (tmp_path / name / "robot.yaml").write_text(ROBOT, encoding="utf-8")
     robots_in(str(tmp_path))
     assert not capsys.readouterr().err
-    monkeypatch.setattr("tfcompose.cli.commands.lint.SAY_AFTER_S", 0.0)
+    monkeypatch.setattr("tfcompose.cli.robot_search.SAY_AFTER_S", 0.0)
     robots_in(str(tmp_path))
     said = capsys.readouterr().err
     assert said.count(str(tmp_path)) == 1

@@ -1,0 +1,190 @@
+"""Judgement of one file for ``lint``: a robot file in its variants, or a URDF or xacro file."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from tfcompose.cli.terminal import warn
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Callable, Mapping, Sequence
+
+    from tfcompose.compiler.compile import Compiled
+    from tfcompose.compiler.resolve import Disk, Library
+    from tfcompose.foundation.findings import Finding, Span
+    from tfcompose.spec.language import Given
+    from tfcompose.spec.load import Source
+
+#: For how long a file is judged in combinations of its arguments, in seconds; the first is always
+#: judged.
+JUDGE_FOR_S = 60.0
+
+
+class _Files(NamedTuple):
+    """Files that a robot file may read, and the variables that its arguments may."""
+
+    read: Callable[[str], str]
+    presets: Library
+    #: Of the file, with what it includes.
+    disk_of: Callable[[Source], Disk]
+    environment_of: Callable[[Source], Mapping[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Linter:
+    """Judges files as the command line says."""
+
+    arguments: Namespace
+    presets: Library
+    #: What arguments of untrusted robot files may take from the environment.
+    environment: Mapping[str, str]
+    #: Whether the command is about one file: then an argument that it does not have is a mistake.
+    has_one_file: bool
+
+    def lint_robot(self, file: str, read: Callable[[str], str]) -> list[Finding]:
+        """Return the findings of a robot file, in the order of their places.
+
+        It is judged alone and with each of its profiles, or with those that are requested, and
+        alone in each combination of its arguments' values.
+        """
+        from tfcompose.cli.compiling import given_by, overlays_of
+        from tfcompose.foundation.findings import RejectedError
+        from tfcompose.spec.language import with_includes
+        from tfcompose.spec.load import load
+
+        files = self._files_of(file, read)
+        try:
+            source = with_includes(load(files.read(file), file), files.read)
+            overlays = overlays_of(self.arguments, files.read)
+        except RejectedError as error:
+            return list(error.findings)
+        given = replace(given_by(self.arguments), environment=files.environment_of(source))
+        if not self.has_one_file:  # an argument is one of any of the files
+            declared = source.data.get("args")
+            names = given.args.keys() & (declared if isinstance(declared, dict) else {}).keys()
+            given = replace(given, args={name: given.args[name] for name in names})
+        variants = _Variants(source, overlays, given, files, files.disk_of(source))
+        requested = self.arguments.profiles
+        findings, judged = variants.in_combinations(requested)
+        if not requested and not overlays:
+            findings += variants.with_each_profile(findings, judged)
+        return sorted(findings, key=lambda finding: finding.sort_key)
+
+    def lint_urdf(self, file: str, read: Callable[[str], str]) -> list[Finding]:
+        """Return the findings of a URDF or xacro file."""
+        from tfcompose.cli.compiling import disk
+        from tfcompose.compiler.urdf.lint import lint_urdf
+        from tfcompose.compiler.urdf.packages import Packages
+
+        if self.arguments.untrusted:
+            from tfcompose.cli.untrusted import UntrustedFiles
+
+            files = UntrustedFiles(file, read).disk()
+        else:
+            files = disk(trusts_files=self.arguments.trust)
+        packages = Packages(files, advice="source the workspace's setup file")
+        return lint_urdf(file, packages, self.arguments.given)
+
+    def _files_of(self, file: str, read: Callable[[str], str]) -> _Files:
+        """Return all files of this machine; with --untrusted those of the robot's tree."""
+        if not self.arguments.untrusted:
+            from tfcompose.cli.compiling import disk
+
+            files = disk(trusts_files=self.arguments.trust, sources=[file])
+            return _Files(read, self.presets, lambda _: files, lambda _: os.environ)
+        from tfcompose.cli.untrusted import UntrustedFiles, declared_environment
+
+        untrusted = UntrustedFiles(file, read)
+        for overlay in self.arguments.overlays:
+            untrusted.reach.add_tree(overlay)
+        return _Files(
+            untrusted.read,
+            untrusted.library(),
+            untrusted.disk_for,
+            lambda source: declared_environment(source, self.environment),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Variants:
+    """A robot file in the variants that its profiles and arguments make of it."""
+
+    source: Source
+    overlays: Sequence[Source]
+    given: Given
+    files: _Files
+    disk: Disk
+
+    def in_combinations(self, profiles: Sequence[str]) -> tuple[list[Finding], list[Compiled]]:
+        """Return the findings for each combination of argument values, and what was compiled."""
+        if "args" not in self.source.data and not self.overlays:
+            alone = self._compile(self.given, profiles)
+            return list(alone.found), [alone]
+        from tfcompose.cli.combinations import combinations, merged
+        from tfcompose.foundation.findings import RejectedError, Span
+        from tfcompose.spec.language import GivenArg, alternatives_of, composed
+
+        try:
+            laid_over = composed(self.source, profiles, self.overlays, self.given)
+            alternatives, first = alternatives_of(laid_over, self.given, self.source)
+        except RejectedError as error:
+            return list(error.findings), []
+        judged = []
+        begin = time.monotonic()
+        every = combinations(alternatives, first)
+        for index, values in enumerate(every):
+            if time.monotonic() - begin > JUDGE_FOR_S:
+                warn(
+                    f"{self.source.file}: judged in {index} of {len(every)} combinations of its"
+                    f" args, within {JUDGE_FOR_S:g} s"
+                )
+                break
+            args = dict(self.given.args)
+            for name, value in values.items():
+                args[name] = GivenArg(value, Span(f"{name}:={value}"))
+            judged.append((values, self._compile(replace(self.given, args=args), profiles)))
+        findings = merged([(values, compiled.found) for values, compiled in judged])
+        return findings, [compiled for _, compiled in judged]
+
+    def with_each_profile(
+        self, findings: Sequence[Finding], judged: Sequence[Compiled]
+    ) -> list[Finding]:
+        """Return what each profile alone adds to the findings, and comments that allow nothing."""
+        from tfcompose.compiler.check import unused_allows
+        from tfcompose.foundation.findings import Note
+        from tfcompose.spec.language import profiles_in
+
+        known = {_identity(finding) for finding in findings}
+        more: list[Finding] = []
+        variants = list(judged)
+        for profile, inside in profiles_in(self.source).items():
+            if "when" in inside and "args" in self.source.data:
+                continue  # it is laid over where its condition holds
+            variant = self._compile(self.given, [profile])
+            variants.append(variant)
+            note = Note(f"with --profile {profile}")
+            new = [finding for finding in variant.found if _identity(finding) not in known]
+            more += [replace(finding, notes=(*finding.notes, note)) for finding in new]
+            known |= {_identity(finding) for finding in new}
+        if all(variant.robot is not None for variant in variants):
+            # Otherwise a comment may be about what was not judged.
+            used = {pair for variant in variants for pair in variant.used}
+            more += unused_allows(self.source.allows, used)
+        return more
+
+    def _compile(self, given: Given, profiles: Sequence[str]) -> Compiled:
+        from tfcompose.compiler.compile import compile_source
+
+        read, presets = self.files.read, self.files.presets
+        return compile_source(
+            self.source, presets, profiles, self.overlays, read, self.disk, given
+        )
+
+
+def _identity(finding: Finding) -> tuple[str, str, Span | None]:
+    """Return what makes findings of several variants the same one."""
+    return finding.code, finding.message, finding.span

@@ -68,12 +68,15 @@ def constructors_with_many_positional_arguments(tree: ast.AST) -> Iterator[int]:
 
 
 def values_smuggled_through_arguments(tree: ast.AST) -> Iterator[int]:
-    """Yield lines that set an attribute of a command's parsed ``arguments``."""
+    """Yield lines that give a command's parsed ``arguments`` an attribute.
+
+    A value that is made of the attribute itself, as where a default is filled in, is none.
+    """
     for node in ast.walk(tree):
         if not isinstance(node, ast.Assign):
             continue
-        for target in node.targets:
-            if isinstance(target, ast.Attribute) and ast.unparse(target.value) == "arguments":
+        for target in map(ast.unparse, node.targets):
+            if target.startswith("arguments.") and target not in ast.unparse(node.value):
                 yield node.lineno
 
 

@@ -173,7 +173,7 @@ def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> 
     )
 
 
-def settle_duration(arguments: Namespace, default_s: float) -> None:
+def settle_duration(arguments: Namespace, default_s: float, *, is_live: bool) -> None:
     """Give --for its default; refuse it where the running tree is not observed, as in a recording.
 
     Raises:
@@ -181,7 +181,7 @@ def settle_duration(arguments: Namespace, default_s: float) -> None:
     """
     if arguments.duration is not None and arguments.bag:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
-    if arguments.duration is not None and not arguments.live:
+    if arguments.duration is not None and not is_live:
         fail(
             "--for says how long to observe the running tree: add --live, or leave out --for",
             UNREADABLE,

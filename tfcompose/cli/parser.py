@@ -181,7 +181,6 @@ def _run_command(name: str, command: CommandModule, words: list[str]) -> int:
             return 0
         options = tool_commands.add_options(name, parser, words)
         arguments = parser.parse_args(words)
-        arguments.commands = all_commands  # for commands that are about commands
         if getattr(arguments, "show_args", False):
             from tfcompose.cli.args import show_args
 

@@ -114,11 +114,11 @@ def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
     if arguments.settle is None:
         return plan
     env = {SETTLE: str(arguments.settle)}
-    processes = tuple(
-        replace(process, env=process.env | env) if process.kind == "guard" else process
-        for process in plan.processes
-    )
-    return replace(plan, processes=processes)
+    processes = list(plan.processes)
+    for index, process in enumerate(processes):
+        if process.kind == "guard":
+            processes[index] = replace(process, env=process.env | env)
+    return replace(plan, processes=tuple(processes))
 
 
 def host_share(plan: Plan, host: str | None, here: str) -> Plan:

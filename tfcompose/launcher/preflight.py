@@ -414,9 +414,8 @@ def _find_launch_file(
     known = sorted(
         {file.name for share in present for kind in _KINDS for file in share.rglob(kind)}
     )
-    notes = tuple(
-        f"{share} {'has no ' + name if share in present else 'is not there'}" for share in shares
-    )
+    states = dict.fromkeys(present, f"has no {name}")
+    notes = tuple(f"{share} {states.get(share, 'is not there')}" for share in shares)
     listed = f"it has {', '.join(known[:12])}" if known else f"install the package {package}"
     return NotFound(
         process.name,

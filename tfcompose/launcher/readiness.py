@@ -98,7 +98,8 @@ def order_gate(step: Transition, one: Tracked) -> None:
     nodes, text = process.lifecycle, ready.text if ready else ""
     if kind == "lifecycle" and not nodes:
         nodes = dict.fromkeys(process.nodes, cast("LifecycleState", text))
-    topic, service = (text if kind == name else "" for name in ("topic", "service"))
+    topic = text if kind == "topic" else ""
+    service = text if kind == "service" else ""
     writers = process.topics if by_edges else ()
     gate = Gate(
         process.name, topic, service, dict(nodes), drive=bool(process.lifecycle), writers=writers

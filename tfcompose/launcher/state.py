@@ -179,10 +179,10 @@ def initial(plan: Plan, times: Times | None = None) -> State:
     """Return the state before ``Begin``: nothing runs."""
     processes = plan.processes
     guards = [process.name for process in processes if process.kind == "guard"]
-    tracked = {
-        process.name: Tracked(process, "expected" if process.kind == "external" else "stopped")
-        for process in processes
-    }
+    tracked = {}
+    for process in processes:
+        state: StateName = "expected" if process.kind == "external" else "stopped"
+        tracked[process.name] = Tracked(process, state)
     times = times or Times()
     settle_s = sum(float(tracked[name].process.env.get(SETTLE, 0)) for name in guards)
     times = replace(times, clear_s=times.clear_s + settle_s)

@@ -87,10 +87,12 @@ def unaddressed(robot: Robot, form: Form) -> list[Asset]:
     """
     if form == "as-written":
         return []
-    without = [
-        one for one in assets(robot) if not (one.package if form == "package" else one.path)
-    ]
-    return list(dict.fromkeys(one for one in without if not _elsewhere(one)))
+    unaddressed: dict[Asset, None] = {}
+    for asset in assets(robot):
+        known = asset.package if form == "package" else asset.path
+        if not known and not _elsewhere(asset):
+            unaddressed[asset] = None
+    return list(unaddressed)
 
 
 def _elsewhere(asset: Asset) -> bool:

@@ -86,7 +86,7 @@ def run(arguments: Namespace) -> int:
     """
     path = Path(arguments.output)
     _check_output(path)
-    settle_duration(arguments, 3.0)
+    settle_duration(arguments, 3.0, is_live=arguments.live)
     if arguments.live or arguments.bag:
         graph = _published_graph(arguments)
     else:

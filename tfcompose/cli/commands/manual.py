@@ -30,11 +30,12 @@ def run(arguments: Namespace) -> int:
     from pathlib import Path
 
     from tfcompose.cli.documentation import for_terminal, html, page, topics
+    from tfcompose.cli.parser import all_commands
     from tfcompose.cli.terminal import table_width
     from tfcompose.cli.tool_commands import report_problems
     from tfcompose.foundation.findings import did_you_mean
 
-    commands = arguments.commands()
+    commands = all_commands()
     report_problems()
     if arguments.html:
         try:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import sys
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.cli.options import add_bag, add_for, add_format, add_namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, can_redraw, coloured, fail, table_width, warn
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.cli.tables import LiveLines
+    from tfcompose.model.plan.topics import Topics
     from tfcompose.tf.live.edges import TreeObserver
 
 #: Of the running tree the last 5 to 10 s are shown.
@@ -60,19 +61,19 @@ def run(arguments: Namespace) -> int:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
     if arguments.a and not arguments.b:
         fail("the edges between two frames are shown: give both, A and B", UNREADABLE)
-    arguments.frames = [name.removeprefix("/") for name in (arguments.a, arguments.b) if name]
-    if not arguments.namespace and not arguments.bag:
-        arguments.namespace = _namespace_here()
-    topics = topics_below(arguments.namespace)
+    frames = [name.removeprefix("/") for name in (arguments.a, arguments.b) if name]
+    is_here = not arguments.namespace and not arguments.bag
+    topics = topics_below(_namespace_here() if is_here else arguments.namespace)
     covers_all = arguments.bag or arguments.duration
     observer = TreeObserver(0.0 if covers_all else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
+    table = _Table(observer, topics, frames, as_json=arguments.format == "json")
     if arguments.bag:
         read_bag(arguments.bag, {topics: observer})
-        return _show(arguments, observer, None)
+        return table.show(None)
     lines = (
         LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
     )
-    show = None if arguments.duration and not lines else partial(_show, arguments, observer, lines)
+    show = None if arguments.duration and not lines else partial(table.show, lines)
     observe(
         "tfcompose_monitor",
         {topics: observer},
@@ -80,7 +81,7 @@ def run(arguments: Namespace) -> int:
         every_s=arguments.every,
         show=show,
     )
-    return _show(arguments, observer, lines) if arguments.duration else 0
+    return table.show(lines) if arguments.duration else 0
 
 
 def _namespace_here() -> str:
@@ -108,33 +109,38 @@ def _namespace_here() -> str:
     return pairs[0][0].rpartition("/")[0]
 
 
-def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None) -> int:
-    """Print one table; return 1 if there is no chain between the two frames."""
-    from tfcompose.cli.edge_table import chain_line, lines_of, objects_of
-    from tfcompose.cli.live import names_of
-    from tfcompose.model.plan.topics import topics_below
-    from tfcompose.tf.live.chain import chain_between
+class _Table(NamedTuple):
+    """The edges of a tree, or those between two frames, as they are printed."""
 
-    now_ns = observer.until_ns
-    edges = sorted(
-        observer.edges(now_ns), key=lambda state: state.stream.static
-    )  # what moves first
-    chain = chain_between(edges, *arguments.frames) if arguments.frames else None
-    shown = edges if chain is None else () if isinstance(chain, str) else chain.all_edges
-    if arguments.format == "json":
-        sys.stdout.write(objects_of(shown, observer, now_ns, chain))
-        sys.stdout.flush()
+    observer: TreeObserver
+    topics: Topics
+    frames: list[str]
+    as_json: bool
+
+    def show(self, live: LiveLines | None) -> int:
+        """Print one table; return 1 if there is no chain between the two frames."""
+        from tfcompose.cli.edge_table import chain_line, lines_of, objects_of
+        from tfcompose.cli.live import names_of
+        from tfcompose.tf.live.chain import chain_between
+
+        now_ns = self.observer.until_ns
+        # What moves comes first.
+        edges = sorted(self.observer.edges(now_ns), key=lambda state: state.stream.static)
+        chain = chain_between(edges, *self.frames) if self.frames else None
+        shown = edges if chain is None else () if isinstance(chain, str) else chain.all_edges
+        if self.as_json:
+            sys.stdout.write(objects_of(shown, self.observer, now_ns, chain))
+            sys.stdout.flush()
+            return int(isinstance(chain, str))
+        width = table_width(sys.stdout)
+        lines = lines_of(shown, self.observer, now_ns, width, coloured=coloured(sys.stdout))
+        if chain is not None:
+            lines[0] = chain_line(chain, *self.frames)
+        if not self.observer.received_any:
+            lines = [f"no TF yet on {names_of([self.topics])}"]
+        if live is not None:
+            live.draw(lines)
+        else:
+            sys.stdout.write("".join(f"{line}\n" for line in lines))
+            sys.stdout.flush()
         return int(isinstance(chain, str))
-    lines = lines_of(
-        shown, observer, now_ns, table_width(sys.stdout), coloured=coloured(sys.stdout)
-    )
-    if chain is not None:
-        lines[0] = chain_line(chain, *arguments.frames)
-    if not observer.received_any:
-        lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
-    if live is not None:
-        live.draw(lines)
-    else:
-        sys.stdout.write("".join(f"{line}\n" for line in lines))
-        sys.stdout.flush()
-    return int(isinstance(chain, str))

@@ -56,7 +56,7 @@ def run(arguments: Namespace) -> int:
 
     Of a published one 1 if there is none, 2 if a bag cannot be read.
     """
-    settle_duration(arguments, 3.0)
+    settle_duration(arguments, 3.0, is_live=arguments.live)
     if arguments.live or arguments.bag:
         _print_published(arguments)
         return 0

@@ -65,8 +65,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 
     refuse_live_bag(arguments)
-    arguments.live = not arguments.bag
-    settle_duration(arguments, 5.0)
+    settle_duration(arguments, 5.0, is_live=not arguments.bag)
     plan, places = _running_plan(arguments) or expected_plan(
         arguments.file or DEFAULT_FILE, arguments
     )

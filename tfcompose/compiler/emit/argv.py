@@ -93,10 +93,11 @@ def _own_params(process: Process) -> list[tuple[str, Any]]:
 
     A number is a double, as its parameter is.
     """
-    return [
-        (name, value if isinstance(value, bool) else float(value))
-        for name, value in sorted(process.params.items())
-    ]
+    params: dict[str, Any] = dict(sorted(process.params.items()))
+    for name, value in params.items():
+        if not isinstance(value, bool):
+            params[name] = float(value)
+    return list(params.items())
 
 
 def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

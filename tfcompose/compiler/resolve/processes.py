@@ -632,12 +632,14 @@ def _with_joints(simulation: Simulation, wanted: str | dict[str, Any], robot: Ro
         for edge in robot.edges
         if edge.joint and _has_position(edge.joint)
     }
-    each = {name: wanted.get(name) if isinstance(wanted, dict) else wanted for name in joints}
-    positions = {
-        name: _rest(joints[name]) if what is None or isinstance(what, str) else what
-        for name, what in each.items()
-    }
-    sweeps = {name: _sweep(joints[name]) for name, what in each.items() if what == SWEEP}
+    requested: dict[str, Any] = dict.fromkeys(joints)
+    requested |= wanted if isinstance(wanted, dict) else dict.fromkeys(joints, wanted)
+    positions: dict[str, float] = {}
+    for name, joint in joints.items():
+        position = requested[name]
+        is_at_rest = position is None or isinstance(position, str)
+        positions[name] = _rest(joint) if is_at_rest else position
+    sweeps = {name: _sweep(joint) for name, joint in joints.items() if requested[name] == SWEEP}
     return replace(
         simulation,
         joints=positions,

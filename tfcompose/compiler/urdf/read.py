@@ -221,9 +221,10 @@ def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) 
     reader = _Reader(expansion.text, file)
     texts = [_Text(read(name), name) for name in expansion.files]
     nowhere = _Origin(_Text("", file), 0)
-    reader.origins = [
-        _Origin.at(texts[place[0]], *place[1:]) if place else nowhere for place in expansion.places
-    ]
+    reader.origins = []
+    for place in expansion.places:
+        origin = _Origin.at(texts[place[0]], *place[1:]) if place else nowhere
+        reader.origins.append(origin)
     return reader.read()
 
 

@@ -52,7 +52,7 @@ def topics_message(
 
     ``declared`` is the topic that the plan says, empty where none does.
     """
-    on = " and ".join(f"on {topic}{' by ' if by else ''}{by}" for topic, by in topics)
+    on = " and ".join(f"on {' by '.join(filter(None, pair))}" for pair in topics)
     return (
         f"{edges} {'are' if several else 'is'} published"
         f" {on}{', declared for ' if declared else ''}{declared}"
@@ -363,10 +363,11 @@ def _together(edges: Sequence[EdgeState]) -> bool:
 
     What is fixed is sent once and holds on.
     """
-    spans = sorted(
-        (e.stream.first_ns, float("inf") if e.stream.static else e.stream.arrivals.last_ns)
-        for e in edges
-    )
+    spans = []
+    for edge in edges:
+        stream = edge.stream
+        spans.append((stream.first_ns, math.inf if stream.static else stream.arrivals.last_ns))
+    spans.sort()
     return any(end - begun > TOGETHER_S * 1e9 for (_, end), (begun, _) in pairwise(spans))
 
 

@@ -153,7 +153,10 @@ class JointSource:
 
     def positions(self, time_s: float) -> list[float]:
         """Return where they are so many seconds after the start: rad, or m of those that slide."""
-        own = [swept(sweep, start, time_s) if sweep else start for start, sweep in self._moves]
+        own = [start for start, _ in self._moves]
+        for index, (rest, sweep) in enumerate(self._moves):
+            if sweep:
+                own[index] = swept(sweep, rest, time_s)
         return own + [one.multiplier * own[one.column] + one.offset for one in self._mimics]
 
 

@@ -33,10 +33,10 @@ def write_plan(plan: Plan) -> str:
 
     One line an edge and a process, the same bytes for the same plan.
     """
-    lines = (
-        f"  {_json(key)}: {_rows(value) if isinstance(value, list) else _json(value)}"
-        for key, value in encode(plan).items()
-    )
+    lines = []
+    for key, value in encode(plan).items():
+        text = _rows(value) if isinstance(value, list) else _json(value)
+        lines.append(f"  {_json(key)}: {text}")
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 

@@ -44,7 +44,11 @@ def namespace_options(names: Iterable[str]) -> str:
     ``--namespace /robot1 or --namespace /robot2``.
     """
     spaces = dict.fromkeys(name.rpartition("/")[0] for name in names)
-    return " or ".join(f"--namespace {name}" if name else "without --namespace" for name in spaces)
+    return " or ".join(map(_namespace_option, spaces))
+
+
+def _namespace_option(name: str) -> str:
+    return f"--namespace {name}" if name else "without --namespace"
 
 
 def parts_of(plan: Plan) -> dict[Topics, Plan]:

@@ -236,11 +236,10 @@ class Robot:
         if not self.ros.frame_prefix:
             return self
         final = self.final
+        finals = {name: final(name) for name in self.frames}
         allow = tuple(
-            EdgePattern(
-                *(final(name) if name in self.frames else name for name in (one.parent, one.child))
-            )
-            for one in self.guard.allow
+            EdgePattern(*(finals.get(name, name) for name in (pattern.parent, pattern.child)))
+            for pattern in self.guard.allow
         )
         return replace(
             self,

@@ -176,10 +176,8 @@ class Agent:
 
         None for one that is absent, no text, or too large.
         """
-        return {
-            path: _text(self.base / "current" / path, None if any_size else MOST_TEXT)
-            for path in paths
-        }
+        most = None if any_size else MOST_TEXT
+        return {path: _text(self.base / "current" / path, most) for path in paths}
 
     def take_lock(self, who: str) -> dict[str, Any]:
         """Take this host's lock until this process ends; say who holds it, if somebody does."""

@@ -42,11 +42,11 @@ def run_on_all_hosts(
     shares = {
         name: _of_host(plan, name, processes) for name in plan.hosts if name in hosts_of(plan)
     }
-    commands = {
-        name: [command, "--robot", f"{plan.robot}.{name}", *words, *(["--", *own] if own else [])]
-        for name, own in shares.items()
-        if own or not processes
-    }
+    commands = {}
+    for name, own in shares.items():
+        if own or not processes:
+            argv = [command, "--robot", f"{plan.robot}.{name}", *words]
+            commands[name] = [*argv, "--", *own] if own else argv
     return asyncio.run(_run(plan, commands, printer))
 
 

@@ -429,10 +429,10 @@ class Rollout:
         found = []
         if missing:
             hosts = {edge.name: plan.process(edge.owner).host or edge.owner for edge in plan.edges}
-            named = [
-                f"{edge} (of {hosts[edge]})" if hosts[edge] != share.name else edge
-                for edge in missing
-            ]
+            named = list(missing)
+            for index, edge in enumerate(missing):
+                if hosts[edge] != share.name:
+                    named[index] = f"{edge} (of {hosts[edge]})"
             message = f"{len(missing)} of {len(expected)} edges are not live on {share.name}: "
             found.append(finding("TF917", message + listed(named, NAMED_AT_MOST), at))
         if late:

@@ -564,10 +564,11 @@ class _Export:
             *(call("SetRemap", repr(old), repr(new)) for old, new in process.remap.items()),
             *([call("SetParameter", "'use_sim_time'", "True")] if plan.ros.clock == "sim" else []),
         ]
-        given = items(
-            f"({name!r}, {text_code(text) if text else _filled(value, self._file(process))})"
-            for name, text, value in arguments
-        )
+        rows = []
+        for name, text, value in arguments:
+            code = text_code(text) if text else _filled(value, self._file(process))
+            rows.append(f"({name!r}, {code})")
+        given = items(rows)
         return call(
             "included",
             repr(package),
@@ -594,15 +595,13 @@ def _variable_name(name: str, taken: Collection[str]) -> str:
 
 def _mapping(values: Mapping[str, Code | str]) -> Code:
     """Return a dict."""
-    several = (
-        (
-            f"{key!r}: {value}"
-            if isinstance(value, str)
-            else Code(f"{key!r}: {value.begin}", value.parts, value.end)
-        )
-        for key, value in values.items()
-    )
-    return Code("{", tuple(several), "}")
+    pairs: list[str | Code] = []
+    for key, value in values.items():
+        if isinstance(value, str):
+            pairs.append(f"{key!r}: {value}")
+        else:
+            pairs.append(Code(f"{key!r}: {value.begin}", value.parts, value.end))
+    return Code("{", tuple(pairs), "}")
 
 
 def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain, count
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -71,9 +71,8 @@ def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str
     for name in names:
         if name not in made:
             plain = plain_of(name)
-            made[name] = next(
-                one for n in count(1) if (one := f"{plain}-{n}" if n > 1 else plain) not in taken
-            )
+            candidates = chain([plain], (f"{plain}-{number}" for number in count(2)))
+            made[name] = next(candidate for candidate in candidates if candidate not in taken)
             taken.add(made[name])
     return made
 
@@ -413,12 +412,11 @@ def _compose_service(
         **{key: value for key, value, _ in settings_of(_COMPOSE, exported)},
     }
     if waits:
-        service["depends_on"] = {
-            names[name]: {
-                "condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]
-            }
-            for name, what in waits.items()
-        }
+        service["depends_on"] = {}
+        for name, what in waits.items():
+            is_known = what != "ready" or bool(plan.edges_of(name))
+            condition = _MET[what if is_known else "started"]
+            service["depends_on"][names[name]] = {"condition": condition}
     if plan.edges_of(process.name):
         test = ["CMD", *map(_kept, probe_of(plan, process))]
         service["healthcheck"] = {

@@ -361,7 +361,7 @@ def _check_use(arguments: Namespace) -> None:
     """
     if bool(arguments.file) + arguments.live + bool(arguments.bag) != 1:
         fail("name one source: a file, --live or --bag", UNREADABLE)
-    settle_duration(arguments, 10.0)
+    settle_duration(arguments, 10.0, is_live=arguments.live)
     if not arguments.file:
         _refuse_given(arguments)
     if arguments.file and Path(arguments.file).suffix not in _ENDINGS:

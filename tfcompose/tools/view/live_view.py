@@ -202,7 +202,8 @@ def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
         found = {
             one.node for one in writers(node, topic) if one.gid not in own and one.node != name
         }
-        return sorted(NAMELESS if one.endswith(UNKNOWN_NODE) else one for one in found)
+        unnamed = [name for name in found if name.endswith(UNKNOWN_NODE)]
+        return sorted([*(found - set(unnamed)), *(NAMELESS for _ in unnamed)])
 
     return JointSender(topic, names, make, others)
 

@@ -89,10 +89,9 @@ class Pictures:
         self._parents = parents
         frames = dict.fromkeys([*self.robot.frames, *parents, *parents.values()])
         self._forest = Forest(tuple(frames), parents)
-        self._local = np.array(
-            [row_of(self.edges[one].pose if one in self.edges else Pose()) for one in frames],
-            np.float64,
-        ).reshape(-1, 7)
+        poses = {child: edge.pose for child, edge in self.edges.items()}
+        rows = [row_of(poses.get(frame, Pose())) for frame in frames]
+        self._local = np.array(rows, np.float64).reshape(-1, 7)
         self._rows = {}
         self._judged = None
         edges = tuple(

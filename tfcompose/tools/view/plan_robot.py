@@ -33,10 +33,8 @@ def robot_of_plan(plan: Plan, description: str | None, file: str, find: Finder) 
     ros = plan.ros
     if description is not None:
         described = robot_of(read_xml(description, file), file, find).robot
-        final = {
-            one: one if one in ros.shared_frames else f"{ros.frame_prefix}{one}"
-            for one in described.links
-        }
+        final = {name: f"{ros.frame_prefix}{name}" for name in described.links}
+        final |= {name: name for name in final.keys() & set(ros.shared_frames)}
         links = {final[name]: link for name, link in described.links.items()}
         limits = {final[edge.child]: edge.joint.limit for edge in described.edges if edge.joint}
     edges = tuple(_edge(edge, limits.get(edge.child)) for edge in plan.edges)

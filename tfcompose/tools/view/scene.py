@@ -259,10 +259,10 @@ class RobotScene:
         self._label()
 
     def _scales(self) -> Any:
-        sizes = (
-            (_SELECTED if frame == self._selected else 1) * (frame not in self._hidden)
-            for frame in self._robot.frames
-        )
+        sizes = []
+        for frame in self._robot.frames:
+            size = _SELECTED if frame == self._selected else 1
+            sizes.append(0 if frame in self._hidden else size)
         return np.fromiter(sizes, np.float32)
 
     def name_all(self, *, visible: bool) -> None:

@@ -116,7 +116,8 @@ def with_value(text: str, file: str, path: Path, values: Mapping[str, str | None
     Raises:
         RejectedError: if the text is not YAML.
     """
-    shown = {key: "null" if value is None else value for key, value in values.items()}
+    shown = {key: value for key, value in values.items() if value is not None}
+    shown = {key: shown.get(key, "null") for key in values}
     if not any(line.strip() and not line.lstrip().startswith("#") for line in text.splitlines()):
         return text + _block(path, shown, 0)
     place, depth = load(text, file).places, 0

@@ -2,39 +2,47 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support import processes
 from tests.support.core import copy_core, run_with
 from tests.support.house import ROOT
+from tests.support.processes import Started
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
-
-    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 ROBOT = ROOT / "robots/autonomous_robot.yaml"
 
 
-def test_it_starts_guards_and_judges_a_robot(
-    start: Callable[..., Started], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_starts_guards_and_judges_a_robot(domain: object, tmp_path: Path) -> None:
+    assert domain
     core = copy_core(tmp_path / "core")
-    monkeypatch.chdir(tmp_path)
     rehearsed = run_with(core, tmp_path, "up", ROBOT, "-p", "demo", "--dry-run", "-o", "built")
     assert rehearsed.returncode == 0, rehearsed.stdout + rehearsed.stderr
-    up = start("tfcompose", "up", ROBOT, "-p", "demo", "-o", tmp_path / "built",
-               PYTHONPATH=str(core))  # fmt: skip
-    up.until_says("tree complete")
-    plan = tmp_path / "built/plan.json"
-    for command in (("doctor",), ("verify", plan), ("monitor", "--for", 3), ("ps",)):
-        done = run_with(core, tmp_path, *command)
-        assert done.returncode == 0, (command, done.stdout, done.stderr)
-        assert "Traceback" not in done.stderr
-    assert re.search(r"^ +guard +", run_with(core, tmp_path, "ps").stdout, re.MULTILINE)
-    assert run_with(core, tmp_path, "down").returncode == 0
-    assert not re.search(r"\[TF\d+\]", up.output), up.output
+    words = ("up", str(ROBOT), "-p", "demo", "-o", "built")
+    command = [sys.executable, "-m", "tfcompose", *words]
+    environment = os.environ | {"PYTHONPATH": str(core)}
+    process = processes.start(
+        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    up = Started(process)
+    try:
+        up.until_says("tree complete")
+        plan = tmp_path / "built/plan.json"
+        for arguments in (("doctor",), ("verify", plan), ("monitor", "--for", 3), ("ps",)):
+            done = run_with(core, tmp_path, *arguments)
+            assert done.returncode == 0, (arguments, done.stdout, done.stderr)
+            assert "Traceback" not in done.stderr
+        assert re.search(r"^ +guard +", run_with(core, tmp_path, "ps").stdout, re.MULTILINE)
+        assert run_with(core, tmp_path, "down").returncode == 0
+        assert not re.search(r"\[TF\d+\]", up.output), up.output
+    finally:
+        up.close()

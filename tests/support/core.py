@@ -28,7 +28,9 @@ def copy_core(folder: Path) -> Path:
 #: An editable install finds each missing part of the package in the repository; this hides it.
 _WITHOUT_EDITABLE = """\
 import sys
-sys.meta_path[:] = [each for each in sys.meta_path if "Editable" not in getattr(each, "__name__", "")]
+for finder in list(sys.meta_path):
+    if "Editable" in getattr(finder, "__name__", ""):
+        sys.meta_path.remove(finder)
 """
 
 

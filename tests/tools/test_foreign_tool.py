@@ -211,7 +211,7 @@ def test_a_command_whose_module_does_not_load_is_one_finding(tmp_path: Path) -> 
 def test_tools_of_other_packages_are_loaded_only_where_something_is_unknown(
     acme: Path, tmp_path: Path
 ) -> None:
-    code = "import sys; from tfcompose.cli import main; main(sys.argv[1:]); print('acme_tool' in sys.modules)"
+    code = "from tfcompose.cli import main; main(sys.argv[1:]); print('acme_tool' in sys.modules)"
 
     def loads(*arguments: str) -> bool:
         command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(acme)!r}); {code}"]

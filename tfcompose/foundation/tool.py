@@ -220,7 +220,7 @@ def installed() -> Toolset:
         try:
             tool = load(reference)
             if not isinstance(tool, Tool):
-                raise TypeError(f"{reference} is no Tool")  # noqa: TRY301 (as one that does not load)
+                raise TypeError(f"{reference} is no Tool")  # noqa: TRY301 (as if not loaded)
             names = list(tool.names())
         except Exception as error:  # noqa: BLE001 (a foreign package may raise anything)
             message = f"the tool {entry_name} cannot be loaded: {type(error).__name__}: {error}"

@@ -320,6 +320,7 @@ def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> No
             "documentation",
             "options",
             "parser",
+            "robot_search",
             "schemas",
             "terminal",
             "tool_commands",

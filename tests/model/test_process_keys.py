@@ -60,7 +60,7 @@ def test_a_key_is_known_in_few_files(row: ProcessKey) -> None:
 
 def foreign_words() -> set[str]:
     """Return other systems' words but for everyday ones: CamelCase, or with a separator."""
-    process = PlanProcess("p", "run", restart="on-failure", component=Component("c", "p", "x::Y"))
+    process = PlanProcess("p", "run", restart="on-failure", oom_score_adj=1, open_files=99)
     words = set()
     for row in ROWS:
         exported = Exported(process, awaited=True)
@@ -73,7 +73,7 @@ def foreign_words() -> set[str]:
 
 def test_a_word_of_another_system_stands_in_the_table_alone() -> None:
     words = foreign_words() - {row.name for row in ROWS} - {"on_exit"}  # event handlers' as well
-    assert {"RestartSec", "stop_grace_period", "backoffLimit", "respawn_delay"} <= words
+    assert {"RestartSec", "stop_grace_period", "LimitNOFILE", "respawn_delay"} <= words
     elsewhere = {word: files_with(word) - {TABLE, UNIT_OF_THE_LAUNCHER} for word in words}
     assert not {word: files for word, files in elsewhere.items() if files}
 

@@ -148,8 +148,8 @@ def _open_files_refusal(name: str, count: int) -> Finding | None:
     except (OSError, ValueError):
         message = f"this user may not start {name} with open_files {count}"
         advice = (
-            f"{before[1]} or less, or nofile in /etc/security/limits.conf, LimitNOFILE= in a"
-            " systemd unit, or the capability CAP_SYS_RESOURCE; the most is fs.nr_open"
+            f"{before[1]} or less, or nofile in /etc/security/limits.conf, or the capability"
+            " CAP_SYS_RESOURCE; the most is fs.nr_open"
         )
         return finding("TF911", message, None, help=advice)
     resource.setrlimit(resource.RLIMIT_NOFILE, before)

@@ -21,7 +21,13 @@ from tfcompose.foundation.confined import Outcome, fits, run_confined
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import Reach
-from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, Folder, Seconds
+from tfcompose.model.process_keys import (
+    EXTRA_ARGUMENTS,
+    PROCESS_KEYS,
+    Folder,
+    Seconds,
+    launch_keywords,
+)
 from tfcompose.tools.importers.launch_substitutions import marks, scalar_of, shown, without_marks
 from tfcompose.tools.importers.programs import (
     CONTAINERS,
@@ -45,6 +51,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from tfcompose.model.files import Target
+    from tfcompose.model.process_keys import KeywordKind
     from tfcompose.tools.importers.draft import Draft
 
 #: The module that reads launch files, confined.
@@ -189,11 +196,18 @@ def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, A
 _NUMBER, _OPTIONAL = (int, float), (str, None)
 _SCALAR = (str, bool, int, float, None)
 _AT: dict[str, Any] = {"at": [(str, int)], "when?": [str], "only_when?": str}
-_COMMON = _AT | {
-    "id": (str, int), "env": {"*": str}, "period": _NUMBER, "after": {"*": str}, "cwd?": str,
-    "prefix?": str, "sigterm_timeout?": str, "sigkill_timeout?": str, "output?": (str, [str], None),
-    "shell?": bool, "respawn?": bool, "emulate_tty?": bool, "respawn_delay?": _NUMBER,
-    "respawn_max_retries?": _NUMBER, "only_env?": bool, "required?": bool,
+#: What a keyword of launch's holds, by its kind.
+_KINDS: dict[KeywordKind, Any] = {
+    "text": str,
+    "switch": bool,
+    "number": _NUMBER,
+    "output": (str, [str], None),
+    "shutdown": bool,
+}
+_KEYWORDS = {f"{keyword.name}?": _KINDS[keyword.kind] for keyword in launch_keywords(*_KINDS)}
+_COMMON = _AT | _KEYWORDS | {
+    "id": (str, int), "env": {"*": str}, "period": _NUMBER, "after": {"*": str}, "shell?": bool,
+    "only_env?": bool,
 }  # fmt: skip
 _OF_NODE = {
     "package": _OPTIONAL, "name": _OPTIONAL, "namespace": _OPTIONAL,
@@ -208,9 +222,9 @@ _RECORDS: dict[str, Any] = {
     "container": _NODE,
     "process": _COMMON | {"argv": [str], "label": _OPTIONAL},
     "component": _AT | _OF_NODE | {
-        "id": (str, int), "container": _OPTIONAL, "plugin": str, "extra": [Any], "period": _NUMBER,
+        "id": (str, int), "container": _OPTIONAL, "plugin": str, "period": _NUMBER,
         "after": {"*": str},
-    },
+    } | {keyword.name: [Any] for keyword in launch_keywords("parameters")},
     "include": _AT | {
         "file": str, "args": {"*": str}, "namespace": _OPTIONAL, "env": {"*": str},
         "period": _NUMBER, "after": {"*": str},
@@ -230,7 +244,8 @@ _PAIR = 2
 
 def _is_record(record: dict[str, Any]) -> bool:
     """Return whether a record has what its kind has, whoever sent it."""
-    numbers = [record.get(key, 0) for key in ("period", "respawn_delay", "respawn_max_retries")]
+    names = ["period", *(keyword.name for keyword in launch_keywords("number"))]
+    numbers = [record.get(name, 0) for name in names]
     at = record.get("at")
     return (
         fits(record, _RECORDS.get(record["kind"]))

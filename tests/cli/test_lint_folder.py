@@ -78,5 +78,5 @@ def test_a_long_search_says_once_what_it_does(
     assert not capsys.readouterr().err
     monkeypatch.setattr("tfcompose.cli.robot_search.SAY_AFTER_S", 0.0)
     robots_in(str(tmp_path))
-    said = capsys.readouterr().err
-    assert said.count(str(tmp_path)) == 1
+    text = capsys.readouterr().err
+    assert text.count(str(tmp_path)) == 1

@@ -22,23 +22,46 @@ NOBODY = 65_534
 OVERRIDES = 0b110
 #: Each command that is given a path, PATH.
 COMMANDS = {
-    "lint": ("lint", "PATH"), "lint untrusted": ("lint", "--untrusted", "PATH"),
-    "lint urdf": ("lint", "--urdf", "PATH"), "lint overlay": ("lint", "r.yaml", "--overlay", "PATH"),
-    "build": ("build", "PATH"), "build output": ("build", "r.yaml", "--output", "PATH"),
-    "tree": ("tree", "PATH"), "graph": ("graph", "PATH"), "graph output": ("graph", "r.yaml", "-o", "PATH/x.svg"),
-    "diff": ("diff", "r.yaml", "PATH"), "explain": ("explain", "PATH"), "pose": ("pose", "PATH", "base_link", "base_link"),
-    "up": ("up", "PATH"), "dry run": ("up", "--dry-run", "PATH"), "view": ("view", "PATH", "--html", "r.html"),
-    "view output": ("view", "r.yaml", "--html", "PATH"), "verify": ("verify", "PATH"),
-    "verify bag": ("verify", "r.yaml", "--bag", "PATH"), "doctor": ("doctor", "PATH"),
+    "lint": ("lint", "PATH"),
+    "lint untrusted": ("lint", "--untrusted", "PATH"),
+    "lint urdf": ("lint", "--urdf", "PATH"),
+    "lint overlay": ("lint", "r.yaml", "--overlay", "PATH"),
+    "build": ("build", "PATH"),
+    "build output": ("build", "r.yaml", "--output", "PATH"),
+    "tree": ("tree", "PATH"),
+    "graph": ("graph", "PATH"),
+    "graph output": ("graph", "r.yaml", "-o", "PATH/x.svg"),
+    "diff": ("diff", "r.yaml", "PATH"),
+    "explain": ("explain", "PATH"),
+    "pose": ("pose", "PATH", "base_link", "base_link"),
+    "up": ("up", "PATH"),
+    "dry run": ("up", "--dry-run", "PATH"),
+    "view": ("view", "PATH", "--html", "r.html"),
+    "view output": ("view", "r.yaml", "--html", "PATH"),
+    "verify": ("verify", "PATH"),
+    "verify bag": ("verify", "r.yaml", "--bag", "PATH"),
+    "doctor": ("doctor", "PATH"),
     "tree bag": ("tree", "r.yaml", "--bag", "PATH"),
-    "deploy": ("deploy", "PATH", "--check"), "deploy wheels": ("deploy", "r.yaml", "--check", "--wheels", "PATH"),
-    "systemd": ("export", "systemd", "PATH"), "compose": ("export", "compose", "PATH", "--output", "PATH"),
-    "k8s": ("export", "k8s", "PATH"), "launch": ("export", "launch", "PATH"), "all hosts": ("ps", "--all-hosts", "--file", "PATH"),
-    "import urdf": ("import", "PATH.urdf"), "import xacro": ("import", "PATH.urdf.xacro"), "import launch": ("import", "PATH.launch.py"),
-    "import script": ("import", "PATH.sh"), "import yaml": ("import", "PATH.yaml"), "import folder": ("import", "PATH"),
-    "import output": ("import", "r.urdf", "--output", "PATH"), "import bag": ("import", "--bag", "PATH"),
-    "init": ("init", "-o", "PATH"), "presets": ("presets", "PATH"), "fleet": ("fleet", "ps", "PATH"), "args": ("build", "PATH", "--show-args"),
-}  # fmt: skip
+    "deploy": ("deploy", "PATH", "--check"),
+    "deploy wheels": ("deploy", "r.yaml", "--check", "--wheels", "PATH"),
+    "systemd": ("export", "systemd", "PATH"),
+    "compose": ("export", "compose", "PATH", "--output", "PATH"),
+    "k8s": ("export", "k8s", "PATH"),
+    "launch": ("export", "launch", "PATH"),
+    "all hosts": ("ps", "--all-hosts", "--file", "PATH"),
+    "import urdf": ("import", "PATH.urdf"),
+    "import xacro": ("import", "PATH.urdf.xacro"),
+    "import launch": ("import", "PATH.launch.py"),
+    "import script": ("import", "PATH.sh"),
+    "import yaml": ("import", "PATH.yaml"),
+    "import folder": ("import", "PATH"),
+    "import output": ("import", "r.urdf", "--output", "PATH"),
+    "import bag": ("import", "--bag", "PATH"),
+    "init": ("init", "-o", "PATH"),
+    "presets": ("presets", "PATH"),
+    "fleet": ("fleet", "ps", "PATH"),
+    "args": ("build", "PATH", "--show-args"),
+}
 
 
 @pytest.fixture
@@ -79,7 +102,7 @@ def without_privileges() -> Iterator[None]:
     ["closed/robot.yaml", "closed", "closed/none/r", "x" * 300, "r.yaml/x", "loop/x"],
 )
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_path_that_cannot_be_looked_at_ends_in_no_traceback(
+def test_a_path_that_cannot_be_inspected_ends_in_no_traceback(
     command: str, path: str, folder: Path
 ) -> None:
     (folder / "loop").symlink_to("loop")

@@ -78,7 +78,8 @@ def test_no_line_of_a_file_in_the_robot_files_place_is_shown(kind: str, tmp_path
 
 @pytest.mark.parametrize("name", ["robot.yaml", "more.yaml", "part.urdf"])
 def test_lines_of_a_robots_own_files_are_shown(name: str, tmp_path: Path) -> None:
-    robot = "tfcompose: 1\nrobot: r\ninclude: [more.yaml]\nlinks: {base_link: {}}\nparts: {a: {urdf: part.urdf, parent: base_link}}\n"
+    robot = "tfcompose: 1\nrobot: r\ninclude: [more.yaml]\nlinks: {base_link: {}}\n"
+    robot += "parts: {a: {urdf: part.urdf, parent: base_link}}\n"
     texts = {
         "robot.yaml": robot, "more.yaml": "frames: {eye: {parent: base_link}}\n",
         "part.urdf": "<robot name='p'><link name='l'/></robot>\n",

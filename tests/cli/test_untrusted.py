@@ -112,7 +112,8 @@ def test_no_environment_is_read_but_declared_choices_and_switches(folder: Path) 
 
 def test_xacro_reads_no_environment(folder: Path) -> None:
     (folder / "a.xacro").write_text(
-        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="$(optenv TOKEN none) x"/></robot>',
+        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">'
+        '<link name="$(optenv TOKEN none) x"/></robot>',
         "utf-8",
     )
     for options, is_read in (((), True), (("--untrusted",), False)):

@@ -47,9 +47,27 @@ LONGEST = 20_000
 
 LIBRARY = library()
 _STARTS_NOTHING = frozenset(
-    "lint build tree graph diff explain pose presets export schema help import".split()  # noqa: SIM905
+    [
+        "lint",
+        "build",
+        "tree",
+        "graph",
+        "diff",
+        "explain",
+        "pose",
+        "presets",
+        "export",
+        "schema",
+        "help",
+        "import",
+    ]
 )
-_ROBOT = "tfcompose: 1\nrobot: r\nargs: {side: {choices: [left, right], default: left}}\nlinks: {base_link: {}, arm: {parent: base_link}}\nprofiles: {demo: {frames: {eye: {parent: arm}}}}\n"
+_ROBOT = """tfcompose: 1
+robot: r
+args: {side: {choices: [left, right], default: left}}
+links: {base_link: {}, arm: {parent: base_link}}
+profiles: {demo: {frames: {eye: {parent: arm}}}}
+"""
 WORDS = """
 { } [ ] ,  - &a *a <<: ${ null ~ 1e999 -0.0 !x " ' \ufeff é < > /> <!-- &amp; &#xD800; "\\ud800" nan .inf true | #
 base_link ${1/0} $(find x)

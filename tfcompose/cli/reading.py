@@ -15,7 +15,8 @@ STDIN = "-"
 #: XML that findings quote, and parameters, calibrations, plans and launch files that are not XML.
 _XML = re.compile(r"<(?:robot|launch|package|sdf)\b|<xacro:|xmlns:xacro")
 _OTHERS = re.compile(
-    r"\bros__parameters[\"']?\s*:|^\s*[\"']?(?:T_cn_cnm1|T_cam_imu|transform|camera_matrix)[\"']?\s*:"
+    r"\bros__parameters[\"']?\s*:"
+    r"|^\s*[\"']?(?:T_cn_cnm1|T_cam_imu|transform|camera_matrix)[\"']?\s*:"
     r"|\"spec_digest\"\s*:|^launch\s*:|\bgenerate_launch_description\b",
     re.MULTILINE,
 )

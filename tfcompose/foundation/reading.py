@@ -123,14 +123,14 @@ def unreadable(path: str | Path, error: OSError | ValueError) -> RejectedError:
         return RejectedError([finding("TF001", "a file name cannot hold a NUL byte", Span("?"))])
     advice = ""
     if isinstance(error, FileNotFoundError):
-        advice = _files_beside(name)
+        advice = _files_next_to(name)
     elif isinstance(error, IsADirectoryError):
         advice = "name a file in it"
     message = f"cannot be read: {error.strerror or error}"
     return RejectedError([finding("TF001", message, Span(name), help=advice)])
 
 
-def _files_beside(name: str) -> str:
+def _files_next_to(name: str) -> str:
     folder = Path(name).parent
     ending = next((ending for ending in _ENDINGS if name.endswith(ending)), ".yaml")
     there = [other for other in _names_if_any(folder) if other.endswith(ending)]

@@ -63,7 +63,7 @@ def save(windows: Windows, number: int) -> str:
     return str(windows.panels[number].panel.report.content)
 
 
-def test_two_windows_choose_for_themselves_and_save_in_turn(
+def test_two_windows_choose_for_themselves_and_save_one_after_the_other(
     windows: Windows, server: viser.ViserServer, tmp_path: Path
 ) -> None:
     file = tmp_path / "r.yaml"
@@ -91,7 +91,9 @@ def test_two_windows_choose_for_themselves_and_save_in_turn(
             assert "+  mast: {parent: base_link, xyz: [0, 0, 3]}" in save(windows, 1)
             assert "tool: {parent: arm, xyz: [2, 0, 0]}" in file.read_text("utf-8")
             page.get_by_text("another window saved").wait_for()
-            assert windows.panels[0].session.robot.parent_edge("mast").pose == Pose((0, 0, 3))  # type: ignore[union-attr]
+            edge = windows.panels[0].session.robot.parent_edge("mast")
+            assert edge
+            assert edge.pose == Pose((0, 0, 3))
             second.session.move("mast", Pose((0, 0, 5)))
             windows.panels[1].panel.choices.selected = "mast"
         assert until(lambda: len(windows.panels) == 1)

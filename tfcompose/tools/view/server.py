@@ -79,7 +79,7 @@ class _Connection(ServerConnection):
             if isinstance(data, bytes):
                 Message.deserialize(data)
                 return data
-        except Exception:  # noqa: BLE001, S110 (viser's reader of bytes from a stranger raises anything)
+        except Exception:  # noqa: BLE001, S110 (viser raises anything)
             pass
         await self.close(CloseCode.INVALID_DATA)
         return await super().recv(decode)

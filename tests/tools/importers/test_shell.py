@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.bringups import compiled, import_of, places, printed_errors
+from tests.support.cli import tfcompose_in
 from tfcompose.cli import main, reading
 
 
@@ -194,3 +195,13 @@ def test_a_script_takes_neither_arguments_nor_a_second_file(word: str, tmp_path:
 def test_a_source_that_starts_nothing_is_refused(tmp_path: Path) -> None:
     source = script(tmp_path, "echo hello\n")
     assert main(["import", str(source)]) == 1
+
+
+@pytest.mark.parametrize(
+    "line", ['" " &', '"" &', 'exec " "', "> a &", "2>&1", "< a > b &", 'x" " > a']
+)
+def test_a_command_without_a_name_is_no_fault_of_the_program(line: str, tmp_path: Path) -> None:
+    (tmp_path / "up.sh").write_text(f"#!/bin/sh\n{line}\nros2 run a b &\n", "utf-8")
+    done = tfcompose_in(tmp_path, "import", "up.sh")
+    assert done.returncode == 0, done.stderr
+    assert "executable: b" in done.stdout

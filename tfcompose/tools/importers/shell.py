@@ -285,8 +285,10 @@ class _Script:
             self._todo(command, f"only a shell knows {', '.join(dict.fromkeys(command.unknown))}")
         elif command.piped:
             self._todo(command, "a pipe")
+        elif program := _without_redirections(words):
+            self._add(command, program, given)
         else:
-            self._add(command, _without_redirections(words), given)
+            self._todo(command, "it opens files, and starts nothing")
 
     def _add(self, command: Command, words: list[str], given: dict[str, str]) -> None:
         """Add a command, or what it starts in a shell, in a terminal or behind a prefix."""

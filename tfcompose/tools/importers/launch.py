@@ -222,13 +222,14 @@ _PAIR = 2
 
 def _is_record(record: dict[str, Any]) -> bool:
     """Return whether a record has what its kind has, whoever sent it."""
-    numbers = [record.get(key, 0) for key in ("period", "respawn_delay", "respawn_max_retries")]
+    tries = [record.get(key, 0) for key in ("respawn_delay", "respawn_max_retries")]
     at = record.get("at")
     return (
         fits(record, _RECORDS.get(record["kind"]))
         and (at == [] or [type(part) for part in at or ()] == [str, int])
         and all(len(rule) == _PAIR for rule in record.get("remap", ()))
-        and all(abs(value) <= _LARGEST for value in numbers)
+        and abs(record.get("period", 0)) <= _LARGEST
+        and all(isinstance(value, float) or abs(value) <= _LARGEST for value in tries)
     )
 
 

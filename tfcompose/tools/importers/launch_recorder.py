@@ -13,8 +13,10 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
+import logging
 import os
 import sys
+import tempfile
 import types
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -22,6 +24,7 @@ from xml.etree import ElementTree as ET
 
 import launch
 import launch.frontend
+import launch.logging
 import launch_ros.descriptions
 import launch_xml.parser
 import launch_yaml.parser
@@ -167,7 +170,13 @@ def _classes() -> Iterator[type]:
 
 
 def attach() -> None:
-    """Let launch's classes keep what the recorder needs, and record instead of starting anything."""
+    """Let launch's classes keep what the recorder needs, and record instead of starting anything.
+
+    Nothing is logged: launch would make a folder for its log, which it may not.
+    """
+    config = launch.logging.launch_config
+    config.log_dir = tempfile.gettempdir()
+    config.log_handler_factory = lambda *_args, **_kwargs: logging.NullHandler()
     for kind in _classes():
         if kind.__init__ is not object.__init__:  # type: ignore[misc]
             _keep(kind)

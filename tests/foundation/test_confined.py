@@ -13,7 +13,8 @@ import pytest
 from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.foundation import confined
-from tfcompose.foundation.confined import Outcome, fits, run_confined
+from tfcompose.foundation.confined import Outcome, run_confined
+from tfcompose.foundation.shape import fits
 
 
 def outcome_of(program: str, wall_s: float = 30, **request: Any) -> Outcome:

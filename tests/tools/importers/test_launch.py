@@ -17,8 +17,8 @@ import yaml
 from tests.support.bringups import compiled, import_of, places, printed_errors, started_with
 from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
-from tfcompose.spec.load import load
 from tfcompose.foundation import confined
+from tfcompose.spec.load import load
 from tfcompose.tools.importers import launch
 from tfcompose.tools.importers import launch_actions as actions
 from tfcompose.tools.importers.launch_substitutions import Context

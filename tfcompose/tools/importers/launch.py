@@ -14,11 +14,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation import confined
-from tfcompose.foundation.confined import Outcome, fits, run_confined
+from tfcompose.foundation.confined import Outcome, run_confined
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import Reach
-from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, Folder, Seconds
+from tfcompose.foundation.shape import fits
+from tfcompose.model.process_keys import (
+    EXTRA_ARGUMENTS,
+    PROCESS_KEYS,
+    Folder,
+    KeywordKind,
+    Seconds,
+    launch_keywords,
+)
 from tfcompose.tools.importers.launch_substitutions import marks, scalar_of, shown, without_marks
 from tfcompose.tools.importers.programs import (
     CONTAINERS,
@@ -180,16 +188,20 @@ def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, A
 
 _NUMBER, _OPTIONAL = (int, float), (str, None)
 _SCALAR = (str, bool, int, float, None)
+_PARAMETERS = [(str, {"*": (*_SCALAR, [_SCALAR])})]
 _AT: dict[str, Any] = {"at": [(str, int)], "when?": [str], "only_when?": str}
+_KINDS: dict[KeywordKind, Any] = {
+    "text": str, "switch": bool, "number": _NUMBER, "output": (str, [str]), "shutdown": bool,
+    "parameters": _PARAMETERS,
+}  # fmt: skip
 _COMMON = _AT | {
-    "id": (str, int), "env": {"*": str}, "period": _NUMBER, "after": {"*": str}, "cwd?": str,
-    "prefix?": str, "sigterm_timeout?": str, "sigkill_timeout?": str, "output?": (str, [str], None),
-    "shell?": bool, "respawn?": bool, "emulate_tty?": bool, "respawn_delay?": _NUMBER,
-    "respawn_max_retries?": _NUMBER, "only_env?": bool, "required?": bool,
+    "id": (str, int), "env": {"*": str}, "period": _NUMBER, "after": {"*": str}, "shell?": bool,
+    "only_env?": bool,
+    **{f"{keyword.name}?": _KINDS[keyword.kind] for keyword in launch_keywords(*_KINDS)},
 }  # fmt: skip
 _OF_NODE = {
-    "package": _OPTIONAL, "name": _OPTIONAL, "namespace": _OPTIONAL,
-    "params": [(str, {"*": (*_SCALAR, [_SCALAR])})], "remap": [[str]],
+    "package": _OPTIONAL, "name": _OPTIONAL, "namespace": _OPTIONAL, "params": _PARAMETERS,
+    "remap": [[str]],
 }  # fmt: skip
 _NODE = _COMMON | _OF_NODE | {
     "executable": str, "label": _OPTIONAL, "argv": [str], "lifecycle?": _OPTIONAL, "ros1?": bool,
@@ -200,8 +212,8 @@ _RECORDS: dict[str, Any] = {
     "container": _NODE,
     "process": _COMMON | {"argv": [str], "label": _OPTIONAL},
     "component": _AT | _OF_NODE | {
-        "id": (str, int), "container": _OPTIONAL, "plugin": str, "extra": [Any], "period": _NUMBER,
-        "after": {"*": str},
+        "id": (str, int), "container": _OPTIONAL, "plugin": str, "period": _NUMBER,
+        "after": {"*": str}, "extra_arguments?": _PARAMETERS,
     },
     "include": _AT | {
         "file": str, "args": {"*": str}, "namespace": _OPTIONAL, "env": {"*": str},
@@ -222,14 +234,14 @@ _PAIR = 2
 
 def _is_record(record: dict[str, Any]) -> bool:
     """Return whether a record has what its kind has, whoever sent it."""
-    tries = [record.get(key, 0) for key in ("respawn_delay", "respawn_max_retries")]
+    counts = [record.get(keyword.name, 0) for keyword in launch_keywords("number")]
     at = record.get("at")
     return (
         fits(record, _RECORDS.get(record["kind"]))
         and (at == [] or [type(part) for part in at or ()] == [str, int])
         and all(len(rule) == _PAIR for rule in record.get("remap", ()))
         and abs(record.get("period", 0)) <= _LARGEST
-        and all(isinstance(value, float) or abs(value) <= _LARGEST for value in tries)
+        and all(isinstance(value, float) or abs(value) <= _LARGEST for value in counts)
     )
 
 

@@ -1,4 +1,4 @@
-"""Runs a seccomp filter on a system call without the kernel, so that those of other machines can be asked, too."""
+"""Runs a seccomp filter on a system call without the kernel: those of other machines, too."""
 
 import struct
 from collections.abc import Sequence

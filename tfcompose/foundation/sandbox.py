@@ -118,8 +118,8 @@ MACHINES: Final = {"x86_64": (0, 0xC000003E), "aarch64": (1, 0xC00000B7)}
 _SECCOMP: Final = (317, 277)
 _SET_FILTER, _EVERY_THREAD = 1, 1
 _SET_DEATH_SIGNAL, _NO_NEW_PRIVILEGES = 1, 38
-#: Of root's capabilities (linux/capability.h) those that read files of others: CAP_DAC_OVERRIDE and
-#: CAP_DAC_READ_SEARCH. With more of them a process could raise its limits again.
+#: Of root's capabilities (linux/capability.h) those that read files of others: CAP_DAC_OVERRIDE
+#: and CAP_DAC_READ_SEARCH. With more of them a process could raise its limits again.
 _CAPSET, _CAPGET = (126, 91), (125, 90)
 _CAPABILITY_VERSION, _KEPT_CAPABILITIES = 0x20080522, 0b110
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446

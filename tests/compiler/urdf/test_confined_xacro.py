@@ -1,4 +1,4 @@
-"""Xacro files of strangers: what their expressions do, what they read, what they print, and what they answer."""
+"""Xacro files of strangers: what expressions do, what they read and print, what is sent."""
 
 import json
 import os
@@ -22,7 +22,10 @@ from tfcompose.foundation.findings import Finding
 HEAD = '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="base_link"/>\n'
 HIDDEN = "root:x:0:0"
 #: By way of a lambda and of a generator, into which xacro itself does not look.
-SYSTEM = "[c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close'][0].__init__.__globals__"
+SYSTEM = (
+    "[c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close']"
+    "[0].__init__.__globals__"
+)
 LAMBDA = f"(lambda: {SYSTEM}['system']('touch made'))()"
 GENERATOR = f"list({SYSTEM}['system']('touch made') for i in [1])"
 FRAME = "[g.gi_frame.f_back.f_back.f_builtins for g in [(i for i in [1])]]"
@@ -92,8 +95,15 @@ READS = [
 @pytest.mark.parametrize("read", READS)
 @pytest.mark.parametrize(
     "named",
-    ["/etc/passwd", "../secret.yaml", "link.yaml", "/proc/self/environ", "/proc/1/cmdline", ".git/config"],
-)  # fmt: skip
+    [
+        "/etc/passwd",
+        "../secret.yaml",
+        "link.yaml",
+        "/proc/self/environ",
+        "/proc/1/cmdline",
+        ".git/config",
+    ],
+)
 def test_what_lies_outside_of_the_tree_is_not_read(read: str, named: str, tmp_path: Path) -> None:
     (tmp_path / "secret.yaml").write_text(HIDDEN, "utf-8")
     Path("link.yaml").symlink_to(tmp_path / "secret.yaml")
@@ -118,8 +128,9 @@ def test_patterns_of_the_tree_are_expanded_in_order() -> None:
     Path("parts/.hidden.xacro").touch()
     Path("r.xacro").write_text(
         HEAD.replace('<link name="base_link"/>', "")
-        + '<xacro:include filename="part[s]/?.xacro"/></robot>', "utf-8"
-    )  # fmt: skip
+        + '<xacro:include filename="part[s]/?.xacro"/></robot>',
+        "utf-8",
+    )
     packages = Packages(disk())
     made = expand.expand("r.xacro", packages, {})
     assert made.files == ("r.xacro", "parts/a.xacro", "parts/b.xacro", "parts/c.xacro")
@@ -195,8 +206,9 @@ def test_a_folder_that_a_robot_calls_a_package_has_to_be_one(
     write("<link name=\"${xacro.load_yaml('$(find secrets)/a.yaml').name}\"/>", file="arm.xacro")
     Path("arm.xacro").write_text(
         HEAD.replace('<link name="base_link"/>', "")
-        + "<link name=\"${xacro.load_yaml('$(find secrets)/a.yaml').name}\"/></robot>", "utf-8"
-    )  # fmt: skip
+        + "<link name=\"${xacro.load_yaml('$(find secrets)/a.yaml').name}\"/></robot>",
+        "utf-8",
+    )
     found = part_of(
         "packages: {secrets: ../secrets}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}"
     )
@@ -259,16 +271,24 @@ HOSTILE: dict[str, list[Any]] = {
     "a place that is true": [READ, {"answer": OF_FILE | {"places": [[True, 1, 1], None]}}],
     "no places": [READ, {"answer": OF_FILE | {"places": []}}],
     "places that are too few": [READ, {"answer": OF_FILE | {"places": [[0, 1, 1]]}}],
-    "a place far behind the file": [READ, {"answer": OF_FILE | {"places": [[0, 10**9, 10**9]] * 2}}],
+    "a place far behind the file": [
+        READ,
+        {"answer": OF_FILE | {"places": [[0, 10**9, 10**9]] * 2}},
+    ],
     "a place far behind its line": [READ, {"answer": OF_FILE | {"places": [[0, 1, 10**9]] * 2}}],
-    "stopped in another file": [{"answer": STOPPED | {"files": ["/etc/passwd"], "at": ["/etc/passwd", 1, 0]}}],
+    "stopped in another file": [
+        {"answer": STOPPED | {"files": ["/etc/passwd"], "at": ["/etc/passwd", 1, 0]}}
+    ],
     "stopped with broken XML elsewhere": [{"answer": STOPPED | {"error": ["/etc/passwd", 1, 0]}}],
     "stopped at no place": [READ, {"answer": STOPPED | {"error": [1, 2, 3], "at": ["r.xacro"]}}],
-    "stopped in half a macro": [READ, {"answer": STOPPED | {"macros": [["a"], [None, None], ["a", "/etc/passwd"]]}}],
+    "stopped in half a macro": [
+        READ,
+        {"answer": STOPPED | {"macros": [["a"], [None, None], ["a", "/etc/passwd"]]}},
+    ],
     "stopped for a long reason": [READ, {"answer": STOPPED | {"reason": "x" * 1_000_000}}],
     "an unknown kind": [READ, {"answer": STOPPED | {"kind": "whatever"}}],
     "a secret": [{"read": "/etc/passwd"}, {"read": "r.xacro"}, {"answer": OF_FILE}],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("lines", HOSTILE.values(), ids=HOSTILE)
@@ -318,8 +338,11 @@ def test_what_the_kernel_does_not_have_is_said_once(numbers: str, missing: list[
     files = [write(file=f"{name}.xacro") for name in "ab"]
     done = subprocess.run(
         [sys.executable, "-c", OLDER, numbers, ":".join(sys.path), "lint", *files],
-        check=False, capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert done.returncode == 0, done.stderr
     lines = [line for line in done.stderr.splitlines() if "TF923" in line]
     assert [

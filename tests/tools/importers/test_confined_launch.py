@@ -1,4 +1,4 @@
-"""Launch files of strangers: what they read, what they print, and what a process answers that they took over."""
+"""Launch files of strangers: what they read and print, what a process sends they took over."""
 
 import json
 import os
@@ -55,11 +55,14 @@ except OSError as error:
 @pytest.mark.parametrize(
     "call",
     [
-        "open({file!r}).read()", "pathlib.Path({file!r}).read_text()", "os.read(os.open({file!r}, 0), 99)",
-        "pathlib.Path({file!r}).read_bytes()", "os.listdir(os.path.dirname({file!r}))",
+        "open({file!r}).read()",
+        "pathlib.Path({file!r}).read_text()",
+        "os.read(os.open({file!r}, 0), 99)",
+        "pathlib.Path({file!r}).read_bytes()",
+        "os.listdir(os.path.dirname({file!r}))",
         "list(os.scandir(os.path.dirname({file!r})))",
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize(
     "file", ["/etc/passwd", "../secret.yaml", "link.yaml", "/proc/self/environ", "/proc/1/environ"]
 )
@@ -101,10 +104,12 @@ def test_environment_modules_and_neighbours_are_there(
     neighbour = tmp_path / "neighbour"
     write("<package><name>neighbour</name></package>", str(neighbour / "package.xml"))
     write("kept", str(neighbour / "config/a.yaml"))
-    made = made_by("""import os, numpy, xml.etree.ElementTree, datetime, threading, random, tempfile, uuid
+    made = made_by("""import os, numpy, xml.etree.ElementTree, datetime, threading
+import random, tempfile, uuid
 from ament_index_python.packages import get_package_share_directory
 folder = get_package_share_directory("neighbour")
-made = [os.environ["SETTING"], open(folder + "/config/a.yaml").read(), sorted(os.listdir(folder)), os.path.exists("a.launch.py")]
+text = open(folder + "/config/a.yaml").read()
+made = [os.environ["SETTING"], text, sorted(os.listdir(folder)), os.path.exists("a.launch.py")]
 """)
     assert made == ["set", "kept", ["config", "package.xml"], True]
 
@@ -114,7 +119,7 @@ def test_a_launch_file_that_lies_outside_is_not_included(
 ) -> None:
     write("<launch><node pkg='far' exec='away'/></launch>", str(tmp_path / "far/far.launch.xml"))
     file = write(
-        f"<launch><include file='{tmp_path}/far/far.launch.xml'/><node pkg='a' exec='b'/></launch>",
+        f"<launch><include file='{tmp_path}/far/far.launch.xml'/>\n<node pkg='a' exec='b'/></launch>",
         "a.launch.xml",
     )
     _, data = import_of(file, code=None)
@@ -139,27 +144,34 @@ def test_parameters_of_a_file_outside_are_not_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize("file", ["/dev/zero", "pipe"])
 def test_a_parameter_file_that_has_no_end_is_not_waited_for(file: str) -> None:
     os.mkfifo("pipe")
-    text = f'<launch><node pkg="p" exec="e"><param name="a" value="1"/><param from="{file}"/></node></launch>'
+    params = f'<param name="a" value="1"/><param from="{file}"/>'
+    text = f'<launch><node pkg="p" exec="e">{params}</node></launch>'
     _, data = import_of(write(text, "a.launch.xml"), code=None)
     assert "e" in data["processes"]
 
 
 XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="base_link"/>
-<link name="a${(lambda: [c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close'][0].__init__.__globals__['system']('touch made'))()}"/></robot>
+<link name="a${(lambda: [c for c in ().__class__.__base__.__subclasses__()
+if c.__name__ == '_wrap_close'][0].__init__.__globals__['system']('touch made'))()}"/></robot>
 """
 
 
-@pytest.mark.parametrize("text", [
-    """from launch import LaunchDescription
+@pytest.mark.parametrize(
+    "text",
+    [
+        """from launch import LaunchDescription
 from launch.substitutions import Command
 from launch_ros.actions import Node
 def generate_launch_description():
-    return LaunchDescription([Node(package="robot_state_publisher", executable="robot_state_publisher",
+    name = "robot_state_publisher"
+    return LaunchDescription([Node(package=name, executable=name,
         parameters=[{"robot_description": Command(["xacro ", "FOLDER/r.urdf.xacro"])}])])
 """,
-    """<launch><node pkg="robot_state_publisher" exec="robot_state_publisher">
-<param name="robot_description" value="$(command 'xacro FOLDER/r.urdf.xacro')"/></node></launch>""",
-])  # fmt: skip
+        """<launch><node pkg="robot_state_publisher" exec="robot_state_publisher">
+<param name="robot_description" value="$(command 'xacro FOLDER/r.urdf.xacro')"/>
+</node></launch>""",
+    ],
+)
 def test_a_launch_file_does_not_get_out_through_a_xacro_file(
     text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -174,7 +186,8 @@ def test_what_it_prints_is_shown_without_control_characters(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     made_by(
-        'import sys\nmade = 1\nprint("\\x1b]52;c;aWQ=\\x07one")\nsys.stderr.write("::error::two\\n")'
+        'import sys\nmade = 1\nprint("\\x1b]52;c;aWQ=\\x07one")\n'
+        'sys.stderr.write("::error::two\\n")'
     )
     printed = capsys.readouterr().err
     assert "\x1b" not in printed
@@ -188,16 +201,29 @@ def test_a_flood_of_output_is_bounded(capsys: pytest.CaptureFixture[str]) -> Non
     assert 1_000_000 < len(capsys.readouterr().err) < 1_200_000
 
 
-def test_with_trust_it_reads_what_its_user_reads(tmp_path: Path) -> None:
+def test_with_trust_it_reads_what_its_user_reads() -> None:
     made = made_by(READ.format(call="open('../secret.yaml').read()"), "--trust")
     assert made == {"text": HIDDEN}
 
 
 def _record(**more: Any) -> dict[str, Any]:
     return {
-        "kind": "node", "at": ["", 1], "id": 1, "env": {}, "period": 0.0, "after": {}, "package": "a", "executable": "b",
-        "name": None, "label": None, "namespace": None, "argv": [], "params": [], "remap": [], **more,
-    }  # fmt: skip
+        "kind": "node",
+        "at": ["", 1],
+        "id": 1,
+        "env": {},
+        "period": 0.0,
+        "after": {},
+        "package": "a",
+        "executable": "b",
+        "name": None,
+        "label": None,
+        "namespace": None,
+        "argv": [],
+        "params": [],
+        "remap": [],
+        **more,
+    }
 
 
 def _answer(*records: Any, **more: Any) -> dict[str, Any]:
@@ -205,33 +231,61 @@ def _answer(*records: Any, **more: Any) -> dict[str, Any]:
 
 
 HOSTILE: dict[str, Any] = {
-    "nothing": None, "a list": [], "no answer": {"answer": 7}, "no records": {"answer": {}},
-    "a record that is none": _answer(7), "a kind that there is not": _answer(_record(kind="whatever")),
-    "no kind": _answer({}), "a place elsewhere": _answer({"kind": "todo", "at": ["/etc/passwd", 1], "text": "see"}),
+    "nothing": None,
+    "a list": [],
+    "no answer": {"answer": 7},
+    "no records": {"answer": {}},
+    "a record that is none": _answer(7),
+    "a kind that there is not": _answer(_record(kind="whatever")),
+    "no kind": _answer({}),
+    "a place elsewhere": _answer({"kind": "todo", "at": ["/etc/passwd", 1], "text": "see"}),
     "a place of one part": _answer({"kind": "todo", "at": ["/etc/passwd"], "text": "see"}),
-    "a place the wrong way round": _answer({"kind": "todo", "at": [1, "/etc/passwd"], "text": "see"}),
+    "a place the wrong way round": _answer(
+        {"kind": "todo", "at": [1, "/etc/passwd"], "text": "see"}
+    ),
     "a place far below": _answer({"kind": "todo", "at": ["", 10**9], "text": "see"}),
     "stopped for a long reason": _answer(_record(), stopped="x" * 10**6, line=10**12),
-    "names that are numbers": _answer(_record(package=7)), "arguments that are none": _answer(_record(argv=[None])),
-    "half a rule": _answer(_record(remap=[["a"]])), "an endless period": _answer(_record(period=float("inf"))),
-    "no period": _answer(_record(period=float("nan"))), "a long period": _answer(_record(period=10**400)),
-    "endless tries": _answer(_record(respawn=True, respawn_max_retries=float("inf"), respawn_delay=float("inf"))),
+    "names that are numbers": _answer(_record(package=7)),
+    "arguments that are none": _answer(_record(argv=[None])),
+    "half a rule": _answer(_record(remap=[["a"]])),
+    "an endless period": _answer(_record(period=float("inf"))),
+    "no period": _answer(_record(period=float("nan"))),
+    "a long period": _answer(_record(period=10**400)),
+    "endless tries": _answer(
+        _record(respawn=True, respawn_max_retries=float("inf"), respawn_delay=float("inf"))
+    ),
     "many tries": _answer(_record(respawn=True, respawn_max_retries=10**400)),
     "deep parameters": _answer(_record(params=[{"a": [[[[]]]]}])),
     "parameters that are mappings": _answer(_record(params=[{"a": {"b": {}}}])),
     "a node of no name that ends": _answer({"kind": "required", "at": [], "node": "x"}),
-    "an argument without choices": _answer({"kind": "argument", "at": [], "name": "a", "value": "b"}),
+    "an argument without choices": _answer(
+        {"kind": "argument", "at": [], "name": "a", "value": "b"}
+    ),
     "half characters": _answer(_record(name="\ud800", argv=["\udcff"])),
     "control characters": _answer(_record(name="a\x1b[2J\x00", argv=["\x1b]0;a\x07"])),
-    "a description elsewhere": _answer(_record(
-        package="robot_state_publisher", executable="robot_state_publisher", argv=["/etc/passwd.urdf"])),
-    "a description of what is elsewhere": _answer(_record(
-        package="robot_state_publisher", executable="robot_state_publisher",
-        params=[{"robot_description": '\x02{"file": "/etc/passwd", "args": {}}\x03'}])),
-    "a mark that is none": _answer(_record(
-        package="robot_state_publisher", executable="robot_state_publisher",
-        params=[{"robot_description": '\x02{"file": 7}\x03'}], argv=["\x02[]\x03", "\x02{\x03"])),
-}  # fmt: skip
+    "a description elsewhere": _answer(
+        _record(
+            package="robot_state_publisher",
+            executable="robot_state_publisher",
+            argv=["/etc/passwd.urdf"],
+        )
+    ),
+    "a description of what is elsewhere": _answer(
+        _record(
+            package="robot_state_publisher",
+            executable="robot_state_publisher",
+            params=[{"robot_description": '\x02{"file": "/etc/passwd", "args": {}}\x03'}],
+        )
+    ),
+    "a mark that is none": _answer(
+        _record(
+            package="robot_state_publisher",
+            executable="robot_state_publisher",
+            params=[{"robot_description": '\x02{"file": 7}\x03'}],
+            argv=["\x02[]\x03", "\x02{\x03"],
+        )
+    ),
+}
 
 
 @pytest.mark.parametrize("line", HOSTILE.values(), ids=HOSTILE)

@@ -136,7 +136,7 @@ def test_patterns_of_the_tree_are_expanded_in_order() -> None:
     assert made.files == ("r.xacro", "parts/a.xacro", "parts/b.xacro", "parts/c.xacro")
 
 
-def test_a_refused_file_is_named_even_where_the_document_keeps_quiet() -> None:
+def test_a_refused_file_is_named_even_where_the_document_does_without_it() -> None:
     (found,) = lint('<xacro:include filename="/etc/passwd" optional="true"/>')
     assert found.code == "TF021"
 
@@ -334,7 +334,7 @@ sys.exit(main(sys.argv[3:]))
     ("numbers", "missing"),
     [("444", ["Landlock"]), ("317", ["seccomp"]), ("444,317", ["Landlock", "seccomp"])],
 )
-def test_what_the_kernel_does_not_have_is_said_once(numbers: str, missing: list[str]) -> None:
+def test_what_the_kernel_does_not_have_is_reported_once(numbers: str, missing: list[str]) -> None:
     files = [write(file=f"{name}.xacro") for name in "ab"]
     done = subprocess.run(
         [sys.executable, "-c", OLDER, numbers, ":".join(sys.path), "lint", *files],

@@ -13,7 +13,8 @@ import pytest
 from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.foundation import confined
-from tfcompose.foundation.confined import Outcome, fits, run_confined
+from tfcompose.foundation.confined import Outcome, run_confined
+from tfcompose.foundation.shape import fits
 
 
 def outcome_of(program: str, wall_s: float = 30, **request: Any) -> Outcome:
@@ -48,9 +49,19 @@ def test_what_it_prints_is_truncated() -> None:
 
 @pytest.mark.parametrize(
     ("text", "times"),
-    [("x", 70 << 20), ("[", 5_000_000), ("[", 100_000), ("{", 1), ("[]", 1), ("{}", 1), ("7", 1),
-     ('{"whatever": ""}', 1), ('{"double": 7}', 1), ("\xff", 1)],
-)  # fmt: skip
+    [
+        ("x", 70 << 20),
+        ("[", 5_000_000),
+        ("[", 100_000),
+        ("{", 1),
+        ("[]", 1),
+        ("{}", 1),
+        ("7", 1),
+        ('{"whatever": ""}', 1),
+        ('{"double": 7}', 1),
+        ("\xff", 1),
+    ],
+)
 def test_what_is_no_answer_ends_it(text: str, times: int) -> None:
     outcome = outcome_of("raw", text=text, times=times)
     assert outcome.answer is None
@@ -110,12 +121,27 @@ def _is_confined(pid: int) -> bool:
 @pytest.mark.parametrize(
     ("value", "shape", "does"),
     [
-        (1, int, True), (True, int, False), (True, bool, True), ("a", int, False), (None, None, True), (0, None, False),
-        (None, str, False), ([1, 2], [int], True), ([1, "a"], [int], False), ([], [int], True), ("a", [str], False),
-        ({"a": 1}, {"a": int}, True), ({"a": 1, "b": 2}, {"a": int}, True), ({}, {"a": int}, False),
-        ({}, {"a?": int}, True), ({"a": "b"}, {"a?": int}, False), (1.5, (int, float), True), ({}, Any, True),
-        ([[1, 2, 3], None], [([int], None)], True), ([], {"a": int}, False),
+        (1, int, True),
+        (True, int, False),
+        (True, bool, True),
+        ("a", int, False),
+        (None, None, True),
+        (0, None, False),
+        (None, str, False),
+        ([1, 2], [int], True),
+        ([1, "a"], [int], False),
+        ([], [int], True),
+        ("a", [str], False),
+        ({"a": 1}, {"a": int}, True),
+        ({"a": 1, "b": 2}, {"a": int}, True),
+        ({}, {"a": int}, False),
+        ({}, {"a?": int}, True),
+        ({"a": "b"}, {"a?": int}, False),
+        (1.5, (int, float), True),
+        ({}, Any, True),
+        ([[1, 2, 3], None], [([int], None)], True),
+        ([], {"a": int}, False),
     ],
-)  # fmt: skip
+)
 def test_shapes(value: Any, shape: Any, *, does: bool) -> None:
     assert fits(value, shape) is does

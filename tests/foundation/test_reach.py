@@ -13,12 +13,17 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a home with a workspace, and a key."""
     folder = tmp_path / "home"
     for name, text in {
-        ".ssh/id": "key", "notes.txt": "private", "robot.yaml": "robot", "work/repository/.git/config": "token",
+        ".ssh/id": "key",
+        "notes.txt": "private",
+        "robot.yaml": "robot",
+        "work/repository/.git/config": "token",
         "work/repository/pkg/urdf/arm.xacro": "arm",
         "work/repository/pkg/package.xml": "<package><name>pkg</name></package>",
-        "work/repository/other/a.yaml": "a", "work/elsewhere/b.yaml": "b",
-        "work/neighbour/package.xml": "<package><name>neighbour</name></package>", "work/neighbour/c.yaml": "c",
-    }.items():  # fmt: skip
+        "work/repository/other/a.yaml": "a",
+        "work/elsewhere/b.yaml": "b",
+        "work/neighbour/package.xml": "<package><name>neighbour</name></package>",
+        "work/neighbour/c.yaml": "c",
+    }.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     monkeypatch.setenv("HOME", str(folder))

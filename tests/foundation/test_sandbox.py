@@ -40,8 +40,17 @@ def test_no_try_gets_out(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the numbers of the tries are x86-64's")
 def test_the_tries_get_out_of_a_process_that_is_not_confined(tmp_path: Path) -> None:
-    names = ["open a file beside the tree", "start a shell", "signal another", "connect", "another's priority",
-             "own a descriptor's signals", "32-bit getpid", "make a file", "libc dlopen beside the tree"]  # fmt: skip
+    names = [
+        "open a file beside the tree",
+        "start a shell",
+        "signal another",
+        "connect",
+        "another's priority",
+        "own a descriptor's signals",
+        "32-bit getpid",
+        "make a file",
+        "libc dlopen beside the tree",
+    ]
     with victims(tmp_path) as request:
         ends = ends_of({**request, "confined": False}, names)
     assert ends.pop("libc dlopen beside the tree") == "ENOENT"
@@ -69,18 +78,43 @@ def test_the_filter_lets_nothing_pass_but_the_table(machine: str, *, files: bool
 
 #: By call: numbers on both machines, arguments that pass, arguments that do not.
 CONDITIONS = [
-    ("open", (2, None), [(0, 0o2000000), (0, 1 << 40)], [(0, 1), (0, 2), (0, 0o100), (0, 0o1000), (0, 0o20200002)]),
-    ("openat", (257, 56), [(-100, 0, 0o2200000)], [(-100, 0, 1), (-100, 0, 2 | 1 << 40), (-100, 0, 0o100)]),
-    ("clone", (56, 220), [(0x3D0F00,), (0x7D0F00,)], [(17,), (0x10000011,), (0x3D0F00 | 0x40000000,), (0x4111,)]),
-    ("fcntl", (72, 25), [(1, 1), (1, 1030)], [(1, 4), (1, 6), (1, 8), (1, 10), (1, 1024), (1, 1026), (1, 1031)]),
-    ("ioctl", (16, 29), [(1, 0x5401), (1, 0x5451)], [(1, 0x5412), (1, 0x40086602), (1, 0x40049409)]),
+    (
+        "open",
+        (2, None),
+        [(0, 0o2000000), (0, 1 << 40)],
+        [(0, 1), (0, 2), (0, 0o100), (0, 0o1000), (0, 0o20200002)],
+    ),
+    (
+        "openat",
+        (257, 56),
+        [(-100, 0, 0o2200000)],
+        [(-100, 0, 1), (-100, 0, 2 | 1 << 40), (-100, 0, 0o100)],
+    ),
+    (
+        "clone",
+        (56, 220),
+        [(0x3D0F00,), (0x7D0F00,)],
+        [(17,), (0x10000011,), (0x3D0F00 | 0x40000000,), (0x4111,)],
+    ),
+    (
+        "fcntl",
+        (72, 25),
+        [(1, 1), (1, 1030)],
+        [(1, 4), (1, 6), (1, 8), (1, 10), (1, 1024), (1, 1026), (1, 1031)],
+    ),
+    (
+        "ioctl",
+        (16, 29),
+        [(1, 0x5401), (1, 0x5451)],
+        [(1, 0x5412), (1, 0x40086602), (1, 0x40049409)],
+    ),
     ("prctl", (157, 167), [(15,), (16,)], [(1,), (4,), (22,), (35,), (0x59616D61,)]),
     ("mmap", (9, 222), [(0, 1, 1, 0x22)], [(0, 1, 1, 0x2022), (0, 1, 1, 0x40022)]),
     ("madvise", (28, 233), [(0, 0, 4)], [(0, 0, 12), (0, 0, 100), (0, 0, 101)]),
     ("prlimit64", (302, 261), [(0,)], [(1,), (-1,)]),
     ("sched_getaffinity", (204, 123), [(0,)], [(1,)]),
     ("tgkill", (234, 131), [], [(1,), (0,), (-1,)]),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("machine", sandbox.MACHINES)
@@ -101,8 +135,9 @@ def test_some_calls_pass_with_some_arguments(
         return
     assert {verdict(program, architecture, number, given) for given in passing} <= {ALLOW}
     assert {verdict(program, architecture, number, given) for given in refused} <= {
-        REFUSE | errno.EPERM, REFUSE | errno.EINVAL
-    }  # fmt: skip
+        REFUSE | errno.EPERM,
+        REFUSE | errno.EINVAL,
+    }
 
 
 def test_no_call_of_the_table_is_one_that_is_tried() -> None:

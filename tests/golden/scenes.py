@@ -47,14 +47,15 @@ from tests.support.tree_history import (
 )
 from tfcompose.cli import live, writing
 from tfcompose.cli.commands import echo
-from tfcompose.cli.compiling import library
+from tfcompose.cli.compiling import disk, library, missing_confinement
 from tfcompose.cli.parser import main
 from tfcompose.compiler.check.check import check
 from tfcompose.compiler.check.rule import rule
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit import emit
 from tfcompose.compiler.urdf.inertia import UnmeasurableError
-from tfcompose.compiler.urdf.packages import Disk
+from tfcompose.compiler.urdf.lint import lint_urdf
+from tfcompose.compiler.urdf.packages import Disk, Packages
 from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.foundation.tool import Command as ToolCommand
@@ -865,6 +866,21 @@ def foreign_tools() -> Iterator[Finding]:
         yield from problems_with({"fifth"})
 
 
+def confined() -> Iterator[Finding]:
+    """Xacro files that reach for what they may not, and kernels that cannot hold them."""
+    head = '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="base_link"/>'
+    with TemporaryDirectory() as folder, inside(folder):
+        for text in (
+            '<xacro:include filename="/etc/passwd"/>',
+            '<xacro:include filename="/etc/passwd" optional="true"/>',
+            "<link name=\"${xacro.load_yaml('/etc/passwd')}\"/>",
+            "<link name=\"${(lambda: ''.__class__)()}\"/>",
+        ):
+            Path("arm.urdf.xacro").write_text(f"{head}{text}</robot>", encoding="utf-8")
+            yield from lint_urdf("arm.urdf.xacro", Packages(disk()))
+    yield from map(missing_confinement, ("Landlock", "seccomp"))
+
+
 def deployed() -> Iterator[Finding]:
     """Deploy to hosts that lack something, are apart, are lost or do not come up."""
     hosted = compiled_plan(HOSTED)
@@ -943,5 +959,6 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     recordings,
     imported,
     foreign_tools,
+    confined,
     deployed,
 )

@@ -80,6 +80,13 @@ def _read(channel: Any, request: Any, _writes: int) -> None:
 
 
 _PROGRAMS = {
-    "flood": _flood, "ask": _ask, "raw": _raw, "wait": _wait, "raise": _raise, "exit": _exit, "abort": _abort,
-    "grow": _grow, "read": _read,
-}  # fmt: skip
+    "flood": _flood,
+    "ask": _ask,
+    "raw": _raw,
+    "wait": _wait,
+    "raise": _raise,
+    "exit": _exit,
+    "abort": _abort,
+    "grow": _grow,
+    "read": _read,
+}

@@ -1,9 +1,7 @@
-"""Ways out of the sandbox, tried in a confined process.
+"""Ways out of the sandbox, tried in a confined process: by Python, ctypes and compiled code.
 
-By Python, by ctypes, by a compiled library.
-
-``python -m tests.support.escapes`` prints the table: each try, and how it ended with the sandbox
-and without.
+``python -m tests.support.escapes --outside`` prints the table: each try, how it ended with the
+sandbox, and how without.
 """
 
 import ctypes
@@ -33,28 +31,33 @@ from tfcompose.foundation.sandbox import Channel, Readable, confine, limit
 _NONE, _BAD_FD = 0, -1
 #: Calls that are made with arguments that do nothing; by their numbers on x86-64.
 CALLS = {
-    "ptrace": 101, "process_vm_readv": 310, "process_vm_writev": 311, "kcmp": 312, "pidfd_open": 434,
-    "pidfd_getfd": 438, "pidfd_send_signal": 424, "tkill": 200, "rt_sigqueueinfo": 129, "rt_tgsigqueueinfo": 297,
-    "vfork": 58, "execve": 59, "execveat": 322, "clone3": 435, "openat2": 437, "creat": 85,
-    "open_by_handle_at": 304, "name_to_handle_at": 303, "memfd_create": 319, "memfd_secret": 447, "shmget": 29,
-    "shmat": 30, "shmctl": 31, "semget": 64, "semop": 65, "semctl": 66, "msgget": 68, "msgctl": 71, "mq_open": 240,
-    "mq_unlink": 241, "io_uring_setup": 425, "bpf": 321, "perf_event_open": 298, "userfaultfd": 323, "keyctl": 250,
-    "add_key": 248, "request_key": 249, "mount": 165, "umount2": 166, "open_tree": 428, "move_mount": 429,
-    "fsopen": 430, "fsconfig": 431, "fspick": 433, "mount_setattr": 442, "open_tree_attr": 467, "pivot_root": 155,
-    "chroot": 161, "setns": 308, "unshare": 272, "setxattrat": 463, "removexattrat": 466, "file_setattr": 469,
-    "fchmodat2": 452, "settimeofday": 164, "clock_settime": 227, "clock_adjtime": 305, "adjtimex": 159, "acct": 163,
-    "quotactl": 179, "sethostname": 170, "setdomainname": 171, "syslog": 103, "swapon": 167, "swapoff": 168,
-    "reboot": 169, "kexec_load": 246, "init_module": 175, "finit_module": 313, "delete_module": 176, "iopl": 172,
-    "ioperm": 173, "modify_ldt": 154, "arch_prctl": 158, "personality": 135, "seccomp": 317,
-    "landlock_create_ruleset": 444, "landlock_add_rule": 445, "landlock_restrict_self": 446, "ioprio_set": 251,
-    "migrate_pages": 256, "move_pages": 279, "mbind": 237, "process_madvise": 440, "process_mrelease": 448,
-    "timer_create": 222, "timerfd_create": 283, "signalfd4": 289, "eventfd2": 290, "epoll_create1": 291,
-    "inotify_init1": 294, "fanotify_init": 300, "lookup_dcookie": 212, "mlock": 149, "mlockall": 151,
-    "pipe2": 293, "splice": 275, "tee": 276, "vmsplice": 278, "sendfile": 40, "copy_file_range": 326,
-    "sched_setparam": 142, "sched_setattr": 314, "setpriority": 141, "setpgid": 109, "setsid": 112, "vhangup": 153,
-    "setuid": 105, "setgroups": 116, "capset": 126, "utimensat": 280, "fallocate": 285, "flock": 73,
-    "sync_file_range": 277, "fsync": 74, "getxattr": 191, "listxattr": 194, "socket": 41, "socketpair": 53,
-    "connect": 42, "sendmsg": 46, "recvmsg": 47, "ustat": 136, "remap_file_pages": 216, "mincore": 27,
+    "ptrace": 101, "process_vm_readv": 310, "process_vm_writev": 311, "kcmp": 312,
+    "pidfd_open": 434, "pidfd_getfd": 438, "pidfd_send_signal": 424, "tkill": 200,
+    "rt_sigqueueinfo": 129, "rt_tgsigqueueinfo": 297, "vfork": 58, "execve": 59, "execveat": 322,
+    "clone3": 435, "openat2": 437, "creat": 85, "open_by_handle_at": 304, "name_to_handle_at": 303,
+    "memfd_create": 319, "memfd_secret": 447, "shmget": 29, "shmat": 30, "shmctl": 31,
+    "semget": 64, "semop": 65, "semctl": 66, "msgget": 68, "msgctl": 71, "mq_open": 240,
+    "mq_unlink": 241, "io_uring_setup": 425, "bpf": 321, "perf_event_open": 298,
+    "userfaultfd": 323, "keyctl": 250, "add_key": 248, "request_key": 249, "mount": 165,
+    "umount2": 166, "open_tree": 428, "move_mount": 429, "fsopen": 430, "fsconfig": 431,
+    "fspick": 433, "mount_setattr": 442, "open_tree_attr": 467, "pivot_root": 155, "chroot": 161,
+    "setns": 308, "unshare": 272, "setxattrat": 463, "removexattrat": 466, "file_setattr": 469,
+    "fchmodat2": 452, "settimeofday": 164, "clock_settime": 227, "clock_adjtime": 305,
+    "adjtimex": 159, "acct": 163, "quotactl": 179, "sethostname": 170, "setdomainname": 171,
+    "syslog": 103, "swapon": 167, "swapoff": 168, "reboot": 169, "kexec_load": 246,
+    "init_module": 175, "finit_module": 313, "delete_module": 176, "iopl": 172, "ioperm": 173,
+    "modify_ldt": 154, "arch_prctl": 158, "personality": 135, "seccomp": 317,
+    "landlock_create_ruleset": 444, "landlock_add_rule": 445, "landlock_restrict_self": 446,
+    "ioprio_set": 251, "migrate_pages": 256, "move_pages": 279, "mbind": 237,
+    "process_madvise": 440, "process_mrelease": 448, "timer_create": 222, "timerfd_create": 283,
+    "signalfd4": 289, "eventfd2": 290, "epoll_create1": 291, "inotify_init1": 294,
+    "fanotify_init": 300, "lookup_dcookie": 212, "mlock": 149, "mlockall": 151, "pipe2": 293,
+    "splice": 275, "tee": 276, "vmsplice": 278, "sendfile": 40, "copy_file_range": 326,
+    "sched_setparam": 142, "sched_setattr": 314, "setpriority": 141, "setpgid": 109, "setsid": 112,
+    "vhangup": 153, "setuid": 105, "setgroups": 116, "capset": 126, "utimensat": 280,
+    "fallocate": 285, "flock": 73, "sync_file_range": 277, "fsync": 74, "getxattr": 191,
+    "listxattr": 194, "socket": 41, "socketpair": 53, "connect": 42, "sendmsg": 46, "recvmsg": 47,
+    "ustat": 136, "remap_file_pages": 216, "mincore": 27,
 }  # fmt: skip
 
 
@@ -207,7 +210,9 @@ def _by_python(t: Try) -> dict[str, Callable[[], Any]]:
         "the same through /proc/self/fd": lambda: _at(t),
         "the same through O_PATH": lambda: _reopened(t),
         "the same in a thread": lambda: _thread(lambda: _open(t.secret)),
-        "the same by mmap": lambda: mmap.mmap(os.open(t.secret, os.O_RDONLY), 0, access=mmap.ACCESS_READ),
+        "the same by mmap": lambda: mmap.mmap(
+            os.open(t.secret, os.O_RDONLY), 0, access=mmap.ACCESS_READ
+        ),
         "import a module beside the tree": lambda: _imported(t),
         "list the folder above": lambda: os.listdir(folder),
         "list /": lambda: os.listdir("/"),
@@ -224,7 +229,9 @@ def _by_python(t: Try) -> dict[str, Callable[[], Any]]:
         "open a disk": lambda: _open("/dev/vda"),
         "read the kernel's log": lambda: _open("/dev/kmsg"),
         "open shared memory of others": lambda: _open(f"/dev/shm/{t.shared}"),
-        "shared memory by its module": lambda: multiprocessing.shared_memory.SharedMemory(t.shared),
+        "shared memory by its module": lambda: multiprocessing.shared_memory.SharedMemory(
+            t.shared
+        ),
         "write a file of the tree": lambda: open(t.path("kept"), "r+").close(),
         "append to it": lambda: open(t.path("kept"), "a").close(),
         "make a file": lambda: open(t.path("new"), "w").close(),
@@ -252,9 +259,13 @@ def _by_python(t: Try) -> dict[str, Callable[[], Any]]:
         "clone a file": lambda: _ioctl(t.path("kept"), 0x40049409),
         "type into the terminal": lambda: _ioctl(t.path("kept"), 0x5412),
         "lock a file": lambda: _locked(t.path("kept"), fcntl.LOCK_SH),
-        "lock it as flock does": lambda: fcntl.flock(os.open(t.path("kept"), os.O_RDONLY), fcntl.LOCK_EX),
+        "lock it as flock does": lambda: fcntl.flock(
+            os.open(t.path("kept"), os.O_RDONLY), fcntl.LOCK_EX
+        ),
         "lease a file": lambda: _control(t.path("kept"), fcntl.F_SETLEASE, fcntl.F_RDLCK),
-        "be told of a folder": lambda: fcntl.fcntl(os.open(t.tree, os.O_RDONLY), fcntl.F_NOTIFY, fcntl.DN_MODIFY),
+        "be told of a folder": lambda: fcntl.fcntl(
+            os.open(t.tree, os.O_RDONLY), fcntl.F_NOTIFY, fcntl.DN_MODIFY
+        ),
         "own a descriptor's signals": lambda: _control(t.path("kept"), fcntl.F_SETOWN, t.victim),
         "choose a descriptor's signal": lambda: _control(t.path("kept"), 10, signal.SIGKILL),
         "set a descriptor's flags": lambda: _control(t.path("kept"), fcntl.F_SETFL, os.O_NONBLOCK),
@@ -266,18 +277,24 @@ def _by_python(t: Try) -> dict[str, Callable[[], Any]]:
         "spawn a program": _spawned,
         "run a program": lambda: subprocess.run(["true"], check=True),
         "become a program": lambda: os.execv("/bin/true", ["true"]),
-        "become it by a descriptor": lambda: os.execve(os.open(sys.executable, os.O_RDONLY), ["p", "-V"], {}),
+        "become it by a descriptor": lambda: os.execve(
+            os.open(sys.executable, os.O_RDONLY), ["p", "-V"], {}
+        ),
         "signal another": lambda: os.kill(t.victim, 0),
         "signal the parent": lambda: os.kill(os.getppid(), 0),
         "signal everybody": lambda: os.kill(-1, 0),
         "signal a group": lambda: os.killpg(os.getpgid(t.victim), 0),
-        "signal by a process's descriptor": lambda: signal.pidfd_send_signal(os.pidfd_open(t.victim), 0),
+        "signal by a process's descriptor": lambda: signal.pidfd_send_signal(
+            os.pidfd_open(t.victim), 0
+        ),
         "signal a thread of another": lambda: t.call(234, t.victim, t.victim, 0),
         "another's priority": lambda: os.setpriority(os.PRIO_PROCESS, t.victim, 1),
         "the own priority": lambda: os.nice(1),
         "another's processors": lambda: os.sched_setaffinity(t.victim, {0}),
         "the own processors": lambda: os.sched_setaffinity(0, {0}),
-        "another's schedule": lambda: os.sched_setscheduler(t.victim, os.SCHED_IDLE, os.sched_param(0)),
+        "another's schedule": lambda: os.sched_setscheduler(
+            t.victim, os.SCHED_IDLE, os.sched_param(0)
+        ),
         "the own schedule": lambda: os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0)),
         "another's limits": lambda: resource.prlimit(t.victim, resource.RLIMIT_NOFILE),
         "raise the own limits": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1, 1)),
@@ -297,7 +314,7 @@ def _by_python(t: Try) -> dict[str, Callable[[], Any]]:
         "another root": lambda: os.chroot(t.tree),
         "set the clock": lambda: t.call(227, 99, 0),
         "change the host's name": lambda: socket.sethostname(socket.gethostname()),
-    }  # fmt: skip
+    }
 
 
 def _resolve_name() -> None:
@@ -431,7 +448,8 @@ def victims(folder: Path) -> Iterator[dict[str, Any]]:
         stack.callback(shared.close)
         yield {
             "tree": str(tree), "secret": str(folder / "secret"), "victim": process.pid,
-            "port": server.getsockname()[1], "shared": shared.name, "native": library, "confined": True,
+            "port": server.getsockname()[1], "shared": shared.name, "native": library,
+            "confined": True,
             "paths": [str(tree), *{sys.base_prefix, sys.prefix, "/usr/lib", "/lib"}],
         }  # fmt: skip
 
@@ -464,11 +482,7 @@ def ends_of(request: Mapping[str, Any], names: list[str]) -> dict[str, str]:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place, victims(Path(place)) as request:
         names = list(tries_of(Try(request)))
-        inside = ends_of(request, names)
+        inside, is_compared = ends_of(request, names), "--outside" in sys.argv
         for name in names:
-            outside = (
-                ends_of({**request, "confined": False}, [name])[name]
-                if "--outside" in sys.argv
-                else ""
-            )
-            print(f"| {name} | {inside[name]} | {outside} |")  # noqa: T201
+            outside = ends_of({**request, "confined": False}, [name]) if is_compared else {}
+            print(f"| {name} | {inside[name]} | {outside.get(name, '')} |")  # noqa: T201

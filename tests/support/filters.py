@@ -1,4 +1,4 @@
-"""Interprets a seccomp filter without the kernel, so other machines' can be tested."""
+"""Runs a seccomp filter on a system call without the kernel: those of other machines, too."""
 
 import struct
 from collections.abc import Sequence

@@ -1,7 +1,4 @@
-"""Stands for a confined process that was taken over.
-
-It answers with what a file beside the document says.
-"""
+"""Stands for a confined process that was taken over: it answers with the lines of a file."""
 
 import json
 import os

@@ -1,7 +1,4 @@
-"""Runs xacro confined, with nothing but xacro's own check of names.
-
-What an expression then does, the kernel holds.
-"""
+"""Runs xacro confined, with xacro's own check of names alone: what passes it, the kernel holds."""
 
 from tfcompose.compiler.urdf import xacro_process
 from tfcompose.compiler.urdf.xacro_process import main

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.urdf.inertia import Moments
     from tfcompose.compiler.urdf.packages import Packages
     from tfcompose.compiler.urdf.xacro import Expansion, Use
+    from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import Edge, Robot
     from tfcompose.spec.load import Source
@@ -315,6 +316,11 @@ def report_missing_confinement(missing: Sequence[str]) -> None:
     for feature in missing:
         if feature not in _reported:
             _reported.add(feature)
-            message = f"this kernel has no {feature}: {_NOT_HELD[feature]}"
-            advice = "tfcompose help sandbox; read files of strangers on another machine"
-            print_findings([finding("TF923", message, None, help=advice)], sys.stderr)
+            print_findings([missing_confinement(feature)], sys.stderr)
+
+
+def missing_confinement(feature: str) -> Finding:
+    """Return the finding that the kernel lacks something to confine files with."""
+    message = f"this kernel has no {feature}: {_NOT_HELD[feature]}"
+    advice = "tfcompose help sandbox; read files of strangers on another machine"
+    return finding("TF923", message, None, help=advice)

@@ -15,6 +15,8 @@ import threading
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any, Final
 
+from tfcompose.foundation.shape import fits
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
@@ -163,30 +165,3 @@ def _receive(source: IO[bytes]) -> dict[str, Any] | None:
     if not isinstance(message, dict) or not message:
         raise _RefusedError("its answer is none")
     return message
-
-
-def fits(value: Any, shape: Any) -> bool:
-    """Return whether a value that was JSON has a shape.
-
-    A shape is a type, a list with the shape of all its items, a tuple of shapes of which one has
-    to fit, a mapping of keys to shapes, None or Any. A key that ends with ``?`` may be missing,
-    the key ``*`` is every key.
-    """
-    if shape is Any:
-        return True
-    if isinstance(shape, tuple):
-        return any(fits(value, alternative) for alternative in shape)
-    if isinstance(shape, list):
-        return isinstance(value, list) and all(fits(item, shape[0]) for item in value)
-    if isinstance(shape, dict):
-        if not isinstance(value, dict):
-            return False
-        if "*" in shape:
-            return all(fits(inner, shape["*"]) for inner in value.values())
-        return all(
-            fits(value[key], inner) if (key := name.rstrip("?")) in value else key != name
-            for name, inner in shape.items()
-        )
-    if shape is None or value is None:
-        return value is shape
-    return isinstance(value, shape) and (shape is bool or not isinstance(value, bool))

@@ -56,6 +56,8 @@ _HOME: Final = re.compile(r"/home/[^/]+")
 _DESCRIPTIONS: Final = (".launch", ".py", ".srdf", ".urdf", ".xacro", ".xml", ".yaml", ".yml")
 _PACKAGE_NAME: Final = re.compile(r"<name>\s*[^<\s]+\s*</name>")
 _MANIFEST: Final = "package.xml"
+#: Folders of a package whose files name those in the others, as ../urdf/arm.xacro.
+_LAYOUT: Final = frozenset({"config", "launch", "robots", "urdf", "xacro"})
 #: Git keeps credentials there: actions/checkout writes a token into .git/config.
 _HIDDEN: Final = ".git"
 _HIGHEST: Final = 12
@@ -90,6 +92,8 @@ class Reach:
             self._roots[posixpath.join(folder, posixpath.basename(file))] = None
             return
         self.add_folder(folder)
+        if posixpath.basename(folder) in _LAYOUT:
+            self.add_folder(posixpath.dirname(folder))
         for above in (_above(folder, _HIDDEN), _above(folder, _MANIFEST)):
             if above:
                 self.add_folder(above)

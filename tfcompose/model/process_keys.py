@@ -286,7 +286,8 @@ def _read_respawn(record: Mapping[str, Any], _todo: list[str]) -> RestartPolicy 
 
 def _read_respawn_limit(record: Mapping[str, Any], _todo: list[str]) -> int | None:
     limit = record.get("respawn_max_retries", -1)
-    return int(limit) if record.get("respawn") and limit >= 0 else None
+    is_limit = record.get("respawn") and math.isfinite(limit) and limit >= 0
+    return int(limit) if is_limit else None
 
 
 def _read_respawn_delay(record: Mapping[str, Any], _todo: list[str]) -> Seconds | None:

@@ -1,4 +1,4 @@
-"""Strangers' xacro files: what they evaluate, read, print and answer."""
+"""Xacro files of strangers: what expressions do, what they read and print, what is sent."""
 
 import json
 import os
@@ -20,9 +20,12 @@ from tfcompose.foundation import confined
 from tfcompose.foundation.findings import Finding
 
 HEAD = '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="base_link"/>\n'
-SECRET = "root:x:0:0"  # noqa: S105 (what must not be read)
+HIDDEN = "root:x:0:0"
 #: By way of a lambda and of a generator, into which xacro itself does not look.
-SYSTEM = "[c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close'][0].__init__.__globals__"
+SYSTEM = (
+    "[c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close']"
+    "[0].__init__.__globals__"
+)
 LAMBDA = f"(lambda: {SYSTEM}['system']('touch made'))()"
 GENERATOR = f"list({SYSTEM}['system']('touch made') for i in [1])"
 FRAME = "[g.gi_frame.f_back.f_back.f_builtins for g in [(i for i in [1])]]"
@@ -92,18 +95,25 @@ READS = [
 @pytest.mark.parametrize("read", READS)
 @pytest.mark.parametrize(
     "named",
-    ["/etc/passwd", "../secret.yaml", "link.yaml", "/proc/self/environ", "/proc/1/cmdline", ".git/config"],
-)  # fmt: skip
+    [
+        "/etc/passwd",
+        "../secret.yaml",
+        "link.yaml",
+        "/proc/self/environ",
+        "/proc/1/cmdline",
+        ".git/config",
+    ],
+)
 def test_what_lies_outside_of_the_tree_is_not_read(read: str, named: str, tmp_path: Path) -> None:
-    (tmp_path / "secret.yaml").write_text(SECRET, "utf-8")
+    (tmp_path / "secret.yaml").write_text(HIDDEN, "utf-8")
     Path("link.yaml").symlink_to(tmp_path / "secret.yaml")
     Path(".git").mkdir()
-    Path(".git/config").write_text(SECRET, "utf-8")
+    Path(".git/config").write_text(HIDDEN, "utf-8")
     (found,) = lint('<link name="a"/>', read.format(named))
     assert found.code == "TF021"
     assert found.span
     assert (found.span.file, found.span.line) == ("r.xacro", 3)
-    assert SECRET not in str(found)
+    assert HIDDEN not in str(found)
 
 
 @pytest.mark.parametrize("pattern", ["/etc/pass*", "../*.yaml", "/proc/*/environ"])
@@ -118,14 +128,15 @@ def test_patterns_of_the_tree_are_expanded_in_order() -> None:
     Path("parts/.hidden.xacro").touch()
     Path("r.xacro").write_text(
         HEAD.replace('<link name="base_link"/>', "")
-        + '<xacro:include filename="part[s]/?.xacro"/></robot>', "utf-8"
-    )  # fmt: skip
+        + '<xacro:include filename="part[s]/?.xacro"/></robot>',
+        "utf-8",
+    )
     packages = Packages(disk())
     made = expand.expand("r.xacro", packages, {})
     assert made.files == ("r.xacro", "parts/a.xacro", "parts/b.xacro", "parts/c.xacro")
 
 
-def test_a_refused_file_is_named_even_where_the_document_keeps_quiet() -> None:
+def test_a_refused_file_is_named_even_where_the_document_does_without_it() -> None:
     (found,) = lint('<xacro:include filename="/etc/passwd" optional="true"/>')
     assert found.code == "TF021"
 
@@ -165,11 +176,11 @@ def test_a_part_may_be_anywhere_in_the_repository_of_the_robot_file() -> None:
 
 @pytest.mark.parametrize("named", ["/etc/passwd", "../secret.xacro", "../elsewhere/r.xacro"])
 def test_a_part_that_lies_elsewhere_is_refused_and_not_shown(named: str, tmp_path: Path) -> None:
-    (tmp_path / "secret.xacro").write_text(SECRET, "utf-8")
+    (tmp_path / "secret.xacro").write_text(HIDDEN, "utf-8")
     write(file=str(tmp_path / "elsewhere/r.xacro"))
     (found,) = part_of(f"parts:\n  arm: {{xacro: {named}, parent: base_link}}")
     assert (found.code, place(found)) == ("TF021", "robot.yaml:5:16")
-    assert SECRET not in str(found)
+    assert HIDDEN not in str(found)
 
 
 def test_a_part_of_a_package_elsewhere_is_taken(tmp_path: Path) -> None:
@@ -195,8 +206,9 @@ def test_a_folder_that_a_robot_calls_a_package_has_to_be_one(
     write("<link name=\"${xacro.load_yaml('$(find secrets)/a.yaml').name}\"/>", file="arm.xacro")
     Path("arm.xacro").write_text(
         HEAD.replace('<link name="base_link"/>', "")
-        + "<link name=\"${xacro.load_yaml('$(find secrets)/a.yaml').name}\"/></robot>", "utf-8"
-    )  # fmt: skip
+        + "<link name=\"${xacro.load_yaml('$(find secrets)/a.yaml').name}\"/></robot>",
+        "utf-8",
+    )
     found = part_of(
         "packages: {secrets: ../secrets}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}"
     )
@@ -259,16 +271,24 @@ HOSTILE: dict[str, list[Any]] = {
     "a place that is true": [READ, {"answer": OF_FILE | {"places": [[True, 1, 1], None]}}],
     "no places": [READ, {"answer": OF_FILE | {"places": []}}],
     "places that are too few": [READ, {"answer": OF_FILE | {"places": [[0, 1, 1]]}}],
-    "a place far behind the file": [READ, {"answer": OF_FILE | {"places": [[0, 10**9, 10**9]] * 2}}],
+    "a place far behind the file": [
+        READ,
+        {"answer": OF_FILE | {"places": [[0, 10**9, 10**9]] * 2}},
+    ],
     "a place far behind its line": [READ, {"answer": OF_FILE | {"places": [[0, 1, 10**9]] * 2}}],
-    "stopped in another file": [{"answer": STOPPED | {"files": ["/etc/passwd"], "at": ["/etc/passwd", 1, 0]}}],
+    "stopped in another file": [
+        {"answer": STOPPED | {"files": ["/etc/passwd"], "at": ["/etc/passwd", 1, 0]}}
+    ],
     "stopped with broken XML elsewhere": [{"answer": STOPPED | {"error": ["/etc/passwd", 1, 0]}}],
     "stopped at no place": [READ, {"answer": STOPPED | {"error": [1, 2, 3], "at": ["r.xacro"]}}],
-    "stopped in half a macro": [READ, {"answer": STOPPED | {"macros": [["a"], [None, None], ["a", "/etc/passwd"]]}}],
+    "stopped in half a macro": [
+        READ,
+        {"answer": STOPPED | {"macros": [["a"], [None, None], ["a", "/etc/passwd"]]}},
+    ],
     "stopped for a long reason": [READ, {"answer": STOPPED | {"reason": "x" * 1_000_000}}],
     "an unknown kind": [READ, {"answer": STOPPED | {"kind": "whatever"}}],
     "a secret": [{"read": "/etc/passwd"}, {"read": "r.xacro"}, {"answer": OF_FILE}],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("lines", HOSTILE.values(), ids=HOSTILE)
@@ -287,7 +307,7 @@ def test_a_process_that_was_taken_over_shows_no_other_file(
         part_of("parts: {arm: {xacro: r.xacro, prefix: a_, parent: base_link}}")
     main(["lint", "robot.yaml" if of_part else "r.xacro"])
     printed = capsys.readouterr()
-    assert SECRET not in printed.out + printed.err
+    assert HIDDEN not in printed.out + printed.err
     assert "Traceback" not in printed.err
 
 
@@ -314,12 +334,15 @@ sys.exit(main(sys.argv[3:]))
     ("numbers", "missing"),
     [("444", ["Landlock"]), ("317", ["seccomp"]), ("444,317", ["Landlock", "seccomp"])],
 )
-def test_what_the_kernel_does_not_have_is_said_once(numbers: str, missing: list[str]) -> None:
+def test_what_the_kernel_does_not_have_is_reported_once(numbers: str, missing: list[str]) -> None:
     files = [write(file=f"{name}.xacro") for name in "ab"]
     done = subprocess.run(
         [sys.executable, "-c", OLDER, numbers, ":".join(sys.path), "lint", *files],
-        check=False, capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert done.returncode == 0, done.stderr
     lines = [line for line in done.stderr.splitlines() if "TF923" in line]
     assert [

@@ -17,6 +17,7 @@ import yaml
 from tests.support.bringups import compiled, import_of, places, printed_errors, started_with
 from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
+from tfcompose.foundation import confined
 from tfcompose.spec.load import load
 from tfcompose.tools.importers import launch
 from tfcompose.tools.importers import launch_actions as actions
@@ -1082,7 +1083,7 @@ def test_a_launch_file_that_aborts_is_not_called_slow(
 def test_a_launch_file_without_end_is_ended(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(launch, "_MOST_WALL_S", 3.0)
+    monkeypatch.setattr(confined, "MOST_WALL_S", 3.0)
     assert main(["import", str(source(tmp_path, "endless.launch.py", text))]) == 1
     assert "endless.launch.py" in printed_errors(capsys)
 

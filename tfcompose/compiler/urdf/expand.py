@@ -18,9 +18,10 @@ from xml.sax.saxutils import quoteattr
 
 from tfcompose.compiler.urdf.xacro import NAMESPACE, Expansion, macros_in
 from tfcompose.foundation import confined
-from tfcompose.foundation.confined import Outcome, fits, run_confined
+from tfcompose.foundation.confined import Outcome, run_confined
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
 from tfcompose.foundation.reach import OutsideError, Reach, is_package
+from tfcompose.foundation.shape import fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping

@@ -1,7 +1,4 @@
-"""Launch files as a draft of a robot file.
-
-Read in a process of their own, and put into the language's words.
-"""
+"""Launch files as a draft of a robot file: read in a process of their own, and put into the language's words."""
 
 from __future__ import annotations
 
@@ -17,14 +14,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation import confined
-from tfcompose.foundation.confined import Outcome, fits, run_confined
+from tfcompose.foundation.confined import Outcome, run_confined
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import Reach
+from tfcompose.foundation.shape import fits
 from tfcompose.model.process_keys import (
     EXTRA_ARGUMENTS,
     PROCESS_KEYS,
     Folder,
+    KeywordKind,
     Seconds,
     launch_keywords,
 )
@@ -51,7 +50,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from tfcompose.model.files import Target
-    from tfcompose.model.process_keys import KeywordKind
     from tfcompose.tools.importers.draft import Draft
 
 #: The module that reads launch files, confined.
@@ -96,9 +94,7 @@ class Launch:
 
 
 def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
-    """Add what a launch file starts to the draft.
-
-    Return what its robot_state_publishers are given.
+    """Add what a launch file starts to the draft; return what its robot_state_publishers are given.
 
     Raises:
         RejectedError: if it is no launch file, or takes too long or too much memory.
@@ -121,7 +117,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
 
 
 def _read(draft: Draft, launch: Launch) -> dict[str, Any]:
-    """Return what ROS's launch records of the file, or else the stand-in.
+    """Return what ROS's launch records of the file where it is installed, what the stand-in does elsewhere.
 
     Raises:
         RejectedError: if neither can read it.
@@ -150,10 +146,7 @@ def _is_of_ros1(answer: dict[str, Any]) -> bool:
 
 
 def has_launch() -> bool:
-    """Return whether ROS's launch can be imported.
-
-    Folders of that name are often near launch files, and are not it.
-    """
+    """Return whether ROS's launch can be imported: folders of that name are often near launch files, and are not it."""
     several = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
     return all(spec is not None and spec.origin is not None for spec in several)
 
@@ -195,23 +188,20 @@ def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, A
 
 _NUMBER, _OPTIONAL = (int, float), (str, None)
 _SCALAR = (str, bool, int, float, None)
+_PARAMETERS = [(str, {"*": (*_SCALAR, [_SCALAR])})]
 _AT: dict[str, Any] = {"at": [(str, int)], "when?": [str], "only_when?": str}
-#: What a keyword of launch's holds, by its kind.
 _KINDS: dict[KeywordKind, Any] = {
-    "text": str,
-    "switch": bool,
-    "number": _NUMBER,
-    "output": (str, [str], None),
-    "shutdown": bool,
-}
-_KEYWORDS = {f"{keyword.name}?": _KINDS[keyword.kind] for keyword in launch_keywords(*_KINDS)}
-_COMMON = _AT | _KEYWORDS | {
+    "text": str, "switch": bool, "number": _NUMBER, "output": (str, [str]), "shutdown": bool,
+    "parameters": _PARAMETERS,
+}  # fmt: skip
+_COMMON = _AT | {
     "id": (str, int), "env": {"*": str}, "period": _NUMBER, "after": {"*": str}, "shell?": bool,
     "only_env?": bool,
+    **{f"{keyword.name}?": _KINDS[keyword.kind] for keyword in launch_keywords(*_KINDS)},
 }  # fmt: skip
 _OF_NODE = {
-    "package": _OPTIONAL, "name": _OPTIONAL, "namespace": _OPTIONAL,
-    "params": [(str, {"*": (*_SCALAR, [_SCALAR])})], "remap": [[str]],
+    "package": _OPTIONAL, "name": _OPTIONAL, "namespace": _OPTIONAL, "params": _PARAMETERS,
+    "remap": [[str]],
 }  # fmt: skip
 _NODE = _COMMON | _OF_NODE | {
     "executable": str, "label": _OPTIONAL, "argv": [str], "lifecycle?": _OPTIONAL, "ros1?": bool,
@@ -223,8 +213,8 @@ _RECORDS: dict[str, Any] = {
     "process": _COMMON | {"argv": [str], "label": _OPTIONAL},
     "component": _AT | _OF_NODE | {
         "id": (str, int), "container": _OPTIONAL, "plugin": str, "period": _NUMBER,
-        "after": {"*": str},
-    } | {keyword.name: [Any] for keyword in launch_keywords("parameters")},
+        "after": {"*": str}, "extra_arguments?": _PARAMETERS,
+    },
     "include": _AT | {
         "file": str, "args": {"*": str}, "namespace": _OPTIONAL, "env": {"*": str},
         "period": _NUMBER, "after": {"*": str},
@@ -244,14 +234,14 @@ _PAIR = 2
 
 def _is_record(record: dict[str, Any]) -> bool:
     """Return whether a record has what its kind has, whoever sent it."""
-    names = ["period", *(keyword.name for keyword in launch_keywords("number"))]
-    numbers = [record.get(name, 0) for name in names]
+    counts = [record.get(keyword.name, 0) for keyword in launch_keywords("number")]
     at = record.get("at")
     return (
         fits(record, _RECORDS.get(record["kind"]))
         and (at == [] or [type(part) for part in at or ()] == [str, int])
         and all(len(rule) == _PAIR for rule in record.get("remap", ()))
-        and all(abs(value) <= _LARGEST for value in numbers)
+        and abs(record.get("period", 0)) <= _LARGEST
+        and all(isinstance(value, float) or abs(value) <= _LARGEST for value in counts)
     )
 
 
@@ -327,10 +317,7 @@ class _Work:
             self.draft.todo(record["text"], span)
 
     def finish(self, decided: list[str]) -> None:
-        """Add what depends on all records.
-
-        ``decided`` are arguments whose values stand in what was added.
-        """
+        """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
         self._args({*decided, *self._read})
         self._into_containers()
         started = self.draft.started()
@@ -452,10 +439,7 @@ class _Work:
             self._delays.append((name, record["period"]))
 
     def _component(self, record: dict[str, Any], span: Span) -> None:
-        """Add a node that a container loads.
-
-        That of a stock publisher's class is what its program is.
-        """
+        """Add a node that a container loads; that of a stock publisher's class is what its program is."""
         plugin = record["plugin"]
         if plugin in _PUBLISHERS:
             words = static_words(record["params"]) if plugin == STATIC_PLUGIN else []
@@ -468,10 +452,7 @@ class _Work:
         self._components.append((name, record["container"], span))
 
     def _into_containers(self) -> None:
-        """Let components name their containers.
-
-        One that the launch file does not start runs already.
-        """
+        """Let components name their containers; one that the launch file does not start runs already."""
         for name, wanted, span in self._components:
             if wanted not in self._containers:
                 namespace, _, node = wanted.strip("/").rpartition("/")
@@ -518,10 +499,7 @@ class _Work:
         )  # fmt: skip
 
     def _is_container(self, record: dict[str, Any]) -> bool:
-        """Return whether a node loads components.
-
-        By its program, or because some are loaded into it.
-        """
+        """Return whether a node loads components: by its program, or because some are loaded into it."""
         if record["kind"] != "node":
             return False
         is_stock = record["package"] == CONTAINERS and record["executable"].startswith(
@@ -689,7 +667,7 @@ def _seconds(value: float) -> Bare:
 
 
 def _without_texts(word: str, todo: list[str]) -> str:
-    """Return a command's word with files in place of xacro output and file texts."""
+    """Return a word of a command in which files stand for what xacro makes of them, or for their texts."""
     plain, files = without_marks(word)
     todo += [
         f"an argument is what is made of {shown(file)}, or its text: here it is the file's name"

@@ -13,8 +13,10 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
+import logging
 import os
 import sys
+import tempfile
 import types
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -22,6 +24,7 @@ from xml.etree import ElementTree as ET
 
 import launch
 import launch.frontend
+import launch.logging
 import launch_ros.descriptions
 import launch_xml.parser
 import launch_yaml.parser
@@ -116,10 +119,7 @@ class RecordingContext(launch.LaunchContext, Context):  # type: ignore[misc]
 
 
 def _here() -> tuple[str, int]:
-    """Return where a launch file makes something.
-
-    The line of a program, or that of the entity that is parsed.
-    """
+    """Return where a launch file makes something: the line of a program, or that of the entity that is parsed."""
     return place() if not _PLACES or place()[0] else _PLACES[-1]
 
 
@@ -170,7 +170,13 @@ def _classes() -> Iterator[type]:
 
 
 def attach() -> None:
-    """Let launch's classes keep what the recorder needs, and start nothing."""
+    """Let launch's classes keep what the recorder needs, and record instead of starting anything.
+
+    Nothing is logged: launch would make a folder for its log, which it may not.
+    """
+    config = launch.logging.launch_config
+    config.log_dir = tempfile.gettempdir()
+    config.log_handler_factory = lambda *_args, **_kwargs: logging.NullHandler()
     for kind in _classes():
         if kind.__init__ is not object.__init__:  # type: ignore[misc]
             _keep(kind)
@@ -316,10 +322,7 @@ def _reason(error: BaseException) -> str:
 
 
 def converted(value: Any) -> Any:
-    """Return the stand-in's counterpart of what launch was given.
-
-    Of objects, and of lists and mappings of them.
-    """
+    """Return the stand-in's counterpart of what launch was given: of objects, and of lists and mappings of them."""
     if isinstance(value, (str, int, float, bool, os.PathLike)) or value is None:
         return value
     if isinstance(value, Mapping):
@@ -385,10 +388,7 @@ def _name(name: str) -> str:
 
 
 class _Own(actions.Action):
-    """An action that launch does itself, or that is another package's.
-
-    What it gives is visited.
-    """
+    """An action that launch does itself, or that is another package's: what it gives is visited."""
 
     def __init__(self, action: Any) -> None:
         super().__init__()
@@ -460,10 +460,7 @@ def _event(value: Any, name: str, args: Any, kwargs: Any) -> Any:
 
 
 def as_substitution(stand_in: type) -> type:
-    """Return a substitution of launch's whose counterpart is that one.
-
-    For packages that are not installed.
-    """
+    """Return a substitution of launch's whose counterpart is that one: for packages that are not installed."""
     kind = type(
         stand_in.__name__,
         (launch.Substitution,),

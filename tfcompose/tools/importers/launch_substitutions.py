@@ -21,6 +21,7 @@ from typing import Any
 
 import yaml
 
+from tfcompose.foundation.shape import fits
 from tfcompose.tools.importers.yaml_text import argument, arguments_in, with_values
 
 #: What stands for the text of a file, or for what xacro makes of one: JSON between two characters
@@ -49,7 +50,16 @@ def marked(**what: Any) -> str:
 
 def marks(text: str) -> list[dict[str, Any]]:
     """Return what stands in a text for descriptions."""
-    return [json.loads(found[1]) for found in _MARK.finditer(text)]
+    return [mark for found in _MARK.finditer(text) if (mark := _mark_in(found[1]))]
+
+
+def _mark_in(text: str) -> dict[str, Any]:
+    """Return a file and its arguments, or nothing if a text of somebody else's only looks so."""
+    try:
+        mark = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return mark if fits(mark, {"file": str, "args": {"*": str}}) else {}
 
 
 def symbolic_text(value: Any, context: Context) -> str:
@@ -217,9 +227,8 @@ def plain(value: Any) -> str:
 
 def without_marks(text: str) -> tuple[str, list[str]]:
     """Return a text with the names of files for what stands for their texts, and these names."""
-    return _MARK.sub(lambda found: str(json.loads(found[1])["file"]), text), [
-        one["file"] for one in marks(text)
-    ]
+    plain_text = _MARK.sub(lambda found: _mark_in(found[1]).get("file", found[0]), text)
+    return plain_text, [mark["file"] for mark in marks(text)]
 
 
 def shown(text: str) -> str:

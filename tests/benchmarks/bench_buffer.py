@@ -114,15 +114,18 @@ def intake() -> float:
         encode(
             [
                 Transform(
-                    START + step * S // HZ, f"parent_of_link_{first + index}", f"link_{first + index}",
-                    (0.1 * step, 0.2, 0.3), (0.0, 0.0, math.sin(0.01 * step), math.cos(0.01 * step)),
+                    START + step * S // HZ,
+                    f"parent_of_link_{first + index}",
+                    f"link_{first + index}",
+                    (0.1 * step, 0.2, 0.3),
+                    (0.0, 0.0, math.sin(0.01 * step), math.cos(0.01 * step)),
                 )
                 for index in range(100)
             ]
         )
         for step in range((warm_s + seconds) * HZ)
         for first in range(0, 1000, 100)
-    ]  # fmt: skip
+    ]
     buffer, decoder = Buffer(), Decoder()
     warm = warm_s * HZ * 10
     for data in messages[:warm]:

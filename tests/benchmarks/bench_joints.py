@@ -77,11 +77,18 @@ def plan_file(folder: Path, joints: int) -> Path:
     """Write the plan of a robot with so many joints."""
     edges = tuple(
         PlanEdge(
-            f"link_{n}", f"link_{n + 1}", "joint", "joints", "/rover/joints", Pose((0.1, 0.0, 0.2)), None,
-            SourceLine("r", 1), Joint(f"joint_{n}", "revolute", (0.0, 0.0, 1.0)),
+            f"link_{n}",
+            f"link_{n + 1}",
+            "joint",
+            "joints",
+            "/rover/joints",
+            Pose((0.1, 0.0, 0.2)),
+            None,
+            SourceLine("r", 1),
+            Joint(f"joint_{n}", "revolute", (0.0, 0.0, 1.0)),
         )
         for n in range(joints)
-    )  # fmt: skip
+    )
     processes = (PlanProcess("joints", "joints", nodes=("/rover/joints",)),)
     file = folder / "plan.json"
     file.write_text(

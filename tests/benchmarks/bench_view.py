@@ -200,8 +200,9 @@ def page_bytes() -> int:
         for file in ROVER.parent.glob("*.yaml"):
             subprocess.run(
                 [sys.executable, "-m", "tfcompose", "view", str(file), "--html", str(page)],
-                check=True, capture_output=True,
-            )  # fmt: skip
+                check=True,
+                capture_output=True,
+            )
             sizes.append(page.stat().st_size)
         return max(sizes)
 

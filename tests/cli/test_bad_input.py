@@ -151,8 +151,10 @@ def test_output_that_cannot_be_saved_is_one_sentence(folder: Path) -> None:
     with Path("/dev/full").open("w") as full:
         done = processes.run(
             [sys.executable, "-m", "tfcompose", "tree", str(ROBOTS / "my_robot.yaml")],
-            cwd=folder, stdout=full, stderr=subprocess.PIPE,
-        )  # fmt: skip
+            cwd=folder,
+            stdout=full,
+            stderr=subprocess.PIPE,
+        )
     assert done.returncode == 2
     assert done.stderr.startswith("tfcompose: ")
     assert os.strerror(errno.ENOSPC) in done.stderr
@@ -167,8 +169,10 @@ def test_a_reader_that_goes_away_causes_no_traceback(words: tuple[str, ...]) -> 
     with os.fdopen(writer, "w") as gone:
         done = processes.run(
             [sys.executable, "-m", "tfcompose", *words],
-            cwd=ROBOTS.parent, stdout=gone, stderr=subprocess.PIPE,
-        )  # fmt: skip
+            cwd=ROBOTS.parent,
+            stdout=gone,
+            stderr=subprocess.PIPE,
+        )
     assert (done.returncode, done.stderr) == (141, "")
 
 

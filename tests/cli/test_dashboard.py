@@ -88,9 +88,18 @@ def dashboard(count: int = 3, edges: int = 2, **changes: object) -> Dashboard:
     states = [replace(RUNNING, name=name, pid=100 + number) for number, name in enumerate(names)]
     states[0] = replace(states[0], edges=edges, live=edges)
     status = RobotStatus(
-        robot="rover", host=None, launcher=99, plan="", uptime=3725.0, complete=True, ready=True, stopping=False,
-        missing=(), silent=(), processes=tuple(states),
-    )  # fmt: skip
+        robot="rover",
+        host=None,
+        launcher=99,
+        plan="",
+        uptime=3725.0,
+        complete=True,
+        ready=True,
+        stopping=False,
+        missing=(),
+        silent=(),
+        processes=tuple(states),
+    )
     plan = Plan(
         "rover",
         "",

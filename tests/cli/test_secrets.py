@@ -81,9 +81,10 @@ def test_lines_of_a_robots_own_files_are_shown(name: str, tmp_path: Path) -> Non
     robot = "tfcompose: 1\nrobot: r\ninclude: [more.yaml]\nlinks: {base_link: {}}\n"
     robot += "parts: {a: {urdf: part.urdf, parent: base_link}}\n"
     texts = {
-        "robot.yaml": robot, "more.yaml": "frames: {eye: {parent: base_link}}\n",
+        "robot.yaml": robot,
+        "more.yaml": "frames: {eye: {parent: base_link}}\n",
         "part.urdf": "<robot name='p'><link name='l'/></robot>\n",
-    }  # fmt: skip
+    }
     faults = {"robot.yaml": "lnks: {}\n", "more.yaml": "sensrs: {}\n", "part.urdf": "<x"}
     for file, text in texts.items():
         (tmp_path / file).write_text(text + faults[file] * (file == name), "utf-8")

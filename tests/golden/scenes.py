@@ -733,8 +733,12 @@ def fleets() -> Iterator[Finding]:
         EdgeStatus("r1/odom", f"r1/{age}", age, delay, stale) for age, delay, stale in ages
     )
     states: list[tuple[LinkState, float | None]] = [
-        ("unreachable", None), ("unreachable", 4.0), ("stale", 4.0), ("silent", None), ("live", 0.1)
-    ]  # fmt: skip
+        ("unreachable", None),
+        ("unreachable", 4.0),
+        ("stale", 4.0),
+        ("silent", None),
+        ("live", 0.1),
+    ]
     with mock.patch.multiple(fleet, find_spec=lambda _: None, reject=_rejected):
         yield from _refused(fleet.refuse_without_zenoh)
     for state, age in states:

@@ -56,12 +56,31 @@ CALIBRATIONS = [
 
 #: Values as --set gives them, laid over robots/autonomous_robot.yaml.
 SETTINGS = (
-    "vars.mast=40 cm", "vars.mast=40 kg", "vars.mast=", "vars.mst=1", "frames.odom.rate=0", "frames.odom=null",
-    "frames=", "sensors.camera.options.streams=[color]", "sensors.camera.options.streams=color",
-    "sensors.camera.preset=realsense/d435", "sensors.camera.preset=realsense/d43", "robot=Robot", "tfcompose=2",
-    "links.base_link.inertial.mass=-1", "a", "=", "a..b=1", "links.base_link.visual.0.box=[1, 1]", "guard.mode=on",
-    "ros.domain_id=7.5", "base=odom", "profiles.x={}", "x={", "gaurd={}",
-)  # fmt: skip
+    "vars.mast=40 cm",
+    "vars.mast=40 kg",
+    "vars.mast=",
+    "vars.mst=1",
+    "frames.odom.rate=0",
+    "frames.odom=null",
+    "frames=",
+    "sensors.camera.options.streams=[color]",
+    "sensors.camera.options.streams=color",
+    "sensors.camera.preset=realsense/d435",
+    "sensors.camera.preset=realsense/d43",
+    "robot=Robot",
+    "tfcompose=2",
+    "links.base_link.inertial.mass=-1",
+    "a",
+    "=",
+    "a..b=1",
+    "links.base_link.visual.0.box=[1, 1]",
+    "guard.mode=on",
+    "ros.domain_id=7.5",
+    "base=odom",
+    "profiles.x={}",
+    "x={",
+    "gaurd={}",
+)
 
 
 def within(

@@ -117,21 +117,45 @@ NOTICES: tuple[Notice, ...] = (
 
 def process(name: str, state: str, **more: object) -> ProcessStatus:
     known: dict[str, object] = {
-        "kind": "run", "host": None, "detail": "", "required": None, "failed": False, "ready": True, "waits": "",
-        "seen": "", "pid": None, "uptime": None, "restarts": 0, "edges": 0, "live": 0, "nodes": (),
-    }  # fmt: skip
+        "kind": "run",
+        "host": None,
+        "detail": "",
+        "required": None,
+        "failed": False,
+        "ready": True,
+        "waits": "",
+        "seen": "",
+        "pid": None,
+        "uptime": None,
+        "restarts": 0,
+        "edges": 0,
+        "live": 0,
+        "nodes": (),
+    }
     return ProcessStatus(name=name, state=state, **{**known, **more})  # type: ignore[arg-type]
 
 
 STATUS = RobotStatus(
-    "rover", None, 5, "0", 75.0, complete=False, ready=False, stopping=False, missing=(), silent=(), processes=(
+    "rover",
+    None,
+    5,
+    "0",
+    75.0,
+    complete=False,
+    ready=False,
+    stopping=False,
+    missing=(),
+    silent=(),
+    processes=(
         process("static", "running", pid=7_000_001, uptime=75.0, edges=2, live=2),
         process("slam", "running", pid=7_000_002, uptime=4000.0, edges=1, ready=False),
         process("nav", "stopped", waits="waits for slam to be ready"),
-        process("camera", "fatal", detail="exit code 1, after 5 restarts", failed=True, restarts=5),
+        process(
+            "camera", "fatal", detail="exit code 1, after 5 restarts", failed=True, restarts=5
+        ),
         process("arm", "expected", host="jetson", edges=1),
     ),
-)  # fmt: skip
+)
 
 
 def buffer_errors() -> str:

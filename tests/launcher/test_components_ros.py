@@ -456,9 +456,16 @@ processes:
 """
 
 
-@pytest.mark.skipif(not shutil.which("component_container_isolated", path=os.pathsep.join(
-    f"{prefix}/lib/rclcpp_components" for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-)), reason="rclcpp_components comes with a distribution only")  # fmt: skip
+@pytest.mark.skipif(
+    not shutil.which(
+        "component_container_isolated",
+        path=os.pathsep.join(
+            f"{prefix}/lib/rclcpp_components"
+            for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+        ),
+    ),
+    reason="rclcpp_components comes with a distribution only",
+)
 @pytest.mark.usefixtures("domain")
 def test_the_containers_of_rclcpp_components_load_a_component(tmp_path: Path) -> None:
     notices = run(tmp_path, STOCK, are_ready)

@@ -55,9 +55,17 @@ _LIBRARIES = (
     "rosidl_typesupport_fastrtps_cpp",
     "fastcdr",
     "rmw",
-    *(f"{package}__{kind}" for package in ("rcl_interfaces", "service_msgs") for kind in (
-        "rosidl_generator_c", "rosidl_generator_py", "rosidl_typesupport_c", "rosidl_typesupport_fastrtps_c")),
-)  # fmt: skip
+    *(
+        f"{package}__{kind}"
+        for package in ("rcl_interfaces", "service_msgs")
+        for kind in (
+            "rosidl_generator_c",
+            "rosidl_generator_py",
+            "rosidl_typesupport_c",
+            "rosidl_typesupport_fastrtps_c",
+        )
+    ),
+)
 
 
 def can_build() -> bool:

@@ -37,8 +37,16 @@ SSHD = shutil.which("sshd", path="/usr/sbin:/sbin:/usr/bin")
 SHIFTED = "import time\n_time = time.time\ntime.time = lambda: _time() + 2\n"
 #: What a computer has of its own; nothing of it outlives the process, nor that who started it.
 _NAMESPACES = (
-    "unshare", "--net", "--pid", "--mount", "--uts", "--ipc", "--fork", "--kill-child", "--mount-proc",
-)  # fmt: skip
+    "unshare",
+    "--net",
+    "--pid",
+    "--mount",
+    "--uts",
+    "--ipc",
+    "--fork",
+    "--kill-child",
+    "--mount-proc",
+)
 #: Makes the namespaces, and says so on standard output; then becomes sshd, or whatever it is
 #: given.
 _INIT = """
@@ -216,8 +224,12 @@ class Computers:
             script = _INIT.format(more=more, number=random.randrange(1000, 30000))
             process = subprocess.Popen(
                 [*namespaces, "sh", "-c", script, "sh", *words],
-                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, start_new_session=True, text=True,
-            )  # fmt: skip
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                start_new_session=True,
+                text=True,
+            )
         assert process.stdout is not None
         line = process.stdout.readline()
         if computer is not None:

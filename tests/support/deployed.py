@@ -34,19 +34,38 @@ processes:
 #: The same, with processes that run nowhere.
 NOWHERE = ROBOT.replace("static: {host: main}", "static: {}").replace("main: {}, ", "")
 PROBE: dict[str, Any] = {
-    "python": "3.12.3", "tfcompose": "0.1.0", "executable": "/usr/bin/python3", "problems": [], "env": {},
-    "machine": "a", "lingers": True, "zenoh": True, "base": "/home/pi/.local/share/tfcompose/x", "setup": [],
-}  # fmt: skip
+    "python": "3.12.3",
+    "tfcompose": "0.1.0",
+    "executable": "/usr/bin/python3",
+    "problems": [],
+    "env": {},
+    "machine": "a",
+    "lingers": True,
+    "zenoh": True,
+    "base": "/home/pi/.local/share/tfcompose/x",
+    "setup": [],
+}
 RUNNING: dict[str, Any] = {"missing": [], "silent": [], "processes": [], "launcher": 7}
 LATE: dict[str, Any] = {
-    "name": "arm_drive", "kind": "simulate", "failed": False, "ready": False, "detail": "", "waits": "",
+    "name": "arm_drive",
+    "kind": "simulate",
+    "failed": False,
+    "ready": False,
+    "detail": "",
+    "waits": "",
     "state": "running",
-}  # fmt: skip
+}
 STATUS: dict[str, Any] = {"robot": RUNNING, "failed": False, "lines": []}
 STATE: dict[str, Any] = {
-    "release": "before", "previous": None, "files": {}, "unit": None, "active": True, "enabled": True, "stranger": None,
+    "release": "before",
+    "previous": None,
+    "files": {},
+    "unit": None,
+    "active": True,
+    "enabled": True,
+    "stranger": None,
     "unsettled": False,
-}  # fmt: skip
+}
 
 
 @dataclass
@@ -64,9 +83,13 @@ class StandInHost:
         del timeout_s
         self.requests.append(request)
         usual: dict[str, Any] = {
-            "state": STATE | STATUS, "take_lock": {"holder": None}, "rehearse": [], "wait": STATUS, "texts": {},
+            "state": STATE | STATUS,
+            "take_lock": {"holder": None},
+            "rehearse": [],
+            "wait": STATUS,
+            "texts": {},
             "back": {"release": "before", "active": True},
-        }  # fmt: skip
+        }
         answer = self.answers.get(request, usual.get(request))
         if isinstance(answer, (LostError, RefusedError)):
             raise answer

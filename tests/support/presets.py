@@ -26,4 +26,4 @@ WRONG_IN_MAST = (
     ("rpy: [-90 deg", "look: up, rpy: [-90 deg"),
     ("frames:\n", "driver: {package: p, node: n}\nframes:\n"),
     ("frames:\n", 'body: {frame: "{name}_case", shape: {box: [1, 1, 1]}}\nframes:\n'),
-)  # fmt: skip
+)

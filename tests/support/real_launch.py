@@ -41,18 +41,29 @@ def record_loaded(action: Any, requests: list[Any], _context: Any) -> None:
             {one.name: parameter_value_to_python(one.value) for one in several}
             for several in (one.parameters, one.extra_arguments)
         )
-        STARTED.append({
-            "component": f"{one.package_name}/{one.plugin_name}", "container": f"/{container.strip('/')}",
-            "node": f"{one.node_namespace.rstrip('/')}/{one.node_name}", "extra_arguments": extra,
-            "remap": dict(reversed([rule.split(":=", 1) for rule in one.remap_rules])),  # the first one counts
-            "params": {name: list(value) if isinstance(value, array) else value for name, value in values.items()},
-        })  # fmt: skip
+        STARTED.append(
+            {
+                "component": f"{one.package_name}/{one.plugin_name}",
+                "container": f"/{container.strip('/')}",
+                "node": f"{one.node_namespace.rstrip('/')}/{one.node_name}",
+                "extra_arguments": extra,
+                "remap": dict(
+                    reversed([rule.split(":=", 1) for rule in one.remap_rules])
+                ),  # the first one counts
+                "params": {
+                    name: list(value) if isinstance(value, array) else value
+                    for name, value in values.items()
+                },
+            }
+        )
 
 
 def executable(substitution: Any, context: Any) -> str:
     """Return the package and the program: they need not be installed."""
-    package, program = ("".join(map(context.perform_substitution, one)) for one in (
-        substitution.package, substitution.executable))  # fmt: skip
+    package, program = (
+        "".join(map(context.perform_substitution, one))
+        for one in (substitution.package, substitution.executable)
+    )
     return f"{package}/{program}"
 
 

@@ -51,8 +51,9 @@ def write_robot(folder: Path, *lines: str) -> None:
 
 def findings(done: subprocess.CompletedProcess[str]) -> list[str]:
     """Return the findings that were printed: place and code."""
-    found = re.findall(r"^(?:(\S+:\d+:\d+): )?(?:error|warning)\[(\w+)\]",
-                       done.stdout + done.stderr, re.MULTILINE)  # fmt: skip
+    found = re.findall(
+        r"^(?:(\S+:\d+:\d+): )?(?:error|warning)\[(\w+)\]", done.stdout + done.stderr, re.MULTILINE
+    )
     return [f"{place} {code}".strip() for place, code in found]
 
 
@@ -85,8 +86,12 @@ def test_its_section_is_validated_at_its_places(run: Run, tmp_path: Path) -> Non
 def test_its_section_is_merged_like_every_other_and_adds_its_process(
     run: Run, tmp_path: Path
 ) -> None:
-    write_robot(tmp_path, "acme: {frame: mast}", "profiles: {loud: {acme: {reach: 3 m}}}",
-                "processes: {beeper: {env: {LOUD: very}}}")  # fmt: skip
+    write_robot(
+        tmp_path,
+        "acme: {frame: mast}",
+        "profiles: {loud: {acme: {reach: 3 m}}}",
+        "processes: {beeper: {env: {LOUD: very}}}",
+    )
     assert run("build", "-p", "loud", "-o", "built").returncode == 0
     plan = json.loads((tmp_path / "built/plan.json").read_text())
     (beeper,) = (process for process in plan["processes"] if process["name"] == "beeper")

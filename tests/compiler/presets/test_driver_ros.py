@@ -187,14 +187,28 @@ def test_a_driver_that_does_as_its_preset_says_is_let_alone(
 @pytest.mark.parametrize(
     ("options", "environment", "code", "names"),
     [
-        (f"{EVERYTHING}}}, tf: tfcompose", {"STAND_IN_IGNORES": "1"}, "TF801", ("publish_tf: false", "front (realse")),
-        ("streams: [depth]}, tf: driver", {"STAND_IN_ALSO": "infra1"}, "TF803", ("front_infra1", "sensors.front")),
+        (
+            f"{EVERYTHING}}}, tf: tfcompose",
+            {"STAND_IN_IGNORES": "1"},
+            "TF801",
+            ("publish_tf: false", "front (realse"),
+        ),
+        (
+            "streams: [depth]}, tf: driver",
+            {"STAND_IN_ALSO": "infra1"},
+            "TF803",
+            ("front_infra1", "sensors.front"),
+        ),
         (  # an infra2 that is 4.5 cm further to the right is that of a D455
             f"{EVERYTHING}}}, tf: driver",
             {"STAND_IN_OFF": "infra2_frame:-0.045"},
             "TF828",
             (
-                "front_infra2_frame", "front_link", " 46.", "xyz 0.0004 -0.0962 0.0003 m", "xyz 0 -0.05 0 m",
+                "front_infra2_frame",
+                "front_link",
+                " 46.",
+                "xyz 0.0004 -0.0962 0.0003 m",
+                "xyz 0 -0.05 0 m",
                 "sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962, 0.0003]",
             ),
         ),
@@ -210,10 +224,22 @@ def test_a_driver_that_does_as_its_preset_says_is_let_alone(
             "TF829",
             ("publish_tf: true", "publish_tf: false", "front (realsense/d435i)"),
         ),
-        (f"{EVERYTHING}}}, tf: driver", {"STAND_IN_LACKS": "publish_tf"}, "TF829", ("publish_tf",)),
+        (
+            f"{EVERYTHING}}}, tf: driver",
+            {"STAND_IN_LACKS": "publish_tf"},
+            "TF829",
+            ("publish_tf",),
+        ),
     ],
-    ids=["ignores its switch", "another stream", "a nominal frame", "an exact frame", "forces", "lacks"],
-)  # fmt: skip
+    ids=[
+        "ignores its switch",
+        "another stream",
+        "a nominal frame",
+        "an exact frame",
+        "forces",
+        "lacks",
+    ],
+)
 def test_a_driver_that_does_otherwise_is_named_once(
     up: Callable[..., Up],
     options: str,

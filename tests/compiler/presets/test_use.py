@@ -233,14 +233,23 @@ def test_the_l515_has_its_imu_on_colour_by_its_description_and_on_the_link_by_it
 
 
 def test_who_publishes_is_by_default_as_the_vendor_has_it() -> None:
-    owners = {name: edge_of(robot_of(name), frame).owner for name, frame in (
-        ("realsense/d435", "s_depth_frame"), ("ouster/os1", "s_lidar"), ("oak/oak-d", "s_left_camera_frame"),
-        ("orbbec/gemini-335", "s_depth_frame"), ("velodyne/vlp16", "s"),
-    )}  # fmt: skip
+    owners = {
+        name: edge_of(robot_of(name), frame).owner
+        for name, frame in (
+            ("realsense/d435", "s_depth_frame"),
+            ("ouster/os1", "s_lidar"),
+            ("oak/oak-d", "s_left_camera_frame"),
+            ("orbbec/gemini-335", "s_depth_frame"),
+            ("velodyne/vlp16", "s"),
+        )
+    }
     assert owners == {
-        "realsense/d435": "s", "ouster/os1": "s", "oak/oak-d": "static",
-        "orbbec/gemini-335": "s", "velodyne/vlp16": "static",
-    }  # fmt: skip
+        "realsense/d435": "s",
+        "ouster/os1": "s",
+        "oak/oak-d": "static",
+        "orbbec/gemini-335": "s",
+        "velodyne/vlp16": "static",
+    }
 
 
 def test_a_driver_that_does_nothing_until_it_is_active_is_made_active() -> None:

@@ -68,10 +68,23 @@ def autoware(parent: str = "base_link", child: str = "lens") -> str:
 def message(parent: str = "base_link", child: str = "lens", indent: str = "") -> str:
     x, y, z, w = QUAT
     lines = [
-        "header:", "  stamp:", "    sec: 0", "    nanosec: 0", f"  frame_id: {parent}", f"child_frame_id: {child}",
-        "transform:", "  translation:", "    x: 0.12", "    y: -0.34", "    z: 0.56",
-        "  rotation:", f"    x: {x!r}", f"    y: {y!r}", f"    z: {z!r}", f"    w: {w!r}",
-    ]  # fmt: skip
+        "header:",
+        "  stamp:",
+        "    sec: 0",
+        "    nanosec: 0",
+        f"  frame_id: {parent}",
+        f"child_frame_id: {child}",
+        "transform:",
+        "  translation:",
+        "    x: 0.12",
+        "    y: -0.34",
+        "    z: 0.56",
+        "  rotation:",
+        f"    x: {x!r}",
+        f"    y: {y!r}",
+        f"    z: {z!r}",
+        f"    w: {w!r}",
+    ]
     return "".join(f"{indent}{line}\n" for line in lines)
 
 

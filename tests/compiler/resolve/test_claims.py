@@ -81,8 +81,10 @@ def test_unusual_names_are_set_too() -> None:
     }
     done = compiled(**names)
     assert params_of(done, "slam")["/r1/slam"] == {
-        "map_frame": "world", "odom_frame": "local", "base_frame": "base_link",
-    }  # fmt: skip
+        "map_frame": "world",
+        "odom_frame": "local",
+        "base_frame": "base_link",
+    }
     parameters = params_of(done, "ekf")["/r1/ekf"]
     assert (parameters["odom_frame"], parameters["world_frame"]) == ("local", "local")
 
@@ -93,16 +95,28 @@ CONTROL = """  control:
 """
 CLAIMS: dict[str, tuple[str, str, dict[str, Any]]] = {
     CONTROL: ("control", "/r1/diff", {"enable_odom_tf": False, "tf_frame_prefix_enable": False}),
-    "  a: {run: {package: p, executable: e}, node: {preset: amcl}}\n": ("a", "/r1/a", {"tf_broadcast": False}),
-    "  a: {run: {package: p, executable: e}, node: {preset: rtabmap}}\n": ("a", "/r1/a", {"publish_tf": False}),
+    "  a: {run: {package: p, executable: e}, node: {preset: amcl}}\n": (
+        "a",
+        "/r1/a",
+        {"tf_broadcast": False},
+    ),
+    "  a: {run: {package: p, executable: e}, node: {preset: rtabmap}}\n": (
+        "a",
+        "/r1/a",
+        {"publish_tf": False},
+    ),
     "  a: {run: {package: p, executable: e}, publishes: [{parent: odom, child: base_link, off: {x.y: 0}}]}\n": (
-        "a", "/r1/a", {"x.y": 0},
+        "a",
+        "/r1/a",
+        {"x.y": 0},
     ),
     "  a: {run: [a], node: {preset: amcl}}\n": ("a", "/r1/amcl", {"tf_broadcast": False}),
     "  a: {run: [a, '${params_file}'], params: {b: 1}, node: {preset: create3}}\n": (
-        "a", "/r1/robot_state", {"b": 1, "publish_odom_tfs": False},
+        "a",
+        "/r1/robot_state",
+        {"b": 1, "publish_odom_tfs": False},
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("more", CLAIMS)

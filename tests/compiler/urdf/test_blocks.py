@@ -62,10 +62,12 @@ def test_a_rate_of_zero_is_that_of_all_as_ros2_control_reads_it() -> None:
 
 def same(one: ET.Element, other: ET.Element) -> bool:
     texts = [(element.text or "").strip() for element in (one, other)]
-    return (
-        (one.tag, one.attrib, texts[0], len(one)) == (other.tag, other.attrib, texts[1], len(other))
-        and all(same(*pair) for pair in zip(one, other, strict=True))
-    )  # fmt: skip
+    return (one.tag, one.attrib, texts[0], len(one)) == (
+        other.tag,
+        other.attrib,
+        texts[1],
+        len(other),
+    ) and all(same(*pair) for pair in zip(one, other, strict=True))
 
 
 def test_hardware_is_emitted_as_ros2_control_reads_it() -> None:

@@ -84,8 +84,9 @@ def test_twice_in_somebody_elses_xacro_it_is_two_robots_where_they_were_put(
     found, single = expanded(outer), ET.fromstring(files["robot.full.urdf"])  # noqa: S314 (as above)
     links = [str(link.get("name")) for link in single.iter("link") if link.get("name")]
     assert [link.get("name") for link in found.findall("link")] == [
-        "table", *(f"{side}_{link}" for side in ("left", "right") for link in links)
-    ]  # fmt: skip
+        "table",
+        *(f"{side}_{link}" for side in ("left", "right") for link in links),
+    ]
     joints = {joint.get("name"): joint for joint in found.findall("joint")}
     assert len(joints) == len(found.findall("joint")) == 2 * len(single.findall("joint")) + 2
     (first,) = (
@@ -125,9 +126,9 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
     ]
     (gazebo,) = found.findall("gazebo")
     assert gazebo.get("reference") == "left_hand"
-    assert [str(gazebo.findtext(f"plugin/{tag}")).strip() for tag in ("frame", "joint", "text", "cost")] == [
-        "left_base_link", "left_joint", "base_link of joint $(eval 1)", "$5 $$(x)"
-    ]  # fmt: skip
+    assert [
+        str(gazebo.findtext(f"plugin/{tag}")).strip() for tag in ("frame", "joint", "text", "cost")
+    ] == ["left_base_link", "left_joint", "base_link of joint $(eval 1)", "$5 $$(x)"]
     (drive,) = found.findall("transmission")
     assert [one.get("name") for one in drive.iter()] == ["left_drive", "left_joint", "left_motor"]
     assert [mesh.get("filename") for mesh in found.iter("mesh")] == [

@@ -47,8 +47,11 @@ def test_every_process_is_started_by_exactly_one_machine_and_the_guard_by_each(
 def test_what_names_no_host_runs_where_static_does() -> None:
     plan = compiled_plan(NAMED)
     assert {process.name: process.host for process in plan.processes} == {
-        "static": "main", "drive": "main", "arm_drive": "jetson", "guard": None,
-    }  # fmt: skip
+        "static": "main",
+        "drive": "main",
+        "arm_drive": "jetson",
+        "guard": None,
+    }
     assert hosts_of(plan) == ("main", "jetson")
 
 

@@ -49,8 +49,16 @@ MISTAKES = [
     (BASE + "guard: strict\n", "4:8 TF103", "{mode: strict}"),
     (BASE + "rules: {TF999: off}\n", "4:9 TF017", "a code that lint prints"),
     (CAM % "params: {a: 1}", "5:53 TF101", "driver: params:"),
-    (BASE + "parts:\n  arm: {file: arm.yaml, parent: base_link}\n", "5:9 TF101", "spec: arm.yaml urdf: xacro:"),
-    (SHAPE.replace("{box: [1, 1, 1], %s}", "{cylinder: {radius: 1, width: 1}}"), "3:52 TF101", "length"),
+    (
+        BASE + "parts:\n  arm: {file: arm.yaml, parent: base_link}\n",
+        "5:9 TF101",
+        "spec: arm.yaml urdf: xacro:",
+    ),
+    (
+        SHAPE.replace("{box: [1, 1, 1], %s}", "{cylinder: {radius: 1, width: 1}}"),
+        "3:52 TF101",
+        "length",
+    ),
     (BASE + "processes:\n  a: {external: yes}\n", "5:17 TF106", "true"),
     (CAM % "driver: {serial: 1}", "5:62 TF101", "options: {serial:"),
     (CAM % "serial: 1", "5:53 TF101", "options: {serial:"),
@@ -61,7 +69,11 @@ MISTAKES = [
     (FRAME % "quat_wxyz: [1, 0, 0, 0]", "5:29 TF101", "quat_xyzw: w last"),
     (FRAME % "rpy_deg: [0, 90, 0]", "5:29 TF101", "90 deg"),
     (SHAPE.replace("visual: {box: [1, 1, 1], %s}", "box: [1, 1, 1]"), "3:21 TF101", "visual:"),
-    (SHAPE.replace("visual: {box: [1, 1, 1], %s}", "inertial: {mass: 1, ixx: 1}"), "3:41 TF101", "inertia:"),
+    (
+        SHAPE.replace("visual: {box: [1, 1, 1], %s}", "inertial: {mass: 1, ixx: 1}"),
+        "3:41 TF101",
+        "inertia:",
+    ),
     (PROCESS % "package: nav2_amcl", "6:26 TF101", "run: nav2_amcl"),
     (PROCESS % "executable: amcl", "6:26 TF101", "run: amcl"),
     (PROCESS % "preset: ekf", "6:26 TF101", "node: {preset: ekf}"),
@@ -70,11 +82,16 @@ MISTAKES = [
     (PROCESS % "remap: {/cmd_vel: '/cmd vel'}", "6:44 TF106", ""),
     (PROCESS % "remap: {'scan:=front': scan}", "6:34 TF106", ""),
     (
-        BASE + "processes:\n  nav: {run: {package: nav2_bringup, executable: navigation_launch.py}}\n",
+        BASE
+        + "processes:\n  nav: {run: {package: nav2_bringup, executable: navigation_launch.py}}\n",
         "5:50 TF106",
         "launch: nav2_bringup/navigation_launch.py",
     ),
-    (BASE + "processes:\n  joints: {simulate: {joints: sweep}}\n", "5:12 TF101", "name of its own"),
+    (
+        BASE + "processes:\n  joints: {simulate: {joints: sweep}}\n",
+        "5:12 TF101",
+        "name of its own",
+    ),
     (BASE + "namespace: nurse\n", "4:1 TF101", "ros: {namespace: nurse}"),
     (BASE + "use_sim_time: true\n", "4:1 TF101", "ros: {clock: sim}"),
     (BASE + "units: {length: cm}\n", "4:1 TF101", "30 cm"),
@@ -83,7 +100,11 @@ MISTAKES = [
     (FRAME % "tf: driver", "5:29 TF101", "sensors owner"),
     (SHAPE.replace("[1, 1, 1], %s", "{size: [0.2, 0.3, 1]}"), "3:35 TF103", "[0.2, 0.3, 1]"),
     (SHAPE.replace("[1, 1, 1], %s", "{size: 0.2 0.3 1}"), "3:35 TF103", "[0.2, 0.3, 1]"),
-    (SHAPE.replace("box: [1, 1, 1], %s", "cylinder: {radius: 1, height: 1}"), "3:52 TF101", "length"),
+    (
+        SHAPE.replace("box: [1, 1, 1], %s", "cylinder: {radius: 1, height: 1}"),
+        "3:52 TF101",
+        "length",
+    ),
     (SHAPE.replace("box: [1, 1, 1], %s", "sphere: {diameter: 1}"), "3:39 TF101", "radius"),
     (
         BASE.replace("{}}", "{}, lift: {}}")
@@ -106,12 +127,17 @@ MISTAKES = [
     (BASE + "env: {A: b}\n", "4:1 TF101", "env: domain_id:"),
     (BASE + "ros: {use_sim_time: true}\n", "4:7 TF101", "clock: sim"),
     (PROCESS % "after: {a: running}", "6:37 TF106", "started"),
-    (BASE + "frames:\n  base_link: {parent: base_footprint}\n", "5:23 TF203", "frames: {base_footprint: {}}"),
+    (
+        BASE + "frames:\n  base_link: {parent: base_footprint}\n",
+        "5:23 TF203",
+        "frames: {base_footprint: {}}",
+    ),
     (FRAME % "owner: static_transform_publisher", "5:36 TF302", "leave owner out"),
     # owners
     (BASE + "frames:\n  odom: {owner: drive}\n", "5:10 TF102", "owner: drive child"),
     (
-        BASE + "frames:\n  mast: {parent: base_link, owner: node}\nprocesses:\n  a: {external: true, node: node}\n",
+        BASE
+        + "frames:\n  mast: {parent: base_link, owner: node}\nprocesses:\n  a: {external: true, node: node}\n",
         "5:36 TF302",
         "did you mean a",
     ),
@@ -124,9 +150,14 @@ MISTAKES = [
     (PROCESS % "ready: {topic: '/sc an'}", "6:41 TF106", ""),
     # conditions
     (ARG + MAST + "  tip: {parent: mast}\n", "7:17 TF203", "when: ${args.on};"),
-    (ARG + MAST + "  tip: {parent: base_link, relative_to: mast}\n", "7:41 TF203", "when: ${args.on};"),
     (
-        ARG + "  tip: {parent: base_link, owner: drive}\nprocesses: {drive: {when: '${args.on}', external: true}}\n",
+        ARG + MAST + "  tip: {parent: base_link, relative_to: mast}\n",
+        "7:41 TF203",
+        "when: ${args.on};",
+    ),
+    (
+        ARG
+        + "  tip: {parent: base_link, owner: drive}\nprocesses: {drive: {when: '${args.on}', external: true}}\n",
         "6:35 TF302",
         "when: ${args.on};",
     ),
@@ -152,7 +183,11 @@ MISTAKES = [
     (FRAME % "xyz: [30 cmm, 0, 0]", "5:35 TF104", "cm mm"),
     (FRAME % "rate: 1,5 Hz", "5:37 TF006", "point"),
     (FRAME % "xyz: [20 cm 0 10 cm]", "5:34 TF103", "[20 cm, 0, 10 cm]"),
-    (FRAME % "xyz: [0.2, 0, 0.1, 0, 0, 1.57]", "5:34 TF103", "xyz: [0.2, 0, 0.1] rpy: [0, 0, 1.57]"),
+    (
+        FRAME % "xyz: [0.2, 0, 0.1, 0, 0, 1.57]",
+        "5:34 TF103",
+        "xyz: [0.2, 0, 0.1] rpy: [0, 0, 1.57]",
+    ),
     (FRAME % "rpy: {yaw: 90 deg}", "5:34 TF103", "[0, 0, 90 deg]"),
     (FRAME % "xyz: [0, 0, $mast]", "5:41 TF103", '"${mast}"'),
     (FRAME % "xyz: [0, 0, mast]", "5:41 TF103", '"${mast}"'),
@@ -163,13 +198,29 @@ MISTAKES = [
     (BASE + "frames:\n  mast: {parent: base_link}\n  cam {parent: mast}\n", "6:3 TF002", "cam:"),
     (BASE + "frames:\n  mast:{parent: base_link}\n", "5:3 TF002", "mast:"),
     (BASE + "frames\n  mast: {parent: base_link}\n", "4:1 TF002", "frames:"),
-    (BASE + "frames:\n  mast: {parent: base_link}\n   cam: {parent: mast}\n", "6:4 TF002", "column 3"),
+    (
+        BASE + "frames:\n  mast: {parent: base_link}\n   cam: {parent: mast}\n",
+        "6:4 TF002",
+        "column 3",
+    ),
     (BASE + "  frames:\n    mast: {parent: base_link}\n", "4:3 TF002", "column 1"),
     (FRAME % "xyz: [0, 0, ${mast}]", "5:42 TF002", '"${mast}"'),
     (FRAME % "xyz: {${mast}}", "5:36 TF002", '"${mast}"'),
-    (BASE + "frames:\n  mast:\n    parent base_link\n    xyz: [0, 0, 1]\n", "6:5 TF002", "parent: base_link"),
-    (BASE + "frames:\n  mast:\n    parent:base_link\n    xyz: [0, 0, 1]\n", "6:5 TF002", "parent: base_link"),
-    (BASE + "frames:\n  mast:\n    parent: base_link\n      xyz: [0, 0, 1]\n", "7:7 TF002", "column 5"),
+    (
+        BASE + "frames:\n  mast:\n    parent base_link\n    xyz: [0, 0, 1]\n",
+        "6:5 TF002",
+        "parent: base_link",
+    ),
+    (
+        BASE + "frames:\n  mast:\n    parent:base_link\n    xyz: [0, 0, 1]\n",
+        "6:5 TF002",
+        "parent: base_link",
+    ),
+    (
+        BASE + "frames:\n  mast:\n    parent: base_link\n      xyz: [0, 0, 1]\n",
+        "7:7 TF002",
+        "column 5",
+    ),
     ("tfcompose:1\nrobot: r\n", "1:1 TF002", "tfcompose: 1"),
     ("tfcompose: 1\nrobot r\nlinks: {}\n", "2:1 TF002", "robot: r"),
     (BASE + "frames: mast: {parent: base_link}\n", "4:9 TF002", "next line"),
@@ -182,7 +233,7 @@ MISTAKES = [
         "8:15 TF102",
         "cam?",
     ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("case", MISTAKES, ids=lambda case: case[1] + " " + case[2][:20])

@@ -156,10 +156,13 @@ expressions = st.recursive(
     numbers,
     lambda inner: st.builds(
         lambda a, sign, b, brackets: f"({a} {sign} {b})" if brackets else f"{a} {sign} {b}",
-        inner, st.sampled_from("+-*/"), inner, st.booleans(),
+        inner,
+        st.sampled_from("+-*/"),
+        inner,
+        st.booleans(),
     ),
     max_leaves=8,
-)  # fmt: skip
+)
 
 
 @given(expressions)

@@ -20,9 +20,15 @@ def observed(
 
 
 def add(  # noqa: PLR0913 (a stream has that many parts)
-    observer: TreeObserver, *edges: str, late_ms: int = 0, every_ms: int = 100, until_ms: int = 4000, gid: bytes = b"1",
-    static: bool = False, length: float = 1.0,
-) -> None:  # fmt: skip
+    observer: TreeObserver,
+    *edges: str,
+    late_ms: int = 0,
+    every_ms: int = 100,
+    until_ms: int = 4000,
+    gid: bytes = b"1",
+    static: bool = False,
+    length: float = 1.0,
+) -> None:
     """Take each edge, "parent child", regularly from second 1 on, with stamps that are late."""
     for at_ms in range(1000, until_ms + 1, every_ms):
         stamp = divmod((at_ms - late_ms) * MS, SECOND)

@@ -200,8 +200,11 @@ def test_the_tree_of_a_bag_says_what_is_expected_unexpected_and_missing(
     rows = tfcompose("tree", robot, "--bag", bag).stdout.splitlines()
     assert rows[0] == "odom"
     assert [row.replace("├── ", "").replace("└── ", "").split()[0] for row in rows[1:]] == [
-        "base_link", "laser_link", "mast_link", "table",
-    ]  # fmt: skip
+        "base_link",
+        "laser_link",
+        "mast_link",
+        "table",
+    ]
     assert "50.0 Hz" in rows[1]
     assert rows[2].endswith("expected")
     assert rows[3].endswith("missing: owner static (/tfcompose_static)")

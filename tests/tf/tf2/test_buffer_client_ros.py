@@ -32,9 +32,13 @@ pytestmark = pytest.mark.ros
 S = 1_000_000_000
 _Future: Any = task.Future  # rclpy does not say its types
 CODES: dict[type[Exception], int] = {
-    LookupException: 1, ConnectivityException: 2, ExtrapolationException: 3, InvalidArgumentException: 4,
-    TimeoutException: 5, TransformException: 6,
-}  # fmt: skip
+    LookupException: 1,
+    ConnectivityException: 2,
+    ExtrapolationException: 3,
+    InvalidArgumentException: 4,
+    TimeoutException: 5,
+    TransformException: 6,
+}
 
 
 class Goal(SimpleNamespace):

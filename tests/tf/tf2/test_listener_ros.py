@@ -126,8 +126,10 @@ def test_a_program_awaits_transforms_in_its_callbacks(program: Callable[..., str
     """
     output = program("awaiting").splitlines()
     assert sorted(output[:-1]) == [
-        "LookupException", "now laser_link is at 2.000", "then laser_link is at 2.000 in odom"
-    ]  # fmt: skip
+        "LookupException",
+        "now laser_link is at 2.000",
+        "then laser_link is at 2.000 in odom",
+    ]
     assert output[-1] == "end"
 
 

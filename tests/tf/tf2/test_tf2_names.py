@@ -87,11 +87,23 @@ METHODS = {
 
 #: What tf2_py's BufferCore has.
 OF_THE_CORE = [
-    "set_transform", "set_transform_static", "lookup_transform_core", "lookup_transform_full_core",
-    "can_transform_core", "can_transform_full_core", "lookupVelocityCore", "lookupVelocityFullCore",
-    "get_latest_common_time", "all_frames_as_yaml", "all_frames_as_string", "clear",
-    "_chain", "_frameExists", "_getFrameStrings", "_allFramesAsDot",
-]  # fmt: skip
+    "set_transform",
+    "set_transform_static",
+    "lookup_transform_core",
+    "lookup_transform_full_core",
+    "can_transform_core",
+    "can_transform_full_core",
+    "lookupVelocityCore",
+    "lookupVelocityFullCore",
+    "get_latest_common_time",
+    "all_frames_as_yaml",
+    "all_frames_as_string",
+    "clear",
+    "_chain",
+    "_frameExists",
+    "_getFrameStrings",
+    "_allFramesAsDot",
+]
 
 
 @for_each(OF_THE_CORE)

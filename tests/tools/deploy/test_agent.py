@@ -22,8 +22,14 @@ from tfcompose.tools.deploy.agent import KEPT, UNIT, Agent, HostError
 from tfcompose.tools.deploy.connection import START, Settings, agent_command, agent_input
 from tfcompose.tools.deploy.release import Release
 
-SETTINGS = {"name": "rover.brain", "unit": "tfcompose-rover.brain.service", "python": "python3", "setup": [],
-            "sourcing": SOURCING, "program": ANYWHERE}  # fmt: skip
+SETTINGS = {
+    "name": "rover.brain",
+    "unit": "tfcompose-rover.brain.service",
+    "python": "python3",
+    "setup": [],
+    "sourcing": SOURCING,
+    "program": ANYWHERE,
+}
 
 
 @pytest.fixture

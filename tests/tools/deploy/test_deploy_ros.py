@@ -361,9 +361,13 @@ def test_commands_on_all_hosts_answer_as_one(computers: Computers) -> None:
     unknown = on_all("logs", "nobody")
     assert (unknown.returncode, unknown.stderr.count("no log of nobody")) == (1, 3), unknown
     following = processes.start(
-        computers.in_office(sys.executable, "-m", "tfcompose", "events", "--all-hosts", "--format", "json"),
-        env=computers.environment(), cwd=computers.folder / "robot", stdout=subprocess.PIPE,
-    )  # fmt: skip
+        computers.in_office(
+            sys.executable, "-m", "tfcompose", "events", "--all-hosts", "--format", "json"
+        ),
+        env=computers.environment(),
+        cwd=computers.folder / "robot",
+        stdout=subprocess.PIPE,
+    )
     down = on_all("down")
     assert (
         down.returncode,

@@ -85,9 +85,13 @@ def test_processes_whose_names_differ_in_a_slash_alone_have_a_unit_and_a_service
     plan = replace(compiled_plan(DRIVEN), edges=(), processes=processes)
     units = {file.path: file.text for file in systemd(plan, Machine("/robot"))[0]}
     assert list(units) == [
-        "rover.target", "rover-left-arm-2.service", "rover-left-arm.service", "rover-left-arm-3.service",
-        "rover-arm.service", "rover-last.service",
-    ]  # fmt: skip
+        "rover.target",
+        "rover-left-arm-2.service",
+        "rover-left-arm.service",
+        "rover-left-arm-3.service",
+        "rover-arm.service",
+        "rover-last.service",
+    ]
     assert "After=rover-left-arm-2.service" in units["rover-last.service"]
     services = yaml.safe_load(compose(plan, Machine("."))[0][0].text)["services"]
     assert list(services) == ["left-arm-2", "left-arm", "left-arm-3", "arm", "last"]
@@ -110,8 +114,11 @@ def test_a_unit_restarts_stops_and_waits_as_the_plan_says() -> None:
     )
     (command,) = slam["Service"]["ExecStart"]
     assert shlex.split(command) == [
-        *anywhere("/usr/bin/python3"), "exec", "/opt/rover/plan.json", "slam",
-    ]  # fmt: skip
+        *anywhere("/usr/bin/python3"),
+        "exec",
+        "/opt/rover/plan.json",
+        "slam",
+    ]
 
 
 def test_a_process_that_is_waited_for_until_it_is_done_is_oneshot() -> None:
@@ -335,12 +342,22 @@ def load(text: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Recorde
         return lambda *words, **given: Recorded(kind=name, words=words, **given)
 
     for module in (
-        "ament_index_python", "ament_index_python.packages", "launch", "launch.actions", "launch.conditions",
-        "launch.event_handlers", "launch.events", "launch.launch_description_sources", "launch.substitutions",
-        "launch_ros", "launch_ros.actions",
-        "launch_ros.event_handlers", "launch_ros.events", "launch_ros.events.lifecycle",
+        "ament_index_python",
+        "ament_index_python.packages",
+        "launch",
+        "launch.actions",
+        "launch.conditions",
+        "launch.event_handlers",
+        "launch.events",
+        "launch.launch_description_sources",
+        "launch.substitutions",
+        "launch_ros",
+        "launch_ros.actions",
+        "launch_ros.event_handlers",
+        "launch_ros.events",
+        "launch_ros.events.lifecycle",
         "launch_ros.parameter_descriptions",
-    ):  # fmt: skip
+    ):
         stand_in = ModuleType(module)
         stand_in.__getattr__ = kind  # type: ignore[method-assign]
         monkeypatch.setitem(sys.modules, module, stand_in)

@@ -100,7 +100,9 @@ def same_tree(before: Robot, after: Robot) -> None:
     assert own.keys() <= there.keys()
     for name, edge in own.items():
         assert (edge.kind, edge.joint_name if edge.joint else "") == (
-            there[name].kind, there[name].joint_name if there[name].joint else "")  # fmt: skip
+            there[name].kind,
+            there[name].joint_name if there[name].joint else "",
+        )
         off = max(abs(a - b) for a, b in zip(edge.pose.xyz, there[name].pose.xyz, strict=True))
         assert off < 1e-9
         assert angle_between(edge.pose.quat_xyzw, there[name].pose.quat_xyzw) < 1e-9

@@ -270,14 +270,23 @@ def test_clearpaths_entries_have_what_its_generator_gives_them_unless_they_say_o
     parts = yaml.safe_load((tmp_path / "out.yaml").read_text(encoding="utf-8"))["parts"]
     params = {name: part["params"] for name, part in parts.items() if name != "platform"}
     assert {name: one["parent_link"] for name, one in params.items()} == {
-        "plate": "default_mount", "front": "front_bumper_mount", "arch": "default_mount", "fender": "base_link",
-        "cover": "default_mount", "post_0": "default_mount", "camera_0": "default_mount",
-    }  # fmt: skip
+        "plate": "default_mount",
+        "front": "front_bumper_mount",
+        "arch": "default_mount",
+        "fender": "base_link",
+        "cover": "default_mount",
+        "post_0": "default_mount",
+        "camera_0": "default_mount",
+    }
     models = {name: one["model"] for name, one in params.items() if "model" in one}
     assert models == {
-        "plate": "default", "front": "default", "arch": "sensor_arch_300", "fender": "default", "post_0": "dual",
+        "plate": "default",
+        "front": "default",
+        "arch": "sensor_arch_300",
+        "fender": "default",
+        "post_0": "dual",
         "camera_0": "zed2i",
-    }  # fmt: skip
+    }
     assert params["cover"]["visual"] == "package://covers/meshes/cover.stl"
     assert "robot.yaml:10" in places(printed_errors(capsys), "TF020")
 

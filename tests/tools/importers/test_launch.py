@@ -139,10 +139,13 @@ def test_each_action_of_a_python_launch_file_has_its_entry(
     assert [processes[f"camera_{i}"]["params"] for i in range(2)] == [{"id": 0}, {"id": 1}]
     drive = processes["drive"]
     assert drive["params"] == {
-        "file": "../drive.yaml", "wheels.count": 4, "text": "4", "from_argument": "${args.cameras}",
+        "file": "../drive.yaml",
+        "wheels.count": 4,
+        "text": "4",
+        "from_argument": "${args.cameras}",
         "kept": "2",
         "mixed": [1, 2.5],
-    }  # fmt: skip
+    }
     assert drive["remap"] == {"scan": "scan_raw", "odom": "odometry"}
     assert (drive["namespace"], drive["restart"], drive["log_level"]) == (
         "front/left",
@@ -181,8 +184,9 @@ def test_what_an_included_file_lacks_is_named_and_all_else_of_it_is_there(
     (tmp_path / "inner.launch.py").write_text(INNER, encoding="utf-8")
     _, data = import_of(source(tmp_path, "a.launch.py", OUTER))
     assert {name: one.get("params") for name, one in data["processes"].items()} == {
-        "first": {"other": 1}, "second": {"speed": "${args.unit}"}
-    }  # fmt: skip
+        "first": {"other": 1},
+        "second": {"speed": "${args.unit}"},
+    }
     found = places(printed_errors(capsys), "TF020")
     assert found == [
         "a.launch.py:8",
@@ -351,8 +355,9 @@ def test_arguments_are_given_and_conditions_passed_over(package: Path) -> None:
     assert "camera_2" in load(out.read_text("utf-8"), str(out)).data["processes"]
     text, data = import_of(file, "--all-branches", code=None)
     assert data["args"] == {
-        "cameras": {"default": 2, "description": "how many"}, "rviz": {"default": False},
-    }  # fmt: skip
+        "cameras": {"default": 2, "description": "how many"},
+        "rviz": {"default": False},
+    }
     assert data["processes"]["rviz2"]["when"] == "${args.rviz}"
     assert data["processes"]["keys"]["when"] == "${not (args.rviz)}"
     robot = compiled(text, package).robot
@@ -396,7 +401,7 @@ def test_launch_arguments_become_arguments_of_the_robot_where_launch_would_read_
         "mode": {"type": "string", "default": "slam", "choices": ["slam", "fixed"]},
         "rate": {"default": 20},
         "loud": {"default": True},
-    }  # fmt: skip
+    }
     processes = data["processes"]
     assert processes["slam"]["when"] == "${args.mode == 'slam'}"
     assert processes["fixed"]["when"] == "${args.mode == 'fixed'}"
@@ -407,8 +412,11 @@ def test_launch_arguments_become_arguments_of_the_robot_where_launch_would_read_
         "True",
     ]
     assert processes["b"]["params"] == {
-        "rate": "${args.rate}", "loud": True, "topic": "${args.mode}/scan", "number": 200,
-    }  # fmt: skip
+        "rate": "${args.rate}",
+        "loud": True,
+        "topic": "${args.mode}/scan",
+        "number": 200,
+    }
     assert processes["b"]["remap"] == {"scan": "${args.mode}/scan"}
     assert data["frames"]["mast"]["xyz"] == [0, 0, 0.5]
     assert sorted(places(printed_errors(capsys), "TF020")) == ["a.launch.py:11"]
@@ -649,24 +657,39 @@ def test_composable_nodes_become_components_of_containers(name: str, tmp_path: P
     text, data = import_of(source(tmp_path, name, BOXES_IN[name]), code=None)
     assert data["containers"] == {
         "perception": {
-            "executor": "multi", "namespace": "cam", "log_level": "debug", "output": "log", "emulate_tty": True,
+            "executor": "multi",
+            "namespace": "cam",
+            "log_level": "debug",
+            "output": "log",
+            "emulate_tty": True,
             "stop": {"timeout": "9 s", "kill_timeout": "5 s"},
         },
         "box": {"package": "own", "executable": "box", "namespace": "mine"},
         "stock": {"isolation": "isolated", "executor": "multi", "args": ["--verbose"]},
         "elsewhere": {"external": True},
-    }  # fmt: skip
+    }
     processes = data["processes"]
     assert processes["rectify"] == {
-        "component": "image_proc/image_proc::RectifyNode", "container": "perception", "namespace": "cam",
-        "params": {"queue": 5, "sub.rate": 2.0, "names": ["a", "b"], "n": "${args.color}",
-                   "text": "true"},
-        "remap": {"image": "image_raw"}, "extra_arguments": {"use_intra_process_comms": True},
-    }  # fmt: skip
+        "component": "image_proc/image_proc::RectifyNode",
+        "container": "perception",
+        "namespace": "cam",
+        "params": {
+            "queue": 5,
+            "sub.rate": 2.0,
+            "names": ["a", "b"],
+            "n": "${args.color}",
+            "text": "true",
+        },
+        "remap": {"image": "image_raw"},
+        "extra_arguments": {"use_intra_process_comms": True},
+    }
     assert processes["grouped"] == {
-        "component": "p/p::Grouped", "container": "box", "namespace": "left/deep", "params": {"speed": 3},
+        "component": "p/p::Grouped",
+        "container": "box",
+        "namespace": "left/deep",
+        "params": {"speed": 3},
         "remap": {"scan": "scan_raw"},
-    }  # fmt: skip
+    }
     assert processes["late"]["container"] == "elsewhere"
     assert processes["late"]["after"]
     assert "never" not in processes
@@ -705,8 +728,13 @@ def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_n
         "rpy": [0, 0, "180 deg"],
     }
     assert list(data["processes"]) == ["bogus", "moves"]
-    wanted = [number for number, line in enumerate(PUBLISHERS.splitlines(), start=1)
-              if any(word in line for word in ("p::Bogus", "p::Moves", "nameless", "p::Alone", "p::Lost"))]  # fmt: skip
+    wanted = [
+        number
+        for number, line in enumerate(PUBLISHERS.splitlines(), start=1)
+        if any(
+            word in line for word in ("p::Bogus", "p::Moves", "nameless", "p::Alone", "p::Lost")
+        )
+    ]
     assert set(places(printed_errors(capsys), "TF020")) == {
         f"a.launch.xml:{line}" for line in wanted
     }
@@ -809,20 +837,30 @@ def test_bringups_of_moveit_and_turtlebots_are_read(
     )
     for name, text in {
         "controllers": "{moveit_manage_controllers: true, trajectory: {names: [a, b]}}",
-        "kinematics": "{arm: {kinematics_solver_timeout: 0.05}}", "joint_limits": "{default_scaling: 0.1}",
-        "ompl_planning": "{planner: ompl}", "diagnostics": "{analyzers: {ros__parameters: {path: Robot}}}",
-    }.items():  # fmt: skip
+        "kinematics": "{arm: {kinematics_solver_timeout: 0.05}}",
+        "joint_limits": "{default_scaling: 0.1}",
+        "ompl_planning": "{planner: ompl}",
+        "diagnostics": "{analyzers: {ros__parameters: {path: Robot}}}",
+    }.items():
         (config / f"{name}.yaml").write_text(text, encoding="utf-8")
     _, data = import_of(source(tmp_path, "arm.launch.py", BRINGUP), code=None)
     processes = data["processes"]
     assert processes["move_group"]["params"] == {
-        "robot_description_kinematics.arm.kinematics_solver_timeout": 0.05, "moveit_manage_controllers": True,
-        "trajectory.names": ["a", "b"], "planning_pipelines": ["ompl"], "default_planning_pipeline": "ompl",
-        "ompl.planner": "ompl", "publish_planning_scene": True, "publish_geometry_updates": True,
-        "publish_state_updates": True, "publish_transforms_updates": True, "publish_robot_description": False,
+        "robot_description_kinematics.arm.kinematics_solver_timeout": 0.05,
+        "moveit_manage_controllers": True,
+        "trajectory.names": ["a", "b"],
+        "planning_pipelines": ["ompl"],
+        "default_planning_pipeline": "ompl",
+        "ompl.planner": "ompl",
+        "publish_planning_scene": True,
+        "publish_geometry_updates": True,
+        "publish_state_updates": True,
+        "publish_transforms_updates": True,
+        "publish_robot_description": False,
         "publish_robot_description_semantic": False,
-        "robot_description_planning.default_scaling": 0.1, "loud": True,
-    }  # fmt: skip
+        "robot_description_planning.default_scaling": 0.1,
+        "loud": True,
+    }
     assert processes["analyzers"]["run"] == {
         "package": "diagnostic_aggregator",
         "executable": "aggregator_node",
@@ -857,8 +895,10 @@ def test_launch_files_of_ros_1_are_read(tmp_path: Path) -> None:
         "optical": {"parent": "camera", "rpy": [-1.5707963, 0, -1.5707963]},
     }
     assert data["processes"]["drive"] == {
-        "run": {"package": "drive", "executable": "drive.py"}, "namespace": "front", "required": True,
-    }  # fmt: skip
+        "run": {"package": "drive", "executable": "drive.py"},
+        "namespace": "front",
+        "required": True,
+    }
     robot = compiled(text, tmp_path).robot
     assert robot
 
@@ -939,7 +979,7 @@ def test_a_robot_state_publisher_with_a_xacro_file_becomes_a_part(package: Path)
     )
     assert data["parts"] == {
         "rover": {"xacro": "package://rover/urdf/rover.urdf.xacro", "args": {"height": "0.5"}},
-    }  # fmt: skip
+    }
     assert data["processes"]["joint_state_publisher_gui"] == {
         "simulate": {"joints": "zero", "rate": "10 Hz"}
     }
@@ -947,8 +987,10 @@ def test_a_robot_state_publisher_with_a_xacro_file_becomes_a_part(package: Path)
     robot = compiled(text, package).robot
     assert robot
     assert {(edge.name, edge.pose.xyz[2]) for edge in robot.edges} == {
-        ("base_link → mast", 0.5), ("base_link → wheel", 0), ("mast → lamp", 0.1),
-    }  # fmt: skip
+        ("base_link → mast", 0.5),
+        ("base_link → wheel", 0),
+        ("mast → lamp", 0.1),
+    }
 
 
 def test_a_robot_state_publisher_with_a_urdf_becomes_links(package: Path) -> None:
@@ -1202,9 +1244,15 @@ def generate_launch_description():
     ])
 """
 BOX = {
-    "isolation": "isolated", "executor": "multi", "namespace": "front", "restart": "always",
-    "stop": {"timeout": "3 s", "kill_timeout": "9 s"}, "output": "log", "emulate_tty": True, "log_level": "info",
-}  # fmt: skip
+    "isolation": "isolated",
+    "executor": "multi",
+    "namespace": "front",
+    "restart": "always",
+    "stop": {"timeout": "3 s", "kill_timeout": "9 s"},
+    "output": "log",
+    "emulate_tty": True,
+    "log_level": "info",
+}
 
 
 def test_containers_have_their_components_whoever_loads_them(package: Path) -> None:
@@ -1229,15 +1277,24 @@ def test_containers_have_their_components_whoever_loads_them(package: Path) -> N
         "crop": {"component": "image_proc/image_proc::CropNode", "container": "box"},
         "cloud": {"component": "depth/depth::Cloud", "container": "plain"},
         "talker": {"component": "demo/demo::Talker", "container": "where"},
-        "talker_2": {"component": "demo/demo::Talker", "container": "mine", "node": "talker", "namespace": "g",
-                     "params": {"speed": 2}},
-    }  # fmt: skip
+        "talker_2": {
+            "component": "demo/demo::Talker",
+            "container": "mine",
+            "node": "talker",
+            "namespace": "g",
+            "params": {"speed": 2},
+        },
+    }
     _, data = import_of(file, "--all-branches", code=None)
     assert data["processes"]["rectify"] == {
-        "component": "image_proc/image_proc::RectifyNode", "container": "box", "namespace": "left",
-        "params": {"size": 5, "a.b": [1.0, 2.0]}, "remap": {"image": "image_raw"},
-        "extra_arguments": {"use_intra_process_comms": True}, "when": "${args.rectify}",
-    }  # fmt: skip
+        "component": "image_proc/image_proc::RectifyNode",
+        "container": "box",
+        "namespace": "left",
+        "params": {"size": 5, "a.b": [1.0, 2.0]},
+        "remap": {"image": "image_raw"},
+        "extra_arguments": {"use_intra_process_comms": True},
+        "when": "${args.rectify}",
+    }
 
 
 COMPOSED_XML = """<launch>
@@ -1330,11 +1387,16 @@ def test_containers_of_an_xml_launch_file_too(package: Path) -> None:
     assert data["containers"] == {"box": {"namespace": "front"}}
     assert data["processes"] == {
         "rectify": {
-            "component": "image_proc/image_proc::RectifyNode", "container": "box", "params": {"size": 5},
-            "remap": {"image": "image_raw"}, "extra_arguments": {"use_intra_process_comms": True},
+            "component": "image_proc/image_proc::RectifyNode",
+            "container": "box",
+            "params": {"size": 5},
+            "remap": {"image": "image_raw"},
+            "extra_arguments": {"use_intra_process_comms": True},
             "when": "${not (args.rectify)}",
         },
         "crop": {
-            "component": "image_proc/image_proc::CropNode", "container": "box", "when": "${args.rectify}",
+            "component": "image_proc/image_proc::CropNode",
+            "container": "box",
+            "when": "${args.rectify}",
         },
-    }  # fmt: skip
+    }

@@ -31,8 +31,9 @@ def test_edges_have_their_values_rates_and_owners(tmp_path: Path) -> None:
         "laser": {"parent": "base_link", "owner": "static_2", "static": True},
     }
     assert data["processes"] == {
-        "drive": {"external": True}, "static_2": {"external": True, "node": "/static"},
-    }  # fmt: skip
+        "drive": {"external": True},
+        "static_2": {"external": True, "node": "/static"},
+    }
     assert "package: drive, executable: driver, args: [" in draft.text()
     result = compiled(draft.text(), tmp_path)
     assert result.robot
@@ -94,7 +95,7 @@ def test_a_comment_names_a_node_whose_name_is_another_one_at_each_start() -> Non
     node = "static_transform_publisher_aB3dE6gH9jK2mN5p"
     history = TreeHistory().takes(
         ("base_link", "laser", 0, 0, 0.0, 0.0, 0.0, *UPRIGHT), b"s", BEGUN_NS, static=True
-    )  # fmt: skip
+    )
     history.observer.take_graph([Publisher(b"s", f"/{node}", static=True)])
     text = drafted(history).text()
     assert "another name at each start" in text
@@ -102,8 +103,10 @@ def test_a_comment_names_a_node_whose_name_is_another_one_at_each_start() -> Non
 
 def test_a_command_line_names_its_package() -> None:
     assert started_by(("python3", "/ws/install/drive/lib/drive/node", "-v")) == {
-        "package": "drive", "executable": "node", "args": ["-v"],
-    }  # fmt: skip
+        "package": "drive",
+        "executable": "node",
+        "args": ["-v"],
+    }
     assert started_by(("/usr/bin/rviz2",)) == {}
     assert started_by(()) == {}
 
@@ -143,17 +146,22 @@ sensors:
 def test_sensors_of_a_recording_have_their_presets(tmp_path: Path) -> None:
     robot = compiled(SENSED, tmp_path).robot
     assert robot
-    edges = [("/tf_static", 0.0, edge.parent, edge.child, 0.0, edge.pose.xyz, edge.pose.quat_xyzw)
-             for edge in robot.edges]  # fmt: skip
+    edges = [
+        ("/tf_static", 0.0, edge.parent, edge.child, 0.0, edge.pose.xyz, edge.pose.quat_xyzw)
+        for edge in robot.edges
+    ]
     bag, out = write_bag(tmp_path / "bag", edges), tmp_path / "robot.yaml"
     assert main(["import", "--bag", str(bag), "-o", str(out)]) == 0
     data = load(out.read_text("utf-8"), str(out)).data
     assert data["sensors"] == {
         "front": {
-            "preset": "realsense/d435i", "parent": "base_link", "xyz": [0.1, 0, 0.2], "options": {"imu": True},
+            "preset": "realsense/d435i",
+            "parent": "base_link",
+            "xyz": [0.1, 0, 0.2],
+            "options": {"imu": True},
             "driver": "none",
         },
-    }  # fmt: skip
+    }
     assert data["frames"] == {"base_link": {}}
     assert main(["verify", str(out), "--bag", str(bag)]) == 0
     assert main(["import", "--bag", str(bag), "-o", str(out), "--force", "--no-sensors"]) == 0

@@ -92,8 +92,13 @@ def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str
         key: repr(list(value) if isinstance(value, tuple) else value)
         for key, value in sorted(params.items())
     }
-    return name or program, {"program": program, "words": rest[:at], "namespace": namespace.strip("/"), "remap": remap,
-                             "params": typed}  # fmt: skip
+    return name or program, {
+        "program": program,
+        "words": rest[:at],
+        "namespace": namespace.strip("/"),
+        "remap": remap,
+        "params": typed,
+    }
 
 
 def of_robot(robot: Robot) -> dict[str, dict[str, Any]]:
@@ -106,9 +111,10 @@ def of_robot(robot: Robot) -> dict[str, dict[str, Any]]:
     return {
         one.get("node") or nodes.get(name, one["program"]): {
             key: value for key, value in one.items() if key not in {"env", "output"}
-        } | ({"component": True} if "node" in one else {})
+        }
+        | ({"component": True} if "node" in one else {})
         for name, one in started_with(robot).items()
-    }  # fmt: skip
+    }
 
 
 def imported(file: Path, *words: str) -> dict[str, dict[str, Any]]:

@@ -29,7 +29,9 @@ def test_lines_of_a_script_become_frames_and_processes_in_their_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)  # from where the script is started: its files are named from there
-    source = script(tmp_path, """#!/bin/bash
+    source = script(
+        tmp_path,
+        """#!/bin/bash
 source /opt/ros/jazzy/setup.bash
 HEIGHT="0.3"   # metres
 ros2 run tf2_ros static_transform_publisher 0 0 ${HEIGHT} 0 0 0 base_link lidar &
@@ -41,7 +43,8 @@ ROS_DOMAIN_ID=3 ros2 run drive node --ros-args -r __node:=base -r __ns:=/front -
 ros2 launch camera rs.launch.py name:=front
 python3 scripts/mission.py --fast
 wait
-""")  # fmt: skip
+""",
+    )
     (tmp_path / "drive.yaml").write_text(
         "/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8"
     )
@@ -72,14 +75,17 @@ wait
 def test_what_only_a_shell_can_do_is_a_comment_and_a_finding(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    source = script(tmp_path, """ros2 run tf2_ros static_transform_publisher 0 0 1 0 0 0 base_link a
+    source = script(
+        tmp_path,
+        """ros2 run tf2_ros static_transform_publisher 0 0 1 0 0 0 base_link a
 sleep 3
 for i in 1 2; do ros2 run drive node --id $i & done
 ros2 run drive node --host $(hostname)
 ros2 bag play x | tee log
 ros2 run tf2_ros static_transform_publisher 0 0 1 0 0 0 base_link b 100
 ros2 run tf2_ros static_transform_publisher 0 0 2 0 0 0 base_link a
-""")  # fmt: skip
+""",
+    )
     text, data = import_of(source)
     assert set(data["frames"]) == {"base_link", "a"}
     assert "processes" not in data
@@ -161,13 +167,16 @@ def test_what_stands_around_a_command_in_a_terminal_is_no_part_of_it(
 def test_a_publisher_behind_an_unknown_program_is_named_and_prefixes_stay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    source = script(tmp_path, f"""export ROS_DOMAIN_ID=7
+    source = script(
+        tmp_path,
+        f"""export ROS_DOMAIN_ID=7
 {PUBLISH} a
 sudo {PUBLISH} b
 tmux send-keys -t tf "{PUBLISH} c" C-m
 nice -n 5 ros2 run drive node
 {PUBLISH} d 100
-""")  # fmt: skip
+""",
+    )
     _, data = import_of(source)
     assert set(data["frames"]) == {"base_link", "a"}
     assert data["ros"] == {"domain_id": 7}

@@ -15,19 +15,45 @@ ARGUMENTS = [
     ("0.1 0.0 0.2 1.5707963 0 0 base_link lidar_link", "ros2", (0.1, 0, 0.2), (0, 0, 1.5707963)),
     ("0 0 0 -1.5707963 0.3 -1.2 base_link lidar_link", "ros2", (0, 0, 0), (-1.2, 0.3, -1.5707963)),
     ("0.2 0 0.1 0.4 0.5 0.6 base_link lidar_link 100", "tf", (0.2, 0, 0.1), (0.6, 0.5, 0.4)),
-    ("0.2 0 0.1 0 0 0.7071067811865476 0.7071067811865476 /base_link /lidar_link 10", "tf", (0.2, 0, 0.1),
-     (0, 0, math.pi / 2)),
+    (
+        "0.2 0 0.1 0 0 0.7071067811865476 0.7071067811865476 /base_link /lidar_link 10",
+        "tf",
+        (0.2, 0, 0.1),
+        (0, 0, math.pi / 2),
+    ),
     ("0.2 0 0.1 0 0 0 1 base_link lidar_link", "tf2_ros", (0.2, 0, 0.1), (0, 0, 0)),
-    ("--yaw 0.1 --pitch 0.2 --roll 0.3 --z 4 --frame-id base_link --child-frame-id lidar_link", "ros2", (0, 0, 4),
-     (0.3, 0.2, 0.1)),
-    ("--frame-id base_link --child-frame-id lidar_link --ros-args -r __node:=a -p use_sim_time:=true", "ros2",
-     (0, 0, 0), (0, 0, 0)),
-    ("--qx 1 --qw 0 --frame-id base_link --child-frame-id lidar_link", "ros2", (0, 0, 0), (math.pi, 0, 0)),
+    (
+        "--yaw 0.1 --pitch 0.2 --roll 0.3 --z 4 --frame-id base_link --child-frame-id lidar_link",
+        "ros2",
+        (0, 0, 4),
+        (0.3, 0.2, 0.1),
+    ),
+    (
+        "--frame-id base_link --child-frame-id lidar_link --ros-args -r __node:=a -p use_sim_time:=true",
+        "ros2",
+        (0, 0, 0),
+        (0, 0, 0),
+    ),
+    (
+        "--qx 1 --qw 0 --frame-id base_link --child-frame-id lidar_link",
+        "ros2",
+        (0, 0, 0),
+        (math.pi, 0, 0),
+    ),
     ("1 2 3 90 0 0 base_link lidar_link __name:=tf", "ros2", (1, 2, 3), (0, 0, 90)),
-    ("--qz 0.05 --frame-id base_link --child-frame-id lidar_link", "ros2", (0, 0, 0), (0, 0, 2 * math.atan(0.05))),
-    ("--ros-args -r __node:=a -- --x 2 --frame-id base_link --child-frame-id lidar_link", "ros2", (2, 0, 0),
-     (0, 0, 0)),
-]  # fmt: skip
+    (
+        "--qz 0.05 --frame-id base_link --child-frame-id lidar_link",
+        "ros2",
+        (0, 0, 0),
+        (0, 0, 2 * math.atan(0.05)),
+    ),
+    (
+        "--ros-args -r __node:=a -- --x 2 --frame-id base_link --child-frame-id lidar_link",
+        "ros2",
+        (2, 0, 0),
+        (0, 0, 0),
+    ),
+]
 
 
 @pytest.mark.parametrize(

@@ -263,49 +263,65 @@ BASE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 CASES = {
     "one number of three": (
         "frames:\n  tool: {parent: base_link, xyz: [0.1, 20 cm, 30mm]}  # tool\n",
-        (0.1, 0.25, 0.03), (0, 0, 0),
+        (0.1, 0.25, 0.03),
+        (0, 0, 0),
         "  tool: {parent: base_link, xyz: [0.1, 25 cm, 30mm]}  # tool",
     ),
     "a quantity in quotes": (
         "frames:\n  tool: {parent: base_link, xyz: ['10 cm', 0, 0]}\n",
-        (0.25, 0, 0), (0, 0, 0),
+        (0.25, 0, 0),
+        (0, 0, 0),
         "  tool: {parent: base_link, xyz: ['25 cm', 0, 0]}",
     ),
     "an angle in degrees": (
         "frames:\n  tool:\n    parent: base_link\n    rpy: [0, 15 deg, 0]  # down\n",
-        (0, 0, 0), (0, 20, 0),
+        (0, 0, 0),
+        (0, 20, 0),
         "    rpy: [0, 20 deg, 0]  # down",
     ),
     "a direction becomes another": (
-        "frames:\n  tool: {parent: base_link, look: down}\n", (0, 0, 0), (0, 0, 90),
+        "frames:\n  tool: {parent: base_link, look: down}\n",
+        (0, 0, 0),
+        (0, 0, 90),
         "  tool: {parent: base_link, look: left}",
     ),
     "a direction becomes angles": (
-        "frames:\n  tool: {parent: base_link, look: down}\n", (0, 0, 0), (0, 80, 0),
+        "frames:\n  tool: {parent: base_link, look: down}\n",
+        (0, 0, 0),
+        (0, 80, 0),
         "  tool: {parent: base_link, look: {down: 80 deg}}",
     ),
     "an angle that is not there yet": (
-        "frames:\n  tool: {parent: base_link, look: {down: 10 deg}}\n", (0, 0, 0), (0, 10, 30),
+        "frames:\n  tool: {parent: base_link, look: {down: 10 deg}}\n",
+        (0, 0, 0),
+        (0, 10, 30),
         "  tool: {parent: base_link, look: {down: 10 deg, left: 30 deg}}",
     ),
     "up stays up": (
-        "frames:\n  tool: {parent: base_link, look: {up: 10 deg}}\n", (0, 0, 0), (0, -15, 0),
+        "frames:\n  tool: {parent: base_link, look: {up: 10 deg}}\n",
+        (0, 0, 0),
+        (0, -15, 0),
         "  tool: {parent: base_link, look: {up: 15 deg}}",
     ),
     "a position that is not there yet": (
-        "frames:\n  tool: {parent: base_link}\n", (0.1, 0, 0), (0, 0, 0),
+        "frames:\n  tool: {parent: base_link}\n",
+        (0.1, 0, 0),
+        (0, 0, 0),
         "  tool: {parent: base_link, xyz: [0.1, 0, 0]}",
     ),
     "the axis stays": (
-        "frames:\n  tool: {parent: base_link, axis_angle: {axis: [0, 0, 2], angle: 10 deg}}\n", (0, 0, 0), (0, 0, -30),
+        "frames:\n  tool: {parent: base_link, axis_angle: {axis: [0, 0, 2], angle: 10 deg}}\n",
+        (0, 0, 0),
+        (0, 0, -30),
         "  tool: {parent: base_link, axis_angle: {axis: [0, 0, 2], angle: -30 deg}}",
     ),
     "what << brings is given anew": (
         "x-a: &a {rpy: [0, 10 deg, 0], parent: base_link}\nframes: {b: {<<: *a},\n  tool: {<<: *a, xyz: [0, 0, 1]}}\n",
-        (0, 0, 1), (0, 25, 0),
+        (0, 0, 1),
+        (0, 25, 0),
         "  tool: {<<: *a, xyz: [0, 0, 1], rpy: [0, 25 deg, 0]}}",
     ),
-}  # fmt: skip
+}
 
 
 @for_each(CASES)
@@ -333,14 +349,24 @@ def test_a_profile_is_edited_where_it_stands() -> None:
 
 #: A file, and what the reason names.
 ELSEWHERE = {
-    "a variable": ("vars: {h: 1 m}\nframes:\n  tool: {parent: base_link, xyz: [0, 0, '${h}']}\n", "${h}"),
+    "a variable": (
+        "vars: {h: 1 m}\nframes:\n  tool: {parent: base_link, xyz: [0, 0, '${h}']}\n",
+        "${h}",
+    ),
     "a variable in a rotation": (
-        "vars: {a: 10 deg}\nframes:\n  tool: {parent: base_link, rpy: [0, '${2 * a}', 0]}\n", "a}"),
-    "an anchor": ("frames:\n  one: &one {parent: base_link, xyz: [0, 0, 1]}\n  tool: *one\n", "frames.one"),
+        "vars: {a: 10 deg}\nframes:\n  tool: {parent: base_link, rpy: [0, '${2 * a}', 0]}\n",
+        "a}",
+    ),
+    "an anchor": (
+        "frames:\n  one: &one {parent: base_link, xyz: [0, 0, 1]}\n  tool: *one\n",
+        "frames.one",
+    ),
     "an anchor of a list": (
-        "frames:\n  one: {parent: base_link, xyz: &p [0, 0, 1]}\n  tool: {parent: base_link, xyz: *p}\n", "frames.one"),
+        "frames:\n  one: {parent: base_link, xyz: &p [0, 0, 1]}\n  tool: {parent: base_link, xyz: *p}\n",
+        "frames.one",
+    ),
     "a preset": ("sensors:\n  tool: {preset: generic/camera, parent: base_link}\n", "preset"),
-}  # fmt: skip
+}
 
 
 @for_each(ELSEWHERE)

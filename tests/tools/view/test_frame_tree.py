@@ -40,8 +40,13 @@ def drawn(tree: FrameTree, chosen: dict[str, bool] | None = None, search: str = 
 
 def test_rows_are_indented_below_their_parents_in_the_order_of_the_file() -> None:
     assert drawn(tree_of(ARM)) == [
-        "-odom", "  -base_link", "    -mast", "      lidar", "    -arm", "      Tool_Arm"
-    ]  # fmt: skip
+        "-odom",
+        "  -base_link",
+        "    -mast",
+        "      lidar",
+        "    -arm",
+        "      Tool_Arm",
+    ]
 
 
 def test_nothing_below_a_closed_frame_has_a_row() -> None:

@@ -35,9 +35,12 @@ def opened(
 ) -> ClientConnection:
     """Return a websocket; raises InvalidStatus."""
     return connect(
-        f"ws://127.0.0.1:{port}/{query}", origin=Origin(origin) if origin else None,
-        subprotocols=[PROTOCOL], open_timeout=20, additional_headers=headers,
-    )  # fmt: skip
+        f"ws://127.0.0.1:{port}/{query}",
+        origin=Origin(origin) if origin else None,
+        subprotocols=[PROTOCOL],
+        open_timeout=20,
+        additional_headers=headers,
+    )
 
 
 def is_refused(port: int, query: str = "", origin: str | None = None, **headers: str) -> bool:
@@ -171,8 +174,12 @@ def test_the_browser_is_opened_by_a_file_that_others_cannot_read(
 
 
 NO_REQUESTS = [
-    b"\x00\xff\r\n\r\n", b"", b"GET /\r\n\r\n", b"GET / HTTP/1.1\r\nHost\r\n\r\n", b"x" * 100_000
-]  # fmt: skip
+    b"\x00\xff\r\n\r\n",
+    b"",
+    b"GET /\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost\r\n\r\n",
+    b"x" * 100_000,
+]
 
 
 def test_bytes_that_are_no_request_end_one_connection_without_a_traceback(rover: Path) -> None:

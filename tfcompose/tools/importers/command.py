@@ -44,11 +44,13 @@ _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "file", nargs="?", metavar="FILE",
+        "file",
+        nargs="?",
+        metavar="FILE",
         help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml, calibrations "
         "of Autoware's or the "
         "folder of its individual_params; -: a script's lines or a launch file from stdin",
-    )  # fmt: skip
+    )
     parser.add_argument("more", nargs="*", metavar="FILE", help="further calibrations")
     parser.add_argument(
         "given",
@@ -72,9 +74,13 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
     parser.add_argument("--robot", metavar="NAME", help="the robot's name; default: the source's")
     parser.add_argument(
-        "--package", action="append", default=[], metavar="NAME=FOLDER", dest="packages",
+        "--package",
+        action="append",
+        default=[],
+        metavar="NAME=FOLDER",
+        dest="packages",
         help="folder of a package that is not installed; repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--no-sensors", action="store_true", help="keep frames as frames, do not match presets"
     )

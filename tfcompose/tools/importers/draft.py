@@ -31,9 +31,20 @@ Entry = tuple[str, str]
 
 #: In the order of the language.
 SECTIONS = (
-    "args", "ros", "packages", "links", "joints", "ros2_control", "xml", "frames", "sensors", "parts", "containers",
-    "processes", "rules",
-)  # fmt: skip
+    "args",
+    "ros",
+    "packages",
+    "links",
+    "joints",
+    "ros2_control",
+    "xml",
+    "frames",
+    "sensors",
+    "parts",
+    "containers",
+    "processes",
+    "rules",
+)
 #: So near to 1 a quaternion's length is left as the source has it.
 _UNIT = 1e-7
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
@@ -150,9 +161,11 @@ class Draft:
                 title, entries, {name: self.notes.get((title, name), ()) for name in entries}
             )
         homeless = [
-            f"{name}: {text}" for (title, name), texts in self.notes.items()
-            if title and name not in sections.get(title, {}) for text in texts
-        ]  # fmt: skip
+            f"{name}: {text}"
+            for (title, name), texts in self.notes.items()
+            if title and name not in sections.get(title, {})
+            for text in texts
+        ]
         return "\n".join([*lines, *comment(homeless), ""])
 
     def _with_roots(self) -> dict[str, dict[str, Any]]:

@@ -37,7 +37,8 @@ _OF_CALL = frozenset({"parent", "xyz", "rpy", "name", "type", "enabled", "urdf_e
 _LINKS = ("box", "cylinder", "frame", "mesh", "sphere")
 #: Where everything is mounted that names no parent.
 _MOUNT = "default_mount"
-#: What attachments are unless the file says otherwise, by platform and type: the generator writes all of it.
+#: What attachments are unless the file says otherwise, by platform and type.
+#: The generator writes all of it.
 _ATTACHMENTS: dict[str, dict[str, Any]] = {
     "a200.bumper": {"parent": "front_bumper_mount", "extension": 0.0},
     "a200.sensor_arch": {"model": "sensor_arch_300"},

@@ -1,4 +1,7 @@
-"""Launch files as a draft of a robot file: read in a process of their own, and put into the language's words."""
+"""Launch files as a draft of a robot file.
+
+Read in a process of their own, and put into the language's words.
+"""
 
 from __future__ import annotations
 
@@ -94,7 +97,9 @@ class Launch:
 
 
 def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
-    """Add what a launch file starts to the draft; return what its robot_state_publishers are given.
+    """Add what a launch file starts to the draft.
+
+    Return what its robot_state_publishers are given.
 
     Raises:
         RejectedError: if it is no launch file, or takes too long or too much memory.
@@ -117,7 +122,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
 
 
 def _read(draft: Draft, launch: Launch) -> dict[str, Any]:
-    """Return what ROS's launch records of the file where it is installed, what the stand-in does elsewhere.
+    """Return what ROS's launch records of the file, or else the stand-in.
 
     Raises:
         RejectedError: if neither can read it.
@@ -146,7 +151,10 @@ def _is_of_ros1(answer: dict[str, Any]) -> bool:
 
 
 def has_launch() -> bool:
-    """Return whether ROS's launch can be imported: folders of that name are often near launch files, and are not it."""
+    """Return whether ROS's launch can be imported.
+
+    Folders of that name are often near launch files, and are not it.
+    """
     several = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
     return all(spec is not None and spec.origin is not None for spec in several)
 
@@ -168,16 +176,29 @@ def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, A
     trusted = launch.is_trusted
     wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
-        "file": str(Path(launch.file).absolute()), "arguments": dict(launch.arguments),
-        "packages": {name: str(Path(folder).absolute()) for name, folder in launch.packages.items()},
-        "prefixes": list(launch.prefixes), "every_branch": launch.every_branch, "with_launch": with_launch,
-        "readable": None if trusted else reach.grants(), "temporary": tempfile.gettempdir(),
+        "file": str(Path(launch.file).absolute()),
+        "arguments": dict(launch.arguments),
+        "packages": {
+            name: str(Path(folder).absolute()) for name, folder in launch.packages.items()
+        },
+        "prefixes": list(launch.prefixes),
+        "every_branch": launch.every_branch,
+        "with_launch": with_launch,
+        "readable": None if trusted else reach.grants(),
+        "temporary": tempfile.gettempdir(),
         "wall_s": wall_s,
-    }  # fmt: skip
+    }
     outcome = run_confined(
-        PROCESS, request, {}, wall_s=wall_s,
-        environment={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"},  # sets keep an order
-    )  # fmt: skip
+        PROCESS,
+        request,
+        {},
+        wall_s=wall_s,
+        environment={
+            **os.environ,
+            "OPENBLAS_NUM_THREADS": "1",
+            "PYTHONHASHSEED": "0",
+        },  # sets keep an order
+    )
     launch.print_output(launch.shown or launch.file, outcome.printed)
     launch.report_missing(outcome.missing)
     answer = outcome.answer
@@ -191,43 +212,79 @@ _SCALAR = (str, bool, int, float, None)
 _PARAMETERS = [(str, {"*": (*_SCALAR, [_SCALAR])})]
 _AT: dict[str, Any] = {"at": [(str, int)], "when?": [str], "only_when?": str}
 _KINDS: dict[KeywordKind, Any] = {
-    "text": str, "switch": bool, "number": _NUMBER, "output": (str, [str]), "shutdown": bool,
+    "text": str,
+    "switch": bool,
+    "number": _NUMBER,
+    "output": (str, [str]),
+    "shutdown": bool,
     "parameters": _PARAMETERS,
-}  # fmt: skip
+}
 _COMMON = _AT | {
-    "id": (str, int), "env": {"*": str}, "period": _NUMBER, "after": {"*": str}, "shell?": bool,
+    "id": (str, int),
+    "env": {"*": str},
+    "period": _NUMBER,
+    "after": {"*": str},
+    "shell?": bool,
     "only_env?": bool,
     **{f"{keyword.name}?": _KINDS[keyword.kind] for keyword in launch_keywords(*_KINDS)},
-}  # fmt: skip
+}
 _OF_NODE = {
-    "package": _OPTIONAL, "name": _OPTIONAL, "namespace": _OPTIONAL, "params": _PARAMETERS,
+    "package": _OPTIONAL,
+    "name": _OPTIONAL,
+    "namespace": _OPTIONAL,
+    "params": _PARAMETERS,
     "remap": [[str]],
-}  # fmt: skip
-_NODE = _COMMON | _OF_NODE | {
-    "executable": str, "label": _OPTIONAL, "argv": [str], "lifecycle?": _OPTIONAL, "ros1?": bool,
-}  # fmt: skip
+}
+_NODE = (
+    _COMMON
+    | _OF_NODE
+    | {
+        "executable": str,
+        "label": _OPTIONAL,
+        "argv": [str],
+        "lifecycle?": _OPTIONAL,
+        "ros1?": bool,
+    }
+)
 #: What the process that reads a launch file answers, by the kind of a record.
 _RECORDS: dict[str, Any] = {
     "node": _NODE,
     "container": _NODE,
     "process": _COMMON | {"argv": [str], "label": _OPTIONAL},
-    "component": _AT | _OF_NODE | {
-        "id": (str, int), "container": _OPTIONAL, "plugin": str, "period": _NUMBER,
-        "after": {"*": str}, "extra_arguments?": _PARAMETERS,
+    "component": _AT
+    | _OF_NODE
+    | {
+        "id": (str, int),
+        "container": _OPTIONAL,
+        "plugin": str,
+        "period": _NUMBER,
+        "after": {"*": str},
+        "extra_arguments?": _PARAMETERS,
     },
-    "include": _AT | {
-        "file": str, "args": {"*": str}, "namespace": _OPTIONAL, "env": {"*": str},
-        "period": _NUMBER, "after": {"*": str},
+    "include": _AT
+    | {
+        "file": str,
+        "args": {"*": str},
+        "namespace": _OPTIONAL,
+        "env": {"*": str},
+        "period": _NUMBER,
+        "after": {"*": str},
     },
-    "argument": _AT | {
-        "name": str, "default": Any, "value": str, "choices": [str], "description": str, "env": str,
+    "argument": _AT
+    | {
+        "name": str,
+        "default": Any,
+        "value": str,
+        "choices": [str],
+        "description": str,
+        "env": str,
     },
     "lifecycle": _AT | {"node": (str, int), "state": str},
     "required": _AT | {"node": (str, int)},
     "package": _AT | {"name": str},
     "skipped": _AT | {"text": str},
     "todo": _AT | {"text": str},
-}  # fmt: skip
+}
 _ANSWER = {"records": [{"kind": str}], "stopped": str, "line": int, "decided": [str]}
 _PAIR = 2
 
@@ -317,7 +374,10 @@ class _Work:
             self.draft.todo(record["text"], span)
 
     def finish(self, decided: list[str]) -> None:
-        """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
+        """Add what depends on all records.
+
+        ``decided`` are arguments whose values stand in what was added.
+        """
         self._args({*decided, *self._read})
         self._into_containers()
         started = self.draft.started()
@@ -405,8 +465,12 @@ class _Work:
             )
 
     def _in_conditions(self) -> set[str]:
-        texts = [keys["when"] for entries in self.draft.sections.values() for keys in entries.values()
-                 if isinstance(keys, dict) and "when" in keys]  # fmt: skip
+        texts = [
+            keys["when"]
+            for entries in self.draft.sections.values()
+            for keys in entries.values()
+            if isinstance(keys, dict) and "when" in keys
+        ]
         return {
             name
             for text in texts
@@ -439,7 +503,10 @@ class _Work:
             self._delays.append((name, record["period"]))
 
     def _component(self, record: dict[str, Any], span: Span) -> None:
-        """Add a node that a container loads; that of a stock publisher's class is what its program is."""
+        """Add a node that a container loads.
+
+        That of a stock publisher's class is what its program is.
+        """
         plugin = record["plugin"]
         if plugin in _PUBLISHERS:
             words = static_words(record["params"]) if plugin == STATIC_PLUGIN else []
@@ -452,7 +519,10 @@ class _Work:
         self._components.append((name, record["container"], span))
 
     def _into_containers(self) -> None:
-        """Let components name their containers; one that the launch file does not start runs already."""
+        """Let components name their containers.
+
+        One that the launch file does not start runs already.
+        """
         for name, wanted, span in self._components:
             if wanted not in self._containers:
                 namespace, _, node = wanted.strip("/").rpartition("/")
@@ -492,14 +562,30 @@ class _Work:
             )  # it is one of all nodes'
             reader = "tf" if record["package"] == "tf" else "tf2_ros"
         return Program(
-            span, record.get("package"), record.get("executable"), argv=argv, shell=bool(record.get("shell")),
-            name=record.get("name"), label=record.get("label"), namespace=record.get("namespace"), params=tuple(params),
-            remap=tuple((old, new) for old, new in record.get("remap", ())), env=self._env(record), keys=keys,
-            period_s=record.get("period", 0.0), reader=reader, description=description, todo=tuple(todo), loads=loads,  # type: ignore[arg-type]
-        )  # fmt: skip
+            span,
+            record.get("package"),
+            record.get("executable"),
+            argv=argv,
+            shell=bool(record.get("shell")),
+            name=record.get("name"),
+            label=record.get("label"),
+            namespace=record.get("namespace"),
+            params=tuple(params),
+            remap=tuple((old, new) for old, new in record.get("remap", ())),
+            env=self._env(record),
+            keys=keys,
+            period_s=record.get("period", 0.0),
+            reader=reader,
+            description=description,
+            todo=tuple(todo),
+            loads=loads,  # type: ignore[arg-type]
+        )
 
     def _is_container(self, record: dict[str, Any]) -> bool:
-        """Return whether a node loads components: by its program, or because some are loaded into it."""
+        """Return whether a node loads components.
+
+        By its program, or because some are loaded into it.
+        """
         if record["kind"] != "node":
             return False
         is_stock = record["package"] == CONTAINERS and record["executable"].startswith(
@@ -640,10 +726,13 @@ class _Work:
         for name, period_s in self._delays:
             if period_s not in gates:
                 free = [
-                    one for one in self._names.values()
-                    if one not in unfit and one not in gates.values() and "run" in started[one]
+                    one
+                    for one in self._names.values()
+                    if one not in unfit
+                    and one not in gates.values()
+                    and "run" in started[one]
                     and not {"ready", "after", "when"} & processes[one].keys()
-                ]  # fmt: skip
+                ]
                 if free:
                     gates[period_s] = free[0]
                     processes[free[0]]["ready"] = {"time": _seconds(period_s)}
@@ -667,7 +756,7 @@ def _seconds(value: float) -> Bare:
 
 
 def _without_texts(word: str, todo: list[str]) -> str:
-    """Return a word of a command in which files stand for what xacro makes of them, or for their texts."""
+    """Return a command's word with files in place of xacro output and file texts."""
     plain, files = without_marks(word)
     todo += [
         f"an argument is what is made of {shown(file)}, or its text: here it is the file's name"

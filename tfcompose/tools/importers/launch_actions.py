@@ -142,8 +142,15 @@ def visit_all(entities: Any, context: Context) -> None:
 
 
 class DeclareLaunchArgument(Action):
-    def __init__(self, name: Any, *, default_value: Any = None, description: Any = "", choices: Any = None,
-                 **kwargs: Any) -> None:  # fmt: skip
+    def __init__(
+        self,
+        name: Any,
+        *,
+        default_value: Any = None,
+        description: Any = "",
+        choices: Any = None,
+        **kwargs: Any,
+    ) -> None:
         super().__init__(**kwargs)
         self.name, self.default_value, self.description, self.choices = (
             name,
@@ -167,8 +174,16 @@ class DeclareLaunchArgument(Action):
             kinds = {bool: "bool", int: "int", float: "float", str: "string"}
             if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
                 context.declared[name] = kinds[type(scalar_of(known))]
-            context.record("argument", self.at, name=name, default=default, value=known, choices=choices,
-                           description=plain([self.description or ""]), env=self._variable(context))  # fmt: skip
+            context.record(
+                "argument",
+                self.at,
+                name=name,
+                default=default,
+                value=known,
+                choices=choices,
+                description=plain([self.description or ""]),
+                env=self._variable(context),
+            )
 
     def _variable(self, context: Context) -> str:
         """Return the environment variable that is its default, or nothing."""
@@ -218,8 +233,15 @@ class UnsetEnvironmentVariable(Action):
 
 
 class AppendEnvironmentVariable(SetEnvironmentVariable):
-    def __init__(self, name: Any, value: Any, *, prepend: Any = False, separator: Any = os.pathsep,
-                 **kwargs: Any) -> None:  # fmt: skip
+    def __init__(
+        self,
+        name: Any,
+        value: Any,
+        *,
+        prepend: Any = False,
+        separator: Any = os.pathsep,
+        **kwargs: Any,
+    ) -> None:
         super().__init__(name, value, **kwargs)
         self.prepend, self.separator = prepend, separator
 
@@ -234,8 +256,15 @@ class AppendEnvironmentVariable(SetEnvironmentVariable):
 
 
 class GroupAction(Action):
-    def __init__(self, actions: Any, *, scoped: Any = True, forwarding: Any = True, launch_configurations: Any = None,
-                 **kwargs: Any) -> None:  # fmt: skip
+    def __init__(
+        self,
+        actions: Any,
+        *,
+        scoped: Any = True,
+        forwarding: Any = True,
+        launch_configurations: Any = None,
+        **kwargs: Any,
+    ) -> None:
         super().__init__(**kwargs)
         self.actions, self.scoped, self.forwarding = actions, scoped, forwarding
         self.own = launch_configurations or {}
@@ -541,9 +570,16 @@ class IncludeLaunchDescription(Action):
                 for name, value in self.launch_arguments
                 if text_of(name, context) in given
             }
-            context.record("include", self.at, file=path, args=symbolic, namespace=context.namespace,
-                           env=dict(context.variables), period=context.period_s,
-                           after=dict(context.after))  # fmt: skip
+            context.record(
+                "include",
+                self.at,
+                file=path,
+                args=symbolic,
+                namespace=context.namespace,
+                env=dict(context.variables),
+                period=context.period_s,
+                after=dict(context.after),
+            )
             return
         include(path, context)
 
@@ -685,9 +721,20 @@ def _texts(values: Any, context: Context) -> dict[str, str]:
 
 
 class Node(ExecuteProcess):
-    def __init__(self, *, executable: Any = None, package: Any = None, name: Any = None, namespace: Any = None,
-                 exec_name: Any = None, parameters: Any = None, remappings: Any = None, ros_arguments: Any = None,
-                 arguments: Any = None, **kwargs: Any) -> None:  # fmt: skip
+    def __init__(
+        self,
+        *,
+        executable: Any = None,
+        package: Any = None,
+        name: Any = None,
+        namespace: Any = None,
+        exec_name: Any = None,
+        parameters: Any = None,
+        remappings: Any = None,
+        ros_arguments: Any = None,
+        arguments: Any = None,
+        **kwargs: Any,
+    ) -> None:
         for old in ("node_executable", "node_name", "node_namespace"):
             value = kwargs.pop(old, None)
             if value is not None:
@@ -713,13 +760,19 @@ class Node(ExecuteProcess):
         argv = [symbolic_text(one, context) for one in words if one is not None]
         ros_argv = [text_of(one, context) for one in self.ros_arguments or ()]
         context.record(
-            kind, self.at, package=_optional(self.package, context), executable=text_of(self.executable, context),
-            name=_optional(self.node, context), label=_optional(self.name, context),
+            kind,
+            self.at,
+            package=_optional(self.package, context),
+            executable=text_of(self.executable, context),
+            name=_optional(self.node, context),
+            label=_optional(self.name, context),
             namespace=below(context.namespace, _optional(self.node_namespace, context)),
             argv=argv + (["--ros-args", *ros_argv] if ros_argv else []),
             params=[*context.params, *parameters_of(self.parameters, context, self.at)],
-            remap=[*context.remaps, *rules_of(self.remappings, context)], **self.common(context), **more,
-        )  # fmt: skip
+            remap=[*context.remaps, *rules_of(self.remappings, context)],
+            **self.common(context),
+            **more,
+        )
 
     def described(self, context: Context) -> str:
         return f"the node {plain([self.package])}/{plain([self.executable])}"
@@ -743,8 +796,17 @@ class LifecycleTransition(Action):
 class ComposableNode(Action):
     """A node that a container loads; ``context.container`` is that, while it is visited."""
 
-    def __init__(self, *, package: Any, plugin: Any = None, name: Any = None, namespace: Any = None,
-                 parameters: Any = None, remappings: Any = None, **kwargs: Any) -> None:  # fmt: skip
+    def __init__(
+        self,
+        *,
+        package: Any,
+        plugin: Any = None,
+        name: Any = None,
+        namespace: Any = None,
+        parameters: Any = None,
+        remappings: Any = None,
+        **kwargs: Any,
+    ) -> None:
         plugin = kwargs.pop("node_plugin", plugin)
         name, namespace = kwargs.pop("node_name", name), kwargs.pop("node_namespace", namespace)
         super().__init__(**kwargs)
@@ -759,13 +821,20 @@ class ComposableNode(Action):
             for keyword in launch_keywords("parameters")
         }
         context.record(
-            "component", self.at, id=self.id, container=context.container, package=text_of(self.package, context),
-            plugin=text_of(self.plugin, context), name=_optional(self.name, context),
+            "component",
+            self.at,
+            id=self.id,
+            container=context.container,
+            package=text_of(self.package, context),
+            plugin=text_of(self.plugin, context),
+            name=_optional(self.name, context),
             namespace=below(context.namespace, _optional(self.namespace, context)),
             params=[*context.params, *parameters_of(self.parameters, context, self.at)],
-            remap=[*context.remaps, *rules_of(self.remappings, context)], period=context.period_s,
-            after=dict(context.after), **more,
-        )  # fmt: skip
+            remap=[*context.remaps, *rules_of(self.remappings, context)],
+            period=context.period_s,
+            after=dict(context.after),
+            **more,
+        )
 
     def described(self, context: Context) -> str:
         return f"the component {plain([self.plugin])}"

@@ -136,8 +136,13 @@ def _alone(value: Any) -> Any:
 #: What stands for an argument in an expression: within quotes, and without.
 _QUOTED, _BARE = "quoted_", "bare_"
 _SIGNS: dict[type[ast.cmpop], str] = {
-    ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="
-}  # fmt: skip
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+}
 
 
 def _python_expression(given: PythonExpression, context: Context) -> str | None:

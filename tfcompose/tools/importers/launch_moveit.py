@@ -36,14 +36,26 @@ _FILES = {
     "moveit_cpp": ("config/moveit_cpp.yaml", ""),
 }
 #: What MoveIt's configuration has even if nobody asks for it.
-_USUAL = ("robot_description", "robot_description_semantic", "robot_description_kinematics", "planning_pipelines",
-          "trajectory_execution", "planning_scene_monitor", "sensors_3d", "joint_limits")  # fmt: skip
+_USUAL = (
+    "robot_description",
+    "robot_description_semantic",
+    "robot_description_kinematics",
+    "planning_pipelines",
+    "trajectory_execution",
+    "planning_scene_monitor",
+    "sensors_3d",
+    "joint_limits",
+)
 #: What the monitor of the scene publishes unless it is told, by the parameters that say so, in the
 #: builder's order.
 _MONITOR = {
-    "publish_planning_scene": True, "publish_geometry_updates": True, "publish_state_updates": True,
-    "publish_transforms_updates": True, "publish_robot_description": False, "publish_robot_description_semantic": False,
-}  # fmt: skip
+    "publish_planning_scene": True,
+    "publish_geometry_updates": True,
+    "publish_state_updates": True,
+    "publish_transforms_updates": True,
+    "publish_robot_description": False,
+    "publish_robot_description_semantic": False,
+}
 
 
 class MoveItConfigs:
@@ -73,9 +85,14 @@ class MoveItConfigsBuilder:
     """Builds them; ``find`` locates packages, ``context`` collects what is missing."""
 
     def __init__(
-        self, find: Callable[[str], str], context: Context, robot_name: str = "",
-        robot_description: str = "robot_description", *, package_name: str | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        find: Callable[[str], str],
+        context: Context,
+        robot_name: str = "",
+        robot_description: str = "robot_description",
+        *,
+        package_name: str | None = None,
+    ) -> None:
         self._find, self._context, self._name, self._key = (
             find,
             context,

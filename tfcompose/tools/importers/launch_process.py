@@ -47,19 +47,68 @@ _HIGHEST = 12
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 
 #: What a launch file is not let do, by the names of Python's audit events.
-_REFUSED = frozenset({
-    "os.system", "os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "os.startfile", "pty.spawn",
-    "subprocess.Popen", "socket.connect", "socket.bind", "socket.sendto", "socket.sendmsg", "socket.getaddrinfo",
-    "socket.gethostbyname", "socket.gethostbyaddr", "os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link",
-    "os.symlink", "os.truncate", "os.chmod", "os.chown", "os.kill", "os.killpg", "shutil.rmtree", "shutil.move",
-    "shutil.copyfile", "shutil.copytree", "socket.__new__", "ctypes.dlopen", "ctypes.dlsym", "ctypes.dlsym/handle",
-    "ctypes.call_function", "ctypes.cdata", "ctypes.cdata/buffer", "ctypes.string_at", "ctypes.addressof",
-})  # fmt: skip
+_REFUSED = frozenset(
+    {
+        "os.system",
+        "os.exec",
+        "os.fork",
+        "os.forkpty",
+        "os.posix_spawn",
+        "os.spawn",
+        "os.startfile",
+        "pty.spawn",
+        "subprocess.Popen",
+        "socket.connect",
+        "socket.bind",
+        "socket.sendto",
+        "socket.sendmsg",
+        "socket.getaddrinfo",
+        "socket.gethostbyname",
+        "socket.gethostbyaddr",
+        "os.remove",
+        "os.rename",
+        "os.rmdir",
+        "os.mkdir",
+        "os.link",
+        "os.symlink",
+        "os.truncate",
+        "os.chmod",
+        "os.chown",
+        "os.kill",
+        "os.killpg",
+        "shutil.rmtree",
+        "shutil.move",
+        "shutil.copyfile",
+        "shutil.copytree",
+        "socket.__new__",
+        "ctypes.dlopen",
+        "ctypes.dlsym",
+        "ctypes.dlsym/handle",
+        "ctypes.call_function",
+        "ctypes.cdata",
+        "ctypes.cdata/buffer",
+        "ctypes.string_at",
+        "ctypes.addressof",
+    }
+)
 #: What reads a path.
 _READS = frozenset({"open", "os.listdir", "os.scandir"})
 #: Packages of ROS's that the stand-in is in the place of, and what xacro and the ament index are.
-_LAUNCH = frozenset({"launch", "launch_ros", "launch_xml", "launch_yaml", "nav2_common", "ament_index_python", "xacro",
-                     "lifecycle_msgs", "launch_param_builder", "moveit_configs_utils", "launch_testing"})  # fmt: skip
+_LAUNCH = frozenset(
+    {
+        "launch",
+        "launch_ros",
+        "launch_xml",
+        "launch_yaml",
+        "nav2_common",
+        "ament_index_python",
+        "xacro",
+        "lifecycle_msgs",
+        "launch_param_builder",
+        "moveit_configs_utils",
+        "launch_testing",
+    }
+)
 #: Packages of which only programs are named, that are not run here.
 _TOOLS = {"xacro"}
 #: Those that are themselves where launch is installed.
@@ -201,17 +250,33 @@ class _Module(types.ModuleType):
 #: Packages that import their modules by themselves, and these: ``import launch`` gives
 #: ``launch.actions`` too.
 _WITH_MODULES = frozenset({"launch", "launch_ros"})
-_MODULES = frozenset({
-    "actions", "conditions", "descriptions", "event_handlers", "events", "launch_description_sources",
-    "parameter_descriptions", "some_substitutions_type", "substitutions", "utilities",
-})  # fmt: skip
+_MODULES = frozenset(
+    {
+        "actions",
+        "conditions",
+        "descriptions",
+        "event_handlers",
+        "events",
+        "launch_description_sources",
+        "parameter_descriptions",
+        "some_substitutions_type",
+        "substitutions",
+        "utilities",
+    }
+)
 _ALIASES = {
-    "PushROSNamespace": "PushRosNamespace", "SetROSRemap": "SetRemap", "PathJoin": "PathJoinSubstitution",
-    "PythonLaunchDescriptionSource": "LaunchDescriptionSource", "AnyLaunchDescriptionSource": "LaunchDescriptionSource",
-    "XMLLaunchDescriptionSource": "LaunchDescriptionSource", "YAMLLaunchDescriptionSource": "LaunchDescriptionSource",
-    "FrontendLaunchDescriptionSource": "LaunchDescriptionSource", "FindPackage": "FindPackageShare",
-    "RosTimer": "TimerAction", "LaunchContext": "Context",
-}  # fmt: skip
+    "PushROSNamespace": "PushRosNamespace",
+    "SetROSRemap": "SetRemap",
+    "PathJoin": "PathJoinSubstitution",
+    "PythonLaunchDescriptionSource": "LaunchDescriptionSource",
+    "AnyLaunchDescriptionSource": "LaunchDescriptionSource",
+    "XMLLaunchDescriptionSource": "LaunchDescriptionSource",
+    "YAMLLaunchDescriptionSource": "LaunchDescriptionSource",
+    "FrontendLaunchDescriptionSource": "LaunchDescriptionSource",
+    "FindPackage": "FindPackageShare",
+    "RosTimer": "TimerAction",
+    "LaunchContext": "Context",
+}
 _CLASSES = {
     name: one
     for name, one in {**vars(substitutions), **vars(conditions), **vars(actions)}.items()
@@ -332,15 +397,23 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         elif spec.name.startswith("ament_index_python"):
             _fill_index(module, self.reader)
         elif spec.name == "xacro":
-            vars(module).update(process_file=_Document, process=lambda file, **more: _Document(file, **more).text,
-                                parse=_Document, process_doc=lambda *_a, **_k: None)  # fmt: skip
+            vars(module).update(
+                process_file=_Document,
+                process=lambda file, **more: _Document(file, **more).text,
+                parse=_Document,
+                process_doc=lambda *_a, **_k: None,
+            )
         elif spec.name.startswith("nav2_common"):
             of = (
                 self.reader.recorder.as_substitution if self.reader.recorder else lambda kind: kind
             )
-            vars(module).update(RewrittenYaml=of(_Rewritten), ReplaceString=of(_Rewritten), HasNodeParams=of(_HasNode),
-                                LaunchConfigAsBool=of(substitutions.LaunchConfigAsBool),
-                                ParseMultiRobotPose=functools.partial(_RobotPoses, self.reader.context))  # fmt: skip
+            vars(module).update(
+                RewrittenYaml=of(_Rewritten),
+                ReplaceString=of(_Rewritten),
+                HasNodeParams=of(_HasNode),
+                LaunchConfigAsBool=of(substitutions.LaunchConfigAsBool),
+                ParseMultiRobotPose=functools.partial(_RobotPoses, self.reader.context),
+            )
         elif spec.name.startswith("moveit_configs_utils"):
             find, context = self.reader.share, self.reader.context
             vars(module)["MoveItConfigsBuilder"] = functools.partial(
@@ -366,9 +439,13 @@ def _fill_index(module: types.ModuleType, reader: Reader) -> None:
     class PackageNotFoundError(KeyError):
         """The error of the real index, which is not raised here."""
 
-    several = {"get_package_share_directory": reader.share, "get_package_prefix": reader.share,
-               "get_package_share_path": lambda name, **_: Path(reader.share(name)),
-               "get_packages_with_prefixes": dict, "PackageNotFoundError": PackageNotFoundError}  # fmt: skip
+    several = {
+        "get_package_share_directory": reader.share,
+        "get_package_prefix": reader.share,
+        "get_package_share_path": lambda name, **_: Path(reader.share(name)),
+        "get_packages_with_prefixes": dict,
+        "PackageNotFoundError": PackageNotFoundError,
+    }
     vars(module).update(several)
 
 
@@ -421,8 +498,11 @@ def _watch(  # noqa: C901 (one hook after another)
         )
 
     def run(words: Any, *_args: Any, **more: Any) -> Any:
-        several = [os.fspath(one) if isinstance(one, os.PathLike) else str(one) for one in words] if not isinstance(
-            words, str) else words.split()  # fmt: skip
+        several = (
+            [os.fspath(one) if isinstance(one, os.PathLike) else str(one) for one in words]
+            if not isinstance(words, str)
+            else words.split()
+        )
         try:
             output = substitutions.of_command(several, " ".join(several))
         except FailedError:
@@ -470,14 +550,20 @@ def _watch(  # noqa: C901 (one hook after another)
 
     plain_open, plain_read = builtins.open, Path.read_text
     hooks: list[tuple[Any, str, Any]] = [
-        (os, "system", system), (os, "makedirs", folder), (os, "mkdir", folder), (Path, "mkdir", folder),
-        (subprocess, "run", run), (subprocess, "call", lambda *a, **k: run(*a, **k).returncode),
+        (os, "system", system),
+        (os, "makedirs", folder),
+        (os, "mkdir", folder),
+        (Path, "mkdir", folder),
+        (subprocess, "run", run),
+        (subprocess, "call", lambda *a, **k: run(*a, **k).returncode),
         (subprocess, "check_call", lambda *a, **k: run(*a, **k).returncode),
         (subprocess, "check_output", lambda *a, **k: run(*a, **k).stdout),
         (subprocess, "getoutput", lambda words, **k: run(words, text=True, **k).stdout),
         (os, "popen", lambda words, *_a, **_k: io.StringIO(run(words, text=True).stdout)),
-        (builtins, "open", opened), (Path, "read_text", read_text), (tempfile, "mktemp", temporary),
-    ]  # fmt: skip
+        (builtins, "open", opened),
+        (Path, "read_text", read_text),
+        (tempfile, "mktemp", temporary),
+    ]
     for owner, name, hook in hooks:
         setattr(owner, name, hook)
     if readable is not None:

@@ -39,23 +39,48 @@ from tfcompose.tools.importers.launch_substitutions import Context, FailedError,
 from tfcompose.tools.importers.launch_texts import Entity, of_xml
 
 _MODULES = (
-    "launch.actions", "launch.conditions", "launch.event_handlers", "launch.events", "launch.events.process",
-    "launch.launch_description_sources", "launch.substitutions", "launch_ros.actions", "launch_ros.descriptions",
-    "launch_ros.event_handlers", "launch_ros.events.lifecycle", "launch_ros.parameter_descriptions",
+    "launch.actions",
+    "launch.conditions",
+    "launch.event_handlers",
+    "launch.events",
+    "launch.events.process",
+    "launch.launch_description_sources",
+    "launch.substitutions",
+    "launch_ros.actions",
+    "launch_ros.descriptions",
+    "launch_ros.event_handlers",
+    "launch_ros.events.lifecycle",
+    "launch_ros.parameter_descriptions",
     "launch_ros.substitutions",
-)  # fmt: skip
+)
 #: What launch evaluates or does itself, though the stand-in has a counterpart.
 _OWN_WORK = frozenset({"GroupAction", "ParameterSubstitution", "LocalSubstitution"})
 #: Substitutions whose result is not launch's: packages that are not found, commands that are not
 #: run, arguments.
-_REPLACED = frozenset({
-    "LaunchConfiguration", "LaunchConfigAsBool", "EnvironmentVariable", "PathJoinSubstitution", "FindPackageShare",
-    "FindPackagePrefix", "FindPackage", "FindExecutable", "ExecutableInPackage", "Command", "FileContent", "AnonName",
-    "LaunchLogDir", "ThisLaunchFile", "ThisLaunchFileDir",
-})  # fmt: skip
+_REPLACED = frozenset(
+    {
+        "LaunchConfiguration",
+        "LaunchConfigAsBool",
+        "EnvironmentVariable",
+        "PathJoinSubstitution",
+        "FindPackageShare",
+        "FindPackagePrefix",
+        "FindPackage",
+        "FindExecutable",
+        "ExecutableInPackage",
+        "Command",
+        "FileContent",
+        "AnonName",
+        "LaunchLogDir",
+        "ThisLaunchFile",
+        "ThisLaunchFileDir",
+    }
+)
 _ALIASES = {
-    "PushROSNamespace": "PushRosNamespace", "RosTimer": "TimerAction", "FindPackage": "FindPackageShare"
-}  # fmt: skip
+    "PushROSNamespace": "PushRosNamespace",
+    "RosTimer": "TimerAction",
+    "FindPackage": "FindPackageShare",
+}
 _STAND_INS: dict[str, Any] = {
     name: one
     for module in (substitutions, conditions, actions)
@@ -119,7 +144,10 @@ class RecordingContext(launch.LaunchContext, Context):  # type: ignore[misc]
 
 
 def _here() -> tuple[str, int]:
-    """Return where a launch file makes something: the line of a program, or that of the entity that is parsed."""
+    """Return where a launch file makes something.
+
+    The line of a program, or that of the entity that is parsed.
+    """
     return place() if not _PLACES or place()[0] else _PLACES[-1]
 
 
@@ -322,7 +350,10 @@ def _reason(error: BaseException) -> str:
 
 
 def converted(value: Any) -> Any:
-    """Return the stand-in's counterpart of what launch was given: of objects, and of lists and mappings of them."""
+    """Return the stand-in's counterpart of what launch was given.
+
+    Of objects, and of lists and mappings of them.
+    """
     if isinstance(value, (str, int, float, bool, os.PathLike)) or value is None:
         return value
     if isinstance(value, Mapping):
@@ -388,7 +419,10 @@ def _name(name: str) -> str:
 
 
 class _Own(actions.Action):
-    """An action that launch does itself, or that is another package's: what it gives is visited."""
+    """An action that launch does itself, or that is another package's.
+
+    What it gives is visited.
+    """
 
     def __init__(self, action: Any) -> None:
         super().__init__()
@@ -460,7 +494,10 @@ def _event(value: Any, name: str, args: Any, kwargs: Any) -> Any:
 
 
 def as_substitution(stand_in: type) -> type:
-    """Return a substitution of launch's whose counterpart is that one: for packages that are not installed."""
+    """Return a substitution of launch's whose counterpart is that one.
+
+    For packages that are not installed.
+    """
     kind = type(
         stand_in.__name__,
         (launch.Substitution,),

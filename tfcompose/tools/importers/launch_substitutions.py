@@ -160,8 +160,12 @@ class Context:
     def scope(self) -> tuple[Any, ...]:
         """Return what a group restores at its end."""
         return (
-            dict(self.configurations), dict(self.variables), self.namespace, list(self.params), list(self.remaps)
-        )  # fmt: skip
+            dict(self.configurations),
+            dict(self.variables),
+            self.namespace,
+            list(self.params),
+            list(self.remaps),
+        )
 
     def restore(self, scope: tuple[Any, ...]) -> None:
         """Take back what was changed in a group."""
@@ -571,8 +575,12 @@ class ParameterValue:
             kind = (*getattr(self.value_type, "__args__", ()), None)[
                 0
             ]  # the values of a list, one by one
-            return [ParameterValue(one, value_type=str if isinstance(one, str) else kind).perform(context)
-                    for one in self.value]  # fmt: skip
+            return [
+                ParameterValue(one, value_type=str if isinstance(one, str) else kind).perform(
+                    context
+                )
+                for one in self.value
+            ]
         if self.value_type is None:
             return _typed_or_symbolic(self.value, context)
         if (symbolic := self._symbolic(context)) is not None:

@@ -128,7 +128,7 @@ def _of_value(tag: str, value: Any, path: Steps, source: Source) -> Entity:
         elif isinstance(inner, list) and any(isinstance(one, dict) for one in inner):
             entity.children += [
                 _of_value(key, one, (*path, key, index), source) for index, one in enumerate(inner)
-            ]  # fmt: skip
+            ]
         else:
             entity.attributes[key] = inner
     return entity
@@ -448,14 +448,19 @@ def _common(entity: Entity) -> dict[str, Any]:
 
 def _node_words(entity: Entity) -> dict[str, Any]:
     return {
-        "package": _need(entity, "pkg"), "executable": _need(entity, "exec", "type"),
-        "name": _optional(entity, "name", "node-name"), "namespace": _optional(entity, "namespace", "ns"),
-        "exec_name": _optional(entity, "exec_name"), "parameters": _parameters(entity),
+        "package": _need(entity, "pkg"),
+        "executable": _need(entity, "exec", "type"),
+        "name": _optional(entity, "name", "node-name"),
+        "namespace": _optional(entity, "namespace", "ns"),
+        "exec_name": _optional(entity, "exec_name"),
+        "parameters": _parameters(entity),
         "remappings": [(_need(one, "from"), _need(one, "to")) for one in entity.all("remap")],
         "arguments": command_line(entity.get("args")) if entity.get("args") is not None else None,
-        "ros_arguments": command_line(entity.get("ros_args")) if entity.get("ros_args") is not None else None,
+        "ros_arguments": command_line(entity.get("ros_args"))
+        if entity.get("ros_args") is not None
+        else None,
         **_common(entity),
-    }  # fmt: skip
+    }
 
 
 def _node(entity: Entity, _context: Context) -> list[Any]:
@@ -482,14 +487,17 @@ class _OfRos1(actions.Action):
 
 def _component(entity: Entity, _context: Context) -> list[Any]:
     component = actions.ComposableNode(
-        package=_need(entity, "pkg"), plugin=_need(entity, "plugin"), name=_optional(entity, "name"),
-        namespace=_optional(entity, "namespace"), parameters=_parameters(entity),
+        package=_need(entity, "pkg"),
+        plugin=_need(entity, "plugin"),
+        name=_optional(entity, "name"),
+        namespace=_optional(entity, "namespace"),
+        parameters=_parameters(entity),
         remappings=[(_need(rule, "from"), _need(rule, "to")) for rule in entity.all("remap")],
         **{
             keyword.name: [dict([_parameter(one)]) for one in entity.all(keyword.attribute)]
             for keyword in launch_keywords("parameters")
         },
-    )  # fmt: skip
+    )
     return [component]
 
 
@@ -557,19 +565,29 @@ def _timer(entity: Entity, _context: Context) -> list[Any]:
 
 _MAKERS: dict[str, Callable[[Entity, Context], list[Any]]] = {
     "arg": _argument,
-    "let": lambda one, _: [actions.SetLaunchConfiguration(_need(one, "name"), _need(one, "value"))],
-    "set_env": lambda one, _: [actions.SetEnvironmentVariable(_need(one, "name"), _need(one, "value"))],
-    "env": lambda one, _: [actions.SetEnvironmentVariable(_need(one, "name"), _need(one, "value"))],
+    "let": lambda one, _: [
+        actions.SetLaunchConfiguration(_need(one, "name"), _need(one, "value"))
+    ],
+    "set_env": lambda one, _: [
+        actions.SetEnvironmentVariable(_need(one, "name"), _need(one, "value"))
+    ],
+    "env": lambda one, _: [
+        actions.SetEnvironmentVariable(_need(one, "name"), _need(one, "value"))
+    ],
     "unset_env": lambda one, _: [actions.UnsetEnvironmentVariable(_need(one, "name"))],
     "append_env": lambda one, _: [
         actions.AppendEnvironmentVariable(
-            _need(one, "name"), _need(one, "value"), prepend=str(one.get("prepend")).lower() == "true",
+            _need(one, "name"),
+            _need(one, "value"),
+            prepend=str(one.get("prepend")).lower() == "true",
             separator=_optional(one, "separator") or ":",
         )
     ],
     "node": _node,
     "executable": lambda one, _: [
-        actions.ExecuteProcess(cmd=command_line(_need(one, "cmd")), name=_optional(one, "name"), **_common(one))
+        actions.ExecuteProcess(
+            cmd=command_line(_need(one, "cmd")), name=_optional(one, "name"), **_common(one)
+        )
     ],
     "node_container": _container,
     "composable_node": _component,
@@ -583,13 +601,15 @@ _MAKERS: dict[str, Callable[[Entity, Context], list[Any]]] = {
         actions.SetParameter(_need(one, "name"), substitutions.ParameterValue(_need(one, "value")))
     ],
     "param": _global_parameter,
-    "set_parameters_from_file": lambda one, _: [actions.SetParametersFromFile(_need(one, "filename"))],
+    "set_parameters_from_file": lambda one, _: [
+        actions.SetParametersFromFile(_need(one, "filename"))
+    ],
     "set_remap": lambda one, _: [actions.SetRemap(_need(one, "from"), _need(one, "to"))],
     "remap": lambda one, _: [actions.SetRemap(_need(one, "from"), _need(one, "to"))],
     "set_use_sim_time": lambda one, _: [actions.SetUseSimTime(_need(one, "value"))],
     "log": lambda one, _: [actions.LogInfo(msg=one.get("message"), level=one.get("level"))],
     "set_ros_log_dir": lambda _one, _: [actions.Action()],
-}  # fmt: skip
+}
 
 
 def read(path: str) -> tuple[str, str]:

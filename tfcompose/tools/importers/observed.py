@@ -116,9 +116,17 @@ class Observed:
         """Return the fixed frames that are in the draft as a robot."""
         at, frames = Span(""), self.draft.sections["frames"]
         edges = tuple(
-            Edge(parent=keys["parent"], child=child, kind="static", owner="", pose=self._poses[child], at=at)
-            for child, keys in frames.items() if child in self._poses
-        )  # fmt: skip
+            Edge(
+                parent=keys["parent"],
+                child=child,
+                kind="static",
+                owner="",
+                pose=self._poses[child],
+                at=at,
+            )
+            for child, keys in frames.items()
+            if child in self._poses
+        )
         return Robot(
             "",
             "",

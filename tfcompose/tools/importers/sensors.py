@@ -308,16 +308,23 @@ class _Search:
                 )
 
     def _at_mount(  # noqa: PLR0913 (a preset with what is decided of it, and a place)
-        self, name: str, preset: PresetSpec, choices: Mapping[str, str], sensor: str, mount: Edge,
-        *, has_own_names: bool = False,
-    ) -> Iterator[_Fit]:  # fmt: skip
+        self,
+        name: str,
+        preset: PresetSpec,
+        choices: Mapping[str, str],
+        sensor: str,
+        mount: Edge,
+        *,
+        has_own_names: bool = False,
+    ) -> Iterator[_Fit]:
         own_mount = filled(preset.mount, sensor, preset.words)
         for options in _options(preset):
             every = dict(choices) | options
             wanted = {
-                key: self._as_sent(frame) for key, frame in preset.frames.items()
+                key: self._as_sent(frame)
+                for key, frame in preset.frames.items()
                 if holds(frame.when, every, self.publisher)
-            }  # fmt: skip
+            }
             if self.publisher == DRIVER and not any(frame.driver for frame in wanted.values()):
                 continue
             names = {own_mount: mount.child} if has_own_names else {}
@@ -365,9 +372,14 @@ class _Search:
         return frame.model_copy(update={"parent": own.parent, **at, **turned})
 
     def _matched(
-        self, preset: PresetSpec, sensor: str, wanted: Mapping[str, PresetFrame], names: dict[str, str],
-        *, has_own_names: bool,
-    ) -> dict[str, _Match]:  # fmt: skip
+        self,
+        preset: PresetSpec,
+        sensor: str,
+        wanted: Mapping[str, PresetFrame],
+        names: dict[str, str],
+        *,
+        has_own_names: bool,
+    ) -> dict[str, _Match]:
         """Return where the robot has the preset's frames.
 
         ``names`` gets those that they have in the robot.

@@ -26,10 +26,37 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ASSIGNMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)=(.*)", re.DOTALL)
 #: What prepares a shell or shows something, and starts nothing of a robot.
-_OF_SHELL = frozenset({
-    "source", ".", "set", "echo", "printf", "wait", "trap", "exit", "true", ":", "shopt", "alias", "clear", "unset",
-    "ls", "cat", "less", "head", "tail", "grep", "find", "pwd", "which", "man", "date", "history", "tfcompose",
-})  # fmt: skip
+_OF_SHELL = frozenset(
+    {
+        "source",
+        ".",
+        "set",
+        "echo",
+        "printf",
+        "wait",
+        "trap",
+        "exit",
+        "true",
+        ":",
+        "shopt",
+        "alias",
+        "clear",
+        "unset",
+        "ls",
+        "cat",
+        "less",
+        "head",
+        "tail",
+        "grep",
+        "find",
+        "pwd",
+        "which",
+        "man",
+        "date",
+        "history",
+        "tfcompose",
+    }
+)
 #: What changes files or ends processes; whether the robot needs it is for its owner to say.
 _ONCE = frozenset(
     {"mkdir", "cp", "mv", "rm", "ln", "touch", "chmod", "chown", "kill", "pkill", "killall", "git"}
@@ -44,9 +71,17 @@ _OF_ROS = re.compile(
     r"\b(ros2|rosrun|roslaunch|static_transform_publisher|robot_state_publisher|roscore)\b"
 )
 #: Programs that start another one, which is all that counts here: its output is in its log.
-_TERMINALS = frozenset({
-    "xterm", "gnome-terminal", "x-terminal-emulator", "konsole", "terminator", "xfce4-terminal", "lxterminal",
-})  # fmt: skip
+_TERMINALS = frozenset(
+    {
+        "xterm",
+        "gnome-terminal",
+        "x-terminal-emulator",
+        "konsole",
+        "terminator",
+        "xfce4-terminal",
+        "lxterminal",
+    }
+)
 _SHELLS = frozenset({"bash", "sh", "zsh", "dash"})
 #: Programs that start another one in some way, which ``prefix`` keeps.
 _PREFIXES = frozenset(
@@ -65,10 +100,39 @@ _PREFIXES = frozenset(
 )
 #: What a shell in a terminal does at last so that the terminal stays open.
 _STAYS_OPEN = frozenset({("exec", "bash"), ("bash",), ("read",), ("exec", "$SHELL"), ("$SHELL",)})
-_CONTROL = frozenset({
-    "if", "then", "else", "elif", "fi", "for", "while", "until", "do", "done", "case", "esac", "function", "{", "}",
-    "(", ")", "select", "cd", "sleep", "eval", "return", "local", "break", "continue", "((", "[[", "[", "test",
-})  # fmt: skip
+_CONTROL = frozenset(
+    {
+        "if",
+        "then",
+        "else",
+        "elif",
+        "fi",
+        "for",
+        "while",
+        "until",
+        "do",
+        "done",
+        "case",
+        "esac",
+        "function",
+        "{",
+        "}",
+        "(",
+        ")",
+        "select",
+        "cd",
+        "sleep",
+        "eval",
+        "return",
+        "local",
+        "break",
+        "continue",
+        "((",
+        "[[",
+        "[",
+        "test",
+    }
+)
 #: Words that end what another one begins.
 _ENDS = frozenset({"fi", "done", "esac", "}", ")"})
 #: Words that control the flow and have a command behind them.

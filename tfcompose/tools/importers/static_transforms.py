@@ -25,9 +25,11 @@ PROGRAM = "static_transform_publisher"
 #: The same as a component, which has the values as parameters.
 PLUGIN = "tf2_ros::StaticTransformBroadcasterNode"
 _PARAMETERS = {
-    **{f"translation.{axis}": f"--{axis}" for axis in "xyz"}, **{f"rotation.{axis}": f"--q{axis}" for axis in "xyzw"},
-    "frame_id": "--frame-id", "child_frame_id": "--child-frame-id",
-}  # fmt: skip
+    **{f"translation.{axis}": f"--{axis}" for axis in "xyz"},
+    **{f"rotation.{axis}": f"--q{axis}" for axis in "xyzw"},
+    "frame_id": "--frame-id",
+    "child_frame_id": "--child-frame-id",
+}
 
 #: Who reads the arguments: the program of ROS 2, that of ROS 1's tf, or that of ROS 1's tf2_ros.
 Reader = Literal["ros2", "tf", "tf2_ros"]

@@ -58,7 +58,7 @@ publisher = node.create_publisher(tf_message_type(), "/tf", 100)
 node.create_subscription(JointState, "joint_states", lambda _: publisher.publish(data), 10, raw=True)
 with contextlib.suppress(ExternalShutdownException):
     rclpy.spin(node)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def cpu_s(pid: int) -> float:

@@ -191,9 +191,7 @@ def measure(runs: int = RUNS, joiners: int = JOINERS) -> dict[str, list[float]]:
 
 
 @pytest.mark.ros
-def test_100_edges_are_live_soon_after_a_plain_process_and_at_once_for_who_joins_in_little_memory() -> (
-    None
-):
+def test_100_edges_are_live_soon_and_at_once_for_who_joins_in_little_memory() -> None:
     found = measure()
     assert median(found["up"]) - median(found["plain"]) <= LATER_S, found
     assert max(found["joined"]) <= JOINED_S, found

@@ -23,7 +23,7 @@ with open_node("stranger", "", args=["-r", f"/tf:={topic}"]) as node:
     while True:
         publisher.publish(encode([Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
         time.sleep(0.01)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_offence(

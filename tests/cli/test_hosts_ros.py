@@ -79,7 +79,7 @@ with open_node("arm_drive", "/", args=sys.argv[2:]) as node:
         for ends in (("base_link", "arm"), ("odom", "base_link")):
             publisher.publish(encode([Transform(time.time_ns(), *ends, (0.0, 0.0, 5.0), (0.0, 0.0, 0.0, 1.0))]))
         time.sleep(0.05)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.parametrize("fence", ["partition", "remap"])

@@ -36,7 +36,7 @@ joints:
   wheel: {type: continuous, parent: base_link, child: e, xyz: [0, 0.3, 0], axis: [0, 1, 0]}
 rules: {TF708: off}
 processes: {states: {simulate: {joints: {z_first: 0.4, wheel: 100 deg}, rate: 50 Hz}}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ console = Console(plan, output, colour=True, status=StatusLine(plan, lambda: siz
 code = supervise(plan, file, report=console, session=Session(file, output=output, refresh=console.refresh))
 output.close()
 sys.exit(code)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def plan_of(*names: str, owner: str = "") -> Plan:

@@ -76,7 +76,7 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
             stamp = deserialize_message(received.data, JointState).header.stamp
             stamp_ns = stamp.sec * 10**9 + stamp.nanosec
             moving.publish(encode([Transform(stamp_ns, *at_zero) for at_zero in kinds["moving"]]))
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_the_tree_is_complete_everybody_publishes_their_own_and_the_description_is_the_full_one(

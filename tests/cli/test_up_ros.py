@@ -54,7 +54,7 @@ class Hider:
     def __getattr__(self, name):
         return getattr(self.finder, name)
 sys.meta_path[:] = [Hider(finder) for finder in sys.meta_path]
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def first_on_the_path(folder: Path) -> dict[str, str]:
@@ -296,7 +296,7 @@ def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreport
     assert know() or all("error[TF854]" in one.text for one in ended()), [one.text for one in both]
 
 
-def test_of_two_that_do_not_observe_before_the_start_and_have_the_same_edges_both_report_it_or_one_ends(
+def test_of_two_robots_with_the_same_edges_both_report_it_or_one_ends(
     up: Callable[..., Up], tmp_path: Path
 ) -> None:
     (tmp_path / "other.yaml").write_text(ROVER.replace("robot: rover", "robot: other"))

@@ -105,7 +105,7 @@ for number in range(count):
         print(f"{type(error).__name__}: {error}\nseed {seed}, number {number}, in {name}:\n{now[name]}")
         raise
 print("done")
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.parametrize("seed", range(4))

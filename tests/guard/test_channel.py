@@ -5,9 +5,7 @@ from tfcompose.guard.channel import SilentEdges
 from tfcompose.model.messages import GuardEvent, Silent
 
 
-def test_each_edge_that_falls_silent_or_whose_publisher_is_gone_is_reported_once_and_when_it_is_back() -> (
-    None
-):
+def test_each_silent_or_orphaned_edge_is_reported_once_and_when_it_is_back() -> None:
     edges = (edge("base lidar", "static", "static"), edge("base camera", "static", "static"))
     running = History(edges=(edge("odom base", "drive", rate=10), *edges)).clear()
     events: list[GuardEvent] = []

@@ -71,7 +71,7 @@ with open_node(name, namespace) as node:
         transforms = [Transform(stamp(n), *edge.split(), (1., 0., 0.), (0., 0., 0., 1.)) for edge in edges]
         publisher.publish(encode(transforms))
         time.sleep(0.05)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 class Running:
@@ -226,7 +226,7 @@ with open_node("mounts", "/") as node:
     print("ready", flush=True)
     while True:
         time.sleep(1)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(
@@ -387,7 +387,7 @@ with open_node("rogue", "/") as node:
         publisher.publish(template.data)
         due += 0.001
         time.sleep(max(0.0, due - time.monotonic()))
-"""
+"""  # noqa: E501 (a text as its reader has it)
 #: The least that any rclpy listener does with the same messages: it takes their bytes.
 LISTENER = """
 import signal, sys
@@ -415,7 +415,7 @@ with open_node("foreign", "/") as node:
         publisher.publish(encode([Transform(1, "map", f"dock_{n}", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
     print("ready", flush=True)
     signal.pause()
-"""
+"""  # noqa: E501 (a text as its reader has it)
 GUARDS = ["mode: watch", "mode: strict, fence: partition", "mode: strict, fence: remap"]
 
 

@@ -52,7 +52,7 @@ with open_node(name, "/strange") as node:
         time.sleep(1 / float(hertz))
         if kind == "moving":
             publisher.publish(encode(transforms))
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @dataclass

@@ -234,7 +234,7 @@ def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(
 
 
 @pytest.mark.parametrize("late", [0.0, 5.0])
-def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_reported_once_with_what_is_lost(
+def test_an_owner_that_replaced_an_unheard_latched_edge_is_reported_once(
     late: float,
 ) -> None:
     running = History().clear().wait(late)

@@ -48,7 +48,7 @@ def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_
     expect(running.only(), "TF801", "map → odom", NAMELESS, "slam (/slam)")
 
 
-def test_a_publisher_that_gets_its_name_after_it_was_reported_is_named_once_and_not_reported_to_have_ended(
+def test_a_publisher_that_gets_its_name_late_is_named_once_and_has_not_ended(
     running: History,
 ) -> None:
     slam, stranger = running.joins("/slam"), running.joins(None)
@@ -161,9 +161,7 @@ def test_ids_that_do_not_say_whose_they_are_distinguish_two_that_alternate() -> 
     assert len(running.all(Recovered)) == 1
 
 
-def test_where_ids_do_not_say_whose_they_are_who_came_just_now_is_one_of_those_that_may_have_sent_it() -> (
-    None
-):
+def test_without_ids_a_newcomer_is_one_of_those_that_may_have_sent_it() -> None:
     """Messages of a newcomer can be heard before the graph shows it."""
     running = History(says_who=False).clear()
     slam, rogue = running.joins("/slam"), running.joins("/rogue", hidden=True)
@@ -195,9 +193,7 @@ def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_st
     } >= {"odom", "base"}
 
 
-def test_ids_that_do_not_say_whose_they_are_name_all_who_may_have_sent_what_nobody_there_owns() -> (
-    None
-):
+def test_without_ids_all_who_may_have_sent_a_foreign_edge_are_named() -> None:
     running = History(says_who=False).clear()
     drive, rogue = running.joins("/drive"), running.joins("/rogue")
     for _ in range(30):

@@ -43,7 +43,7 @@ with open_node(name, "/", args=ros) as node:
         now = time.time_ns()
         publisher.publish(encode([Transform(now, *edge.split(), (float(x), 0, 0), (0, 0, 0, 1)) for edge in edges]))
         time.sleep(0.05)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 ROBOT = """
 tfcompose: 1
 robot: liars
@@ -207,7 +207,7 @@ with open_node("flood", "/") as node:
         rest = ((0, 0, 0), (0, 0, 0, 1))
         publisher.publish(encode([Transform(now, f"f{n}_{i}", f"f{n}_{i + 1}", *rest) for i in range(3000)]))
         time.sleep(0.1)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 #: What a guard may grow by, however much is sent.
 MOST_GROWTH = 60_000_000
 

@@ -150,7 +150,7 @@ def test_a_slow_rate_may_be_silent_for_four_periods(watch: Callable[..., History
     assert len(history.run(2).found()) == 1
 
 
-def test_several_edges_of_one_owner_that_falls_silent_are_one_finding_and_come_back_in_one_sentence(
+def test_silent_edges_of_one_owner_are_one_finding_and_one_recovery(
     watch: Callable[..., History],
 ) -> None:
     children = [f"wheel_{n}" for n in range(8)]
@@ -280,7 +280,7 @@ def test_jitter_and_checks_at_uneven_times_find_nothing(
             assert [event for event in live.judge(now) if isinstance(event, FindingShown)] == []
 
 
-def test_a_latching_owner_that_leaves_the_graph_is_reported_once_with_its_edges_and_when_it_is_back(
+def test_a_latching_owner_that_leaves_is_reported_once_and_when_it_is_back(
     watch: Callable[..., History],
 ) -> None:
     live = watch(

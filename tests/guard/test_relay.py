@@ -150,9 +150,7 @@ def test_fixed_edges_of_one_who_has_left_are_latched_no_more() -> None:
     assert running.bus.latched() == [{("base", "camera")}, {("map", "odom")}]
 
 
-def test_fixed_edges_of_one_sender_come_together_and_what_is_not_admitted_is_left_out_and_counted() -> (
-    None
-):
+def test_fixed_edges_of_a_sender_come_together_without_refused_ones() -> None:
     running = (
         Passing()
         .send(CAMERA, "base camera", who="/camera")
@@ -166,9 +164,7 @@ def test_fixed_edges_of_one_sender_come_together_and_what_is_not_admitted_is_lef
     assert not running.relay.held.report()
 
 
-def test_a_guard_that_follows_latches_again_what_may_still_pass_and_forgets_nobody_before_all_are_found() -> (
-    None
-):
+def test_a_following_guard_latches_again_and_forgets_nobody_too_early() -> None:
     memory = (
         Passing().send(CAMERA, "base camera, base lidar").send(SLAM, "map odom").relay.memory()
     )

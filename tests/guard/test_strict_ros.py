@@ -37,7 +37,7 @@ signal.signal(signal.SIGINT, lambda *_: sys.exit())
 def message(edges):
     return encode([Transform(time.time_ns(), *edge.split(), (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8)) for edge in edges])
 def wait_until_passed_on(edge):
-    # A latched topic keeps the last message only, and subscribers that are counted may be one's own.
+    # A latched topic keeps the last message only, and counted subscribers may be its own.
     with open_node(name, "/outside") as node:
         reader, wanted = TFSubscription(node, static=True), edge.split()[1]
         while wanted not in {t.child for one in reader.take() for t in decode(one.data)}:
@@ -60,7 +60,7 @@ with open_node(name, "/", args=sys.argv[5:]) as node:
         heard |= found
         if found:
             print("hears", *sorted(heard), flush=True)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 ROBOT = """
 tfcompose: 1
 robot: fenced
@@ -286,7 +286,7 @@ with open_node("ear", "/", args=sys.argv[2:]) as node:
         wait(node, readers, 0.5, Stop())
         heard.update(t.child for reader in readers for one in reader.take() for t in decode(one.data))
         print("heard", json.dumps(heard), flush=True)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 LISTENING = """
 tfcompose: 1
 robot: listening__robot

@@ -60,7 +60,7 @@ session = Session(file, RunFiles(place, lock, file), None, output)
 code = supervise(plan, file, report=Console(plan, output, colour=False, keep=logs.write), session=session)
 output.close()
 sys.exit(code)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 #: Stands before the launcher: once there is a file "back", the clock is an hour behind.
 CLOCK_GOES_BACK = """
 import os, time
@@ -110,7 +110,7 @@ if os.fork() == 0:
     os.execve(sys.executable, [sys.executable, "-I", "-c", code], {})
 while "stays" in sys.argv or not os.path.exists("daemon"):  # before, it is of its parent's group, as in DAEMON
     time.sleep(0.01)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 class Run:

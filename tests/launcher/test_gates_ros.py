@@ -54,7 +54,7 @@ try:
     rclpy.spin(node)
 except BaseException:
     pass
-"""
+"""  # noqa: E501 (a text as its reader has it)
 GUARD = PlanProcess("guard", "guard", (PROGRAM, "guard", "${plan}", "guard"), nodes=("/guard",))
 
 

@@ -34,7 +34,7 @@ ros: {discovery: localhost, namespace: rover, clock: sim}
 frames: {base_link: {}, lidar: {parent: base_link, xyz: [0, 0, 0.3]}}
 processes:
   demo: {run: {launch: demo/two.launch.py, args: {speed: "2.5"}}, remap: {chatter: loud}, ready: {topic: loud}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 LAUNCH = """
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -58,7 +58,7 @@ speed = node.declare_parameter("speed", 0.0).value
 publisher = node.create_publisher(String, "chatter", 1)
 print("I am", node.get_fully_qualified_name(), publisher.topic_name, node.get_parameter("use_sim_time").value, speed)
 rclpy.spin(node)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.fixture

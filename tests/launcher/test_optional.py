@@ -94,9 +94,7 @@ def test_what_else_is_missing_is_still_waited_for() -> None:
     assert [one.owner for one in history.all(Waiting)[0].missing] == ["static"]
 
 
-def test_one_that_waits_for_it_fails_with_the_reason_and_ends_everything_unless_it_is_optional_too() -> (
-    None
-):
+def test_who_waits_for_it_fails_and_ends_everything_unless_optional_too() -> None:
     gate = Ready("log", "up")
     camera = replace(optional(), ready=gate)
     history = begin(STATIC, camera, run_process("nav", after={"camera": "ready"})).feed(

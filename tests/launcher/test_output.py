@@ -9,9 +9,7 @@ import pytest
 from tfcompose.launcher.output import KEPT, NonBlockingOutput
 
 
-def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_learns_how_much_is_left_out() -> (
-    None
-):
+def test_a_reader_that_does_not_read_costs_bounded_memory_and_learns_of_it() -> None:
     reader, writer = os.pipe()
     stream = NonBlockingOutput(writer)
     for number in range(20_000):

@@ -72,9 +72,7 @@ def test_the_guard_checks_a_gate_and_what_waits_is_started_when_it_opens(
     assert history.all(ProcessReady) == [ProcessReady("lidar", "/scan", 2.0)]
 
 
-def test_a_gate_that_stays_shut_is_reported_once_with_what_was_there_instead_and_may_still_open() -> (
-    None
-):
+def test_a_gate_that_stays_shut_is_reported_once_and_may_still_open() -> None:
     history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(
         Clear(), GateShut("lidar", "topics /tf, /scan_raw")
     )
@@ -269,9 +267,7 @@ def test_a_guard_that_is_restarted_learns_who_is_absent_and_which_gates_are_shut
     assert history.found() == []
 
 
-def test_a_guard_that_dies_is_reported_and_restarted_with_its_reports_and_live_edges_stay_live() -> (
-    None
-):
+def test_a_guard_that_dies_is_restarted_with_its_reports_and_live_edges() -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
     history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
     history.notices.clear()

@@ -99,7 +99,7 @@ def test_a_folder_that_somebody_else_may_have_prepared_is_refused(
         runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": ""})
 
 
-def test_of_two_only_one_gets_the_lock_the_other_learns_who_has_it_and_a_killed_holder_leaves_nothing(
+def test_one_of_two_gets_the_lock_and_a_killed_holder_leaves_nothing(
     env: dict[str, str],
 ) -> None:
     place = runtime_dir_of(ROVER, env)

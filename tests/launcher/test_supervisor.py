@@ -46,7 +46,7 @@ child = subprocess.Popen([sys.executable, "-I", "-S", "-c", deaf], stdout=subpro
 child.stdout.readline()
 print("pids", os.getpid(), child.pid, flush=True)
 time.sleep(180)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 HEAD_OF_TF808 = "name: process_failed\nseverity: error\nfamily: processes\n"
 DEAF = """
 import os, signal, time

@@ -20,7 +20,7 @@ SERVICES = {
     "LoadNode": (
         """string package_name; string plugin_name; string node_name; string node_namespace; uint8 log_level;
         sequence<string> remap_rules; sequence<rcl_interfaces::msg::Parameter> parameters;
-        sequence<rcl_interfaces::msg::Parameter> extra_arguments;""",
+        sequence<rcl_interfaces::msg::Parameter> extra_arguments;""",  # noqa: E501 (a text as its reader has it)
         "boolean success; string error_message; string full_node_name; uint64 unique_id;",
     ),
     "UnloadNode": ("uint64 unique_id;", "boolean success; string error_message;"),

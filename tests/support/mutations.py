@@ -19,21 +19,21 @@ T = TypeVar("T")
 #: Values in the place of another: other types, other dimensions, no numbers, no expressions,
 #: nested wrongly.
 VALUES = (
-    "null", "true", "maybe", "3", "-1", "0", "1e400", ".nan", "''", "{}", "[]", "{a: 1}", "[1, 2]", "[[1], 2]",
-    "3 kg", "10 degrees", "5 cmm", "2 Hz", "-4 cm", "1e308 km", "30 °", "'3,5 m'", "12:30", "2020-01-01", "0x1F", "012",
-    "'${nope}'", "'${1/0}'", "'${'", "'${1 m + 1 kg}'", "'${frame(a)}'", "*nowhere", "!degrees 5", "a: b", "base_link",
+    "null", "true", "maybe", "3", "-1", "0", "1e400", ".nan", "''", "{}", "[]", "{a: 1}", "[1, 2]", "[[1], 2]",  # noqa: E501 (a text as its reader has it)
+    "3 kg", "10 degrees", "5 cmm", "2 Hz", "-4 cm", "1e308 km", "30 °", "'3,5 m'", "12:30", "2020-01-01", "0x1F", "012",  # noqa: E501 (a text as its reader has it)
+    "'${nope}'", "'${1/0}'", "'${'", "'${1 m + 1 kg}'", "'${frame(a)}'", "*nowhere", "!degrees 5", "a: b", "base_link",  # noqa: E501 (a text as its reader has it)
     "9999999999999999999999", "~/x", "'a b'", "ü", "[{}, null]", "{xyz: [1, 2, 3], rpy: zero}",
 )  # fmt: skip
 
 #: Entries that a mapping may have no use for: unknown keys, keys of other places, and second
 #: choices.
 ENTRIES = (
-    "xzy: [0, 0, 0]", "nmae: x", "extra: 1", "rpy: [0, 0, 0]", "look: up", "look: {down: 1, up: 1}",
-    "quat_xyzw: [0, 0, 0, 2]", "axis_angle: {axis: [0, 0, 0], angle: 1}", "matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]",
-    "run: [x]", "simulate: {circle: {}}", "external: true", "launch: a/b.launch.py", "parent: nowhere", "parent: null",
-    "owner: nobody", "rate: 0", "rate: 10 s", "type: hinge", "preset: generic/lidar2", "options: {streem: [color]}",
-    "box: [1, 1]", "sphere: {radius: -1}", "mass: 3 m", "static: 1", "xyz: [1, 2]", "xyz: [1, 2, 3, 4]",
-    "limit: {lower: x}", "ready: {exit: 300}", "restart: sometimes", "when: {tf: x}", "x-note: 1", "3: 4", "[a]: b",
+    "xzy: [0, 0, 0]", "nmae: x", "extra: 1", "rpy: [0, 0, 0]", "look: up", "look: {down: 1, up: 1}",  # noqa: E501 (a text as its reader has it)
+    "quat_xyzw: [0, 0, 0, 2]", "axis_angle: {axis: [0, 0, 0], angle: 1}", "matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]",  # noqa: E501 (a text as its reader has it)
+    "run: [x]", "simulate: {circle: {}}", "external: true", "launch: a/b.launch.py", "parent: nowhere", "parent: null",  # noqa: E501 (a text as its reader has it)
+    "owner: nobody", "rate: 0", "rate: 10 s", "type: hinge", "preset: generic/lidar2", "options: {streem: [color]}",  # noqa: E501 (a text as its reader has it)
+    "box: [1, 1]", "sphere: {radius: -1}", "mass: 3 m", "static: 1", "xyz: [1, 2]", "xyz: [1, 2, 3, 4]",  # noqa: E501 (a text as its reader has it)
+    "limit: {lower: x}", "ready: {exit: 300}", "restart: sometimes", "when: {tf: x}", "x-note: 1", "3: 4", "[a]: b",  # noqa: E501 (a text as its reader has it)
     "null: 1", "'': {}",
 )  # fmt: skip
 
@@ -276,6 +276,6 @@ def _unit(text: str, spot: Spot, chooser: Chooser) -> str:
 
 
 KINDS: tuple[Callable[[str, Spot, Chooser], str], ...] = (
-    _delete, _duplicate, _rename, _rename, _misspell, _other_value, _other_value, _null, _nested, _entry, _entry,
+    _delete, _duplicate, _rename, _rename, _misspell, _other_value, _other_value, _null, _nested, _entry, _entry,  # noqa: E501 (a text as its reader has it)
     _swapped, _unit, _unit,
 )  # fmt: skip

@@ -27,7 +27,7 @@ frames:
 processes:
   drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
   arm_drive: {simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: jetson, after: {drive: ready}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 #: A robot with names in every place where a xacro macro prefixes them, and texts that xacro would
 #: evaluate.
 EVERYTHING = """tfcompose: 1
@@ -52,7 +52,7 @@ xml:
     <gazebo reference="hand"><plugin name="p" filename='q'><frame> base_link </frame><joint>joint</joint>
       <text>base_link of joint $(eval 1)</text><cost>$5 $$(x)</cost></plugin></gazebo>
     <transmission name="drive"><joint name="joint"/><actuator name="motor"/></transmission>
-"""
+"""  # noqa: E501 (a text as its reader has it)
 #: A robot with everything that a process can have.
 DRIVEN = """
 tfcompose: 1
@@ -77,4 +77,4 @@ processes:
     stop: {signal: SIGTERM, timeout: 2 s}
   slam: {run: [slam, --now], node: slam, restart: on-failure, max_restarts: 3, after: {drive: started, static: ready}}
   other: {external: true}
-"""
+"""  # noqa: E501 (a text as its reader has it)

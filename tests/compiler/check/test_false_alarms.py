@@ -42,7 +42,7 @@ processes: {cameras: {external: true}}
 profiles:
   low: {sensors: {camera: {xyz: [0, 0, "${spare}"]}}}
   alone: {sensors: {camera: {driver: none, tf: tfcompose}}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.parametrize("profiles", [(), ("low",), ("alone",), ("low", "alone")])

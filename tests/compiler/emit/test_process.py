@@ -205,9 +205,7 @@ def test_how_it_is_run_becomes_words_that_the_launcher_can_follow(keys: str) -> 
     assert process_of(keys).argv == COMMANDS[keys]
 
 
-def test_a_command_that_owns_an_edge_gets_the_arguments_of_all_nodes_and_one_that_may_be_no_node_does_not() -> (
-    None
-):
+def test_a_command_that_owns_an_edge_gets_ros_arguments_and_others_do_not() -> None:
     head = HEAD.replace("namespace: r1", "namespace: r1, isolate: topics, clock: sim")
     head = head.replace("{map: {}}", "{map: {}, odom: {parent: map, owner: drive}}")
     plan = read_plan(
@@ -512,9 +510,7 @@ def test_a_component_is_loaded_with_typed_parameters_and_started_by_nobody() -> 
     assert process.after == {"box": "ready"}
 
 
-def test_a_component_has_the_clock_and_the_topics_of_the_robot_since_no_command_line_gives_them() -> (
-    None
-):
+def test_a_component_has_the_clock_and_the_topics_of_the_robot() -> None:
     process = component_of(
         head=HEAD.replace("{namespace: r1}", "{namespace: r1, clock: sim, isolate: topics}")
     )

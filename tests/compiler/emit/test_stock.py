@@ -167,9 +167,7 @@ ARM = (
 )
 
 
-def test_a_part_that_is_a_robot_has_a_stock_publisher_of_its_own_and_one_that_is_a_piece_has_not() -> (
-    None
-):
+def test_only_a_part_that_is_a_robot_has_a_stock_publisher_of_its_own() -> None:
     texts = {"r.yaml": ONE, "arm.yaml": ARM}
     found = compile_robot(FLEET, "fleet.yaml", library(), read=texts.__getitem__)
     assert not found.errors, found.errors

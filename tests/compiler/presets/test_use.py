@@ -191,9 +191,7 @@ def test_two_of_one_kind_share_no_frame_no_node_and_no_serial_number() -> None:
     }
 
 
-def test_with_infra1_the_driver_hangs_the_optical_frame_on_its_aligned_depth_and_tfcompose_does_not() -> (
-    None
-):
+def test_with_infra1_only_the_driver_hangs_the_optical_frame_on_aligned_depth() -> None:
     options = {"streams": ["depth", "color", "infra1"]}
     by_driver, ours = (
         robot_of("realsense/d455", options=options, tf=tf) for tf in ("driver", "tfcompose")
@@ -204,9 +202,7 @@ def test_with_infra1_the_driver_hangs_the_optical_frame_on_its_aligned_depth_and
     assert "s_aligned_depth_to_infra1_frame" not in ours.frames
 
 
-def test_a_zed_sends_its_lenses_on_tf_unless_intra_process_communication_is_off_and_nothing_before_5_1() -> (
-    None
-):
+def test_a_zed_sends_its_lenses_on_tf_by_version_and_intra_process_option() -> None:
     frames = ("s_left_camera_frame", "s_right_camera_frame")
     for options, kind, owner in (
         ({}, "dynamic", "s"),

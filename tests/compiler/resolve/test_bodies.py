@@ -185,9 +185,7 @@ def test_a_collada_file_is_as_large_as_its_unit_says(tmp_path: Path) -> None:
     assert matrix(by_mesh) == pytest.approx(matrix(by_box), rel=1e-6)
 
 
-def test_a_centre_of_mass_that_is_given_is_kept_and_the_tensor_about_it_is_that_of_the_shapes() -> (
-    None
-):
+def test_a_given_centre_of_mass_is_kept_with_the_tensor_of_the_shapes() -> None:
     shape = {"visual": {"box": [1, 2, 3], "xyz": [0.1, 0, 0]}}
     free = inertial_of(shape | {"inertial": {"mass": 2}})
     moved = inertial_of(shape | {"inertial": {"mass": 2, "xyz": [0, 0, -0.2]}})

@@ -11,7 +11,7 @@ FLEET = """
 fleet: 1
 share: [odom → base_link]
 robots: {rover: {router: tcp/10.0.0.11:7447}, r2: {router: tcp/10.0.0.12:7447, share: [two/odom → two/base_link]}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 ROBOT = """
 tfcompose: 1
 robot: rover

@@ -33,7 +33,7 @@ planner:
 robot1:
   planner: {ros__parameters: {nested: 1}}
 /*/planner: {ros__parameters: {one_part: 1}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def compiled(params: str, **files: str) -> Compiled:
@@ -51,9 +51,7 @@ def source_text(params: str, **files: str) -> str:
     return {file.path: file.text for file in emit(result.robot)}["params/planner.yaml"]
 
 
-def test_what_the_file_says_to_the_node_is_taken_in_its_order_and_inline_parameters_are_laid_over_it() -> (
-    None
-):
+def test_parameters_of_the_file_come_in_order_below_inline_ones() -> None:
     params = yaml.safe_load(source_text("{file: p.yaml, deep: {a: 9}, own: x}"))
     assert list(params) == ["/robot1/planner"]
     output = params["/robot1/planner"]["ros__parameters"]

@@ -37,7 +37,7 @@ processes:
   wheels: {simulate: {joints: {wheel_joint: 1}}, after: {slam: started}}
 guard: {allow: [{parent: camera_link, child: "tag:*"}]}
 profiles: {bare: {sensors: null}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 FLEET = """
 tfcompose: 1
@@ -57,7 +57,7 @@ joints:
   shoulder: {type: revolute, parent: foot, child: upper, limit: {lower: -1, upper: 1, effort: 1, velocity: 1}}
 frames: {tool: {parent: upper, xyz: [0, 0, 0.5]}, camera_frame: {parent: foot, xyz: [0.1, 0, 0.3], rpy: [0, 0.2, 0]}}
 processes: {shaker: {simulate: {joints: zero}, after: {static: started}}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 CELL = """
 tfcompose: 1
@@ -111,9 +111,7 @@ def test_two_robots_from_one_file_share_a_map_and_nothing_else() -> None:
         )
 
 
-def test_the_processes_of_a_part_are_below_its_namespace_and_know_its_frames_by_their_final_names() -> (
-    None
-):
+def test_processes_of_a_part_are_in_its_namespace_and_know_final_frame_names() -> None:
     files = built(FLEET)
     plan = read_plan(files["plan.json"], "plan.json")
     slam = plan.process("one/slam")

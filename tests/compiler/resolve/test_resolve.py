@@ -168,9 +168,7 @@ def inner(robot: Robot) -> set[str]:
     return {edge.owner for edge in robot.edges if edge.child.startswith("c_color")}
 
 
-def test_the_driver_publishes_the_frames_inside_unless_tfcompose_does_and_then_it_is_switched_off() -> (
-    None
-):
+def test_the_driver_is_switched_off_where_tfcompose_publishes_its_frames() -> None:
     default, by_driver, ours = (
         robot_of(CAMERA % f"options: {{}}{tf}") for tf in ("", ", tf: driver", ", tf: tfcompose")
     )

@@ -21,7 +21,7 @@ joints:
   bend: {type: revolute, parent: b, child: c, limit: {lower: -90 deg, upper: 30 deg, velocity: 2, effort: 1}}
   follow: {type: revolute, parent: c, child: d, limit: {lower: -1, upper: 1, velocity: 2, effort: 1}, %s}
 processes: {states: {simulate: {joints: %s}}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 ROTATION = Sweep(6.0)
 LIFT = Sweep(math.pi * 0.4 / 0.05, 0.1, 0.5)
 BEND = Sweep(6.0, -math.pi / 2, math.pi / 6)

@@ -51,7 +51,7 @@ EXPECTED = """<ros2_control name="base" type="system" rw_rate="100" is_async="tr
 <param name="encoder">4096</param></joint>
 <sensor name="force"><state_interface name="force.x"/><param name="frame_id">wheel</param></sensor>
 <gpio name="lamp"><command_interface name="digital" data_type="bool" size="4">
-<param name="initial_value">false</param></command_interface></gpio></ros2_control>"""
+<param name="initial_value">false</param></command_interface></gpio></ros2_control>"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_a_rate_of_zero_is_that_of_all_as_ros2_control_reads_it() -> None:
@@ -159,7 +159,7 @@ frames: {a: {}}
 ros2_control: {motors: {plugin: x/Y, joints: {wrist: {command: [effort]}}}}
 xml: {g: '<gazebo reference="hand"><frame>foot</frame><word>footed</word></gazebo>'}
 processes: {x: {external: true}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
     texts = {"red.yaml": arm % 1, "dark.yaml": arm % 0.2}
     holder = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nparts:\n" + "".join(
         f"  {side}: {{spec: {file}, prefix: {side}_, parent: base_link}}\n"

@@ -245,7 +245,7 @@ XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
   <link name="base_link"/>
   <xacro:leg n="1"/>
 </robot>
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_a_xacro_file_is_expanded_and_places_are_those_in_it(tmp_path: Path) -> None:
@@ -306,38 +306,38 @@ LIMIT = f'<limit {RATES} {{}} {{}}="1"/>'
 #: the robot, or takes it for another one.
 JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="a"/>{}</joint>'
 LEVELS = {
-    "hyphens, as every UR has them": (f'<link name="a"/>{JOINT.format("base_link-a_joint", "fixed", "")}', "warning"),
+    "hyphens, as every UR has them": (f'<link name="a"/>{JOINT.format("base_link-a_joint", "fixed", "")}', "warning"),  # noqa: E501 (a text as its reader has it)
     "a space": (f'<link name="a"/>{JOINT.format("my joint", "fixed", "")}', "warning"),
-    "a slash that no lookup takes": (f'<link name="a"/>{JOINT.format("/j", "fixed", "")}', "error"),
+    "a slash that no lookup takes": (f'<link name="a"/>{JOINT.format("/j", "fixed", "")}', "error"),  # noqa: E501 (a text as its reader has it)
     "an extension": ('<material name="m" gloss="1"><color rgba="1 1 1 1"/></material>', "warning"),
     "an extension that is like a word": (
         f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "command_effort"))}',
         "warning",
     ),
     "a safety controller without its gain": (
-        '<link name="a"/>' + JOINT.format("j", "continuous", '<safety_controller soft_upper_limit="1"/>'), "error"),
-    "a slip": (f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "uper"))}', "error"),
-    "a limit without ends": (f'<link name="a"/>{JOINT.format("j", "revolute", f"<limit {RATES}/>")}', "warning"),
+        '<link name="a"/>' + JOINT.format("j", "continuous", '<safety_controller soft_upper_limit="1"/>'), "error"),  # noqa: E501 (a text as its reader has it)
+    "a slip": (f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "uper"))}', "error"),  # noqa: E501 (a text as its reader has it)
+    "a limit without ends": (f'<link name="a"/>{JOINT.format("j", "revolute", f"<limit {RATES}/>")}', "warning"),  # noqa: E501 (a text as its reader has it)
     "a limit of the largest float": (
-        '<link name="a"/>' + JOINT.format("j", "revolute", LIMIT.format('lower="-1e308"', "upper")), "warning"),
+        '<link name="a"/>' + JOINT.format("j", "revolute", LIMIT.format('lower="-1e308"', "upper")), "warning"),  # noqa: E501 (a text as its reader has it)
     "a place beyond all numbers": (
         '<link name="a"/>' + JOINT.format("j", "fixed", '<origin xyz="1e300 0 0"/>'), "error"),
     "no limit": (f'<link name="a"/>{JOINT.format("j", "revolute", "")}', "error"),
-    "a body of no size": ('<link name="a"><collision><geometry><sphere radius="0"/></geometry></collision></link>'
+    "a body of no size": ('<link name="a"><collision><geometry><sphere radius="0"/></geometry></collision></link>'  # noqa: E501 (a text as its reader has it)
         + JOINT.format("j", "fixed", ""), "warning"),
-    "a body of less": ('<link name="a"><collision><geometry><sphere radius="-1"/></geometry></collision></link>'
+    "a body of less": ('<link name="a"><collision><geometry><sphere radius="-1"/></geometry></collision></link>'  # noqa: E501 (a text as its reader has it)
         + JOINT.format("j", "fixed", ""), "error"),
     "a shape that simulators have and Jazzy has not": (
-        '<link name="a"><visual><geometry><capsule radius="1" length="1"/></geometry></visual></link>'
+        '<link name="a"><visual><geometry><capsule radius="1" length="1"/></geometry></visual></link>'  # noqa: E501 (a text as its reader has it)
         + JOINT.format("j", "fixed", ""), "warning"),
     "a tab between numbers": (
-        '<link name="a"/>' + JOINT.format("j", "fixed", '<origin xyz="1\t0 0" rpy=" 0 0 0 "/>'), "warning"),
-    "a line break": ('<link name="a"/>' + JOINT.format("j", "fixed", "<origin xyz='1 0 0\n'/>"), "warning"),
+        '<link name="a"/>' + JOINT.format("j", "fixed", '<origin xyz="1\t0 0" rpy=" 0 0 0 "/>'), "warning"),  # noqa: E501 (a text as its reader has it)
+    "a line break": ('<link name="a"/>' + JOINT.format("j", "fixed", "<origin xyz='1 0 0\n'/>"), "warning"),  # noqa: E501 (a text as its reader has it)
     "xacro without its prefix": (
         '<link name="a"/>' + JOINT.format("j", "fixed", '<insert_block name="origin"/>'), "error"),
-    "xacro that was not expanded": ('<xacro:wheel n="1" xmlns:xacro="http://www.ros.org/wiki/xacro"/>', "error"),
+    "xacro that was not expanded": ('<xacro:wheel n="1" xmlns:xacro="http://www.ros.org/wiki/xacro"/>', "error"),  # noqa: E501 (a text as its reader has it)
     "a block about nothing": ('<gazebo reference="gone"/>', "warning"),
-    "a transmission of nothing": ('<transmission name="t"><joint name="gone"/></transmission>', "warning"),
+    "a transmission of nothing": ('<transmission name="t"><joint name="gone"/></transmission>', "warning"),  # noqa: E501 (a text as its reader has it)
 }  # fmt: skip
 
 

@@ -36,7 +36,7 @@ joints:
       dynamics: {damping: 1}, safety_controller: {k_velocity: 1}, calibration: {rising: 0.5}}
   k: {type: prismatic, parent: a, child: b, mimic: {joint: j, offset: 1}, axis: [0, 1, 0],
       limit: {lower: 0, upper: 1}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 #: What yourdfpy takes an axis for that is not there.
 AXIS_OF_ITSELF = '    <axis xyz="1 0 0"/>\n'
 SPECS = [

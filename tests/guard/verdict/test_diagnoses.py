@@ -352,9 +352,7 @@ def test_with_a_plan_what_differs_from_it_is_found(case: str) -> None:
     expect(found, code, *names)
 
 
-def test_a_frame_that_goes_from_node_to_node_is_reported_once_and_one_whose_node_has_left_too() -> (
-    None
-):
+def test_a_frame_that_goes_from_node_to_node_is_reported_once() -> None:
     history = TreeHistory().moving("table cup", until_s=2.0).fixed("table tool0")
     for tick in range(101, 250):
         now = BEGUN_NS + tick * SECOND_NS // 50

@@ -417,7 +417,7 @@ def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan:
     assert [found.code for verdict in verdicts for found in verdict.found] == []
 
 
-def test_a_frame_that_a_driver_sends_far_from_its_preset_is_reported_and_a_strangers_is_not_compared(
+def test_a_driver_far_from_its_preset_is_reported_and_strangers_are_not_compared(
     plan: Plan, tree: Tree
 ) -> None:
     driven = replace(plan.process("camera").drives[0], frames={"lens": "nominal"})

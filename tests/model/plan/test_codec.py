@@ -108,9 +108,7 @@ def test_what_is_encoded_is_decoded(machine: Machine) -> None:
     assert decode(Machine, json.loads(json.dumps(encode(machine)))) == machine
 
 
-def test_fields_stand_in_their_order_flat_ones_among_the_others_and_omitted_ones_not_at_their_default() -> (
-    None
-):
+def test_fields_stand_in_order_with_flat_ones_and_without_defaults() -> None:
     assert json.dumps(encode(ONE)) == json.dumps(DATA)
 
 

@@ -92,9 +92,7 @@ def test_a_host_that_the_plan_does_not_know_is_a_finding(
 STRICT = "guard: {mode: strict}\n"
 
 
-def test_behind_a_strict_guard_each_machine_hears_the_others_guard_and_has_a_fence_of_its_own() -> (
-    None
-):
+def test_each_machine_of_a_strict_plan_hears_the_other_guard_and_has_a_fence() -> None:
     plan = compiled_plan(ON_TWO_HOSTS + STRICT)
     shares = [
         share

@@ -137,7 +137,7 @@ MISTAKES = [
     (BASE + "frames:\n  odom: {owner: drive}\n", "5:10 TF102", "owner: drive child"),
     (
         BASE
-        + "frames:\n  mast: {parent: base_link, owner: node}\nprocesses:\n  a: {external: true, node: node}\n",
+        + "frames:\n  mast: {parent: base_link, owner: node}\nprocesses:\n  a: {external: true, node: node}\n",  # noqa: E501 (a text as its reader has it)
         "5:36 TF302",
         "did you mean a",
     ),
@@ -157,7 +157,7 @@ MISTAKES = [
     ),
     (
         ARG
-        + "  tip: {parent: base_link, owner: drive}\nprocesses: {drive: {when: '${args.on}', external: true}}\n",
+        + "  tip: {parent: base_link, owner: drive}\nprocesses: {drive: {when: '${args.on}', external: true}}\n",  # noqa: E501 (a text as its reader has it)
         "6:35 TF302",
         "when: ${args.on};",
     ),

@@ -406,7 +406,7 @@ def test_a_large_profile_is_laid_over_in_time_that_grows_with_its_size() -> None
         source = load(
             f"base:\n{keys}profiles:\n  p:\n    base:\n" + keys.replace("  k", "      k"), "f"
         )
-        gc.disable()  # it is turned down on the command line too, and grows with everything else that is alive
+        gc.disable()  # it is turned down on the command line too, and grows with everything else that is alive  # noqa: E501 (a text as its reader has it)
         began = time.process_time()
         composed(source, ["p"])
         taken = time.process_time() - began
@@ -425,9 +425,7 @@ two: {<<: *used, 3: {a: !mine b}}
 """
 
 
-def test_what_is_wrong_below_an_anchor_at_the_top_is_reported_once_and_only_if_something_uses_it() -> (
-    None
-):
+def test_faults_below_an_anchor_are_reported_once_and_only_if_it_is_used() -> None:
     found = load(ASIDE, "f").found
     places = sorted((one.code, one.span.line, one.span.column) for one in found if one.span)
     assert places == [("TF004", 2, 28), ("TF004", 4, 18), ("TF005", 2, 19), ("TF007", 2, 38)]

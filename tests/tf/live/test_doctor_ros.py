@@ -426,7 +426,7 @@ with open_node("far", "") as node:
     while True:
         publisher.publish(encode([Transform(time.time_ns(), "odom", "base_link", (0.0,) * 3, (0.0, 0.0, 0.0, 1.0))]))
         time.sleep(0.03)
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.skipif(not GCC, reason="the clock of a process is set by a library that gcc makes")
@@ -451,7 +451,7 @@ def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: 
     assert {one["code"] for one in found} == {"TF834"}
 
 
-def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_that_differs_from_its_plan_gives_each_difference(
+def test_a_robot_as_planned_gives_no_finding_and_each_difference_is_one(
     start: Callable[..., Started], nodes: FakeNodes
 ) -> None:
     """The example's stand-ins; without the profile the plan expects a camera's driver."""

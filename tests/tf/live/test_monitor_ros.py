@@ -136,9 +136,7 @@ def test_where_nothing_comes_it_says_so_with_exit_code_1() -> None:
     assert "error[TF811] " in done.stderr
 
 
-def test_between_two_frames_each_edge_has_its_publisher_and_the_net_delay_is_that_of_the_last() -> (
-    None
-):
+def test_between_two_frames_each_edge_has_its_publisher_and_a_net_delay() -> None:
     def is_named(seconds: float) -> None:
         done = json.loads(
             monitor("map", "/base_link", "--for", str(seconds), "--format", "json").stdout

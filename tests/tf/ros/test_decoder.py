@@ -94,9 +94,7 @@ def test_random_bytes_are_refused_or_read_as_by_decode(noise: bytes) -> None:
             assert repr(list(decoder.rows(data))) == expected
 
 
-def test_every_truncation_and_every_huge_count_is_refused_after_the_full_message_was_accepted() -> (
-    None
-):
+def test_truncations_and_huge_counts_are_refused_after_a_full_message() -> None:
     decoder = Decoder()
     data = encode(
         [Transform(S, "odom", f"f{index}", (1, 2, 3), (0, 0, 0, 1)) for index in range(4)]
@@ -114,9 +112,7 @@ def test_every_truncation_and_every_huge_count_is_refused_after_the_full_message
                 decoder.rows(data[:at] + struct.pack("<I", count) + data[at + 4 :])
 
 
-def test_a_flood_of_ever_new_layouts_takes_bounded_memory_and_no_more_time_later_than_at_first() -> (
-    None
-):
+def test_a_flood_of_new_layouts_takes_bounded_memory_and_time() -> None:
     rng = random.Random(3)
     decoder = Decoder()
 

@@ -40,7 +40,7 @@ read = {name: repr(p.value) for name, p in node.get_parameters_by_prefix("").ite
 print(json.dumps(read, sort_keys=True))
 node.destroy_node()
 rclpy.shutdown()
-"""
+"""  # noqa: E501 (a text as its reader has it)
 ROBOT = """
 tfcompose: 1
 robot: r

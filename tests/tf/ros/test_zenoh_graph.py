@@ -95,9 +95,7 @@ def test_what_is_no_publishers_token_is_left_out(token: str) -> None:
     assert publisher_of(token) is None
 
 
-def test_an_attachment_says_the_count_the_time_and_the_id_in_the_layouts_of_old_and_new_releases() -> (
-    None
-):
+def test_an_attachment_has_count_time_and_id_in_old_and_new_layouts() -> None:
     numbers = (5).to_bytes(8, "little"), (77).to_bytes(8, "little")
     new = numbers[0] + numbers[1] + b"\x10" + GID
     old = (

@@ -249,7 +249,7 @@ def test_a_wait_ends_when_the_transform_comes_or_when_the_time_is_over_and_not_m
     timer.join()
 
 
-def test_malformed_messages_and_transforms_that_tf2_refuses_are_reported_once_and_the_listener_goes_on(
+def test_malformed_messages_and_refused_transforms_are_reported_once(
     node: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     buffer = Buffer()

@@ -29,7 +29,7 @@ frames: {lidar: {parent: base_link, xyz: [0, 0, 0.3]}}
 processes:
   static: {host: brain}
   map: {run: {package: nav2_map_server, executable: map_server, args: ["map:=${file(maps/office.yaml)}"]}, cwd: maps}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.fixture

@@ -476,7 +476,7 @@ joints:
   shoulder: {{type: revolute, parent: base_link, child: upper, axis: [0, 0, 1], limit: {{lower: -1, upper: 1}}}}
 processes:
   joints: {joints}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.parametrize(
@@ -552,7 +552,7 @@ processes:
   filter: {run: [filter], ready: {time: 0.5 s}, after: {camera: started}}
   last: {run: [last], after: {filter: ready, usb: ready}}
   other: {run: [other], after: {usb: started}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_whom_launch_does_not_wait_for_is_reported_and_a_time_is_waited_for() -> None:
@@ -607,7 +607,7 @@ processes:
     env: {LEVEL: debug}
     remap: {image: image_raw}
     restart: always
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.parametrize("below", ["", "launch/", "launch/deeper/"])

@@ -34,7 +34,7 @@ processes:
   spawner: {run: [spawn, "$(HOME)"], host: brain}
   drive: {run: [drive], node: drive, ready: {time: 3 s}, host: rear.local, after: {spawner: done, static: ready}}
   late: {run: [late], host: rear.local, after: {drive: ready, spawner: started}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def manifests(

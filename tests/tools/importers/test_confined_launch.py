@@ -119,7 +119,7 @@ def test_a_launch_file_that_lies_outside_is_not_included(
 ) -> None:
     write("<launch><node pkg='far' exec='away'/></launch>", str(tmp_path / "far/far.launch.xml"))
     file = write(
-        f"<launch><include file='{tmp_path}/far/far.launch.xml'/>\n<node pkg='a' exec='b'/></launch>",
+        f"<launch><include file='{tmp_path}/far/far.launch.xml'/>\n<node pkg='a' exec='b'/></launch>",  # noqa: E501 (a text as its reader has it)
         "a.launch.xml",
     )
     _, data = import_of(file, code=None)

@@ -78,7 +78,7 @@ processes:
   navigation_launch:
     run: {launch: nav2_bringup/navigation_launch.py, args: {mode: "${args.mode}", n: 3}}
     when: ${args.cameras >= 1 and args.mode != 'slam'}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 COMBINATIONS = [
     {"sim": sim, "mode": mode, "cameras": cameras, "rate": rate}
     for sim, mode, cameras, rate in product(

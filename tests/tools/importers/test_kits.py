@@ -219,7 +219,7 @@ manipulators:
     rpy: [0.0, 0.0, 0.0]
     ip: 10.0.0.4
     gripper: {model: robotiq_2f_85, xyz: [0, 0, 0.01], rpy: [0, 0, 0]}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_an_arm_of_clearpaths_has_its_gripper_at_its_end_and_what_is_not_enabled_is_left_out(

@@ -79,7 +79,7 @@ def generate_launch_description():
             composable_node_descriptions=[
                 ComposableNode(package="image_proc", plugin="image_proc::RectifyNode", name="rectify")]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.fixture(autouse=True)
@@ -207,7 +207,7 @@ def generate_launch_description():
         DeclareLaunchArgument("unit", default_value="1"),
         Node(package="p", executable="e", name="second", parameters=[{"speed": LaunchConfiguration("unit")}]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 INNER = """
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -237,7 +237,7 @@ def generate_launch_description():
     assert not ParseMultiRobotPose("robots").value()
     return LaunchDescription([Node(package="p", executable="e", name="n", arguments=[tempfile.mktemp(suffix=".sdf")],
                                    remappings={(word, f"other_{word}") for word in "abcdefgh"})])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_a_number_with_a_point_stays_a_double_as_a_parameter_and_keeps_its_text_in_a_command(
@@ -281,7 +281,7 @@ from nav2_common.launch import RewrittenYaml
 def generate_launch_description():
     params = RewrittenYaml(source_file="a.yaml", root_key="front", param_rewrites={}, convert_types=True)
     return LaunchDescription([Node(package="p", executable="e", name="n", parameters=[params])])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_an_argument_that_is_the_clock_of_all_nodes_is_the_robots(tmp_path: Path) -> None:
@@ -389,7 +389,7 @@ def generate_launch_description():
         Node(package="tf2_ros", executable="static_transform_publisher",
              arguments=["--z", Given("height"), "--frame-id", "base_link", "--child-frame-id", "mast"]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_launch_arguments_become_arguments_of_the_robot_where_launch_would_read_them_alike(
@@ -563,7 +563,7 @@ def generate_launch_description():
         Node(package="rclcpp_components", executable="component_container_isolated", name="stock", namespace="",
              arguments=["--use_multi_threaded_executor", "--verbose"]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
     ),
     "boxes.launch.xml": (
         """<launch>
@@ -597,7 +597,7 @@ def generate_launch_description():
   <node pkg="rclcpp_components" exec="component_container_isolated" name="stock" namespace=""
     args="--use_multi_threaded_executor --verbose"/>
 </launch>
-"""
+"""  # noqa: E501 (a text as its reader has it)
     ),
     "boxes.launch.yaml": (
         """launch:
@@ -647,7 +647,7 @@ def generate_launch_description():
     name: stock
     namespace: ""
     args: --use_multi_threaded_executor --verbose
-"""
+"""  # noqa: E501 (a text as its reader has it)
     ),
 }
 
@@ -715,7 +715,7 @@ PUBLISHERS = """<launch>
   <composable_node pkg="p" plugin="p::Alone" name="alone"/>
   <load_composable_node><composable_node pkg="p" plugin="p::Lost" name="lost"/></load_composable_node>
 </launch>
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_named(
@@ -756,7 +756,7 @@ def generate_launch_description():
         ComposableNodeContainer(name="box", namespace="", package="a", executable="b", composable_node_descriptions=[
             ComposableNode(package="a", plugin="a::B::", name="odd")]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_an_action_that_is_given_nonsense_does_not_end_the_others(
@@ -780,7 +780,7 @@ def test_a_parameter_file_lies_over_the_parameters_before_it(
     text = f"""<launch><node pkg="p" exec="e" name="n">
       <param name="a"><param name="b" value="1"/><param name="c" value="2"/></param><param name="d" value="3"/>
       <param from="{tmp_path}/over.yaml"/><param name="e" value="4"/></node>
-      <node pkg="p" exec="e" name="m"><param name="a" value="1"/><param from="{tmp_path}/none.yaml"/></node></launch>"""
+      <node pkg="p" exec="e" name="m"><param name="a" value="1"/><param from="{tmp_path}/none.yaml"/></node></launch>"""  # noqa: E501 (a text as its reader has it)
     _, data = import_of(source(tmp_path, "a.launch.xml", text), code=None)
     assert data["processes"]["n"]["params"] == {"file": "over.yaml", "a.c": 2, "d": 3, "e": 4}
     assert places(printed_errors(capsys), "TF020") == ["a.launch.xml:4"]
@@ -824,7 +824,7 @@ def generate_launch_description():
         launch.actions.RegisterEventHandler(launch.event_handlers.OnProcessExit(
             target_action=stop, on_exit=[launch.actions.EmitEvent(event=launch.events.Shutdown())])),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_bringups_of_moveit_and_turtlebots_are_read(
@@ -883,7 +883,7 @@ ROS1 = """<launch>
   <node pkg="tf2_ros" type="static_transform_publisher" name="c" args="0 0 0 -1.5707963 0 -1.5707963 camera optical"/>
   <group ns="front"><node pkg="drive" type="drive.py" name="drive" required="true"/></group>
 </launch>
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_launch_files_of_ros_1_are_read(tmp_path: Path) -> None:
@@ -963,12 +963,12 @@ def generate_launch_description():
         Node(package="tf2_ros", executable="static_transform_publisher",
              arguments=["--frame-id", "mast", "--child-frame-id", "lamp", "--z", "0.1"]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 ROVER = """<robot name="rover" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="height" default="1"/>
 <link name="base_link"/><link name="mast"/><link name="wheel"/>
 <joint name="m" type="fixed"><parent link="base_link"/><child link="mast"/><origin xyz="0 0 $(arg height)"/></joint>
 <joint name="w" type="continuous"><parent link="base_link"/><child link="wheel"/></joint></robot>
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_a_robot_state_publisher_with_a_xacro_file_becomes_a_part(package: Path) -> None:
@@ -1029,7 +1029,7 @@ from launch import LaunchDescription
 from launch_ros.actions import Node
 def generate_launch_description():
     return LaunchDescription([Node(package="a", executable="b")])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_a_launch_file_that_would_do_harm_is_contained_and_named(
@@ -1083,7 +1083,7 @@ from launch import LaunchDescription
 from launch_ros.actions import Node
 def generate_launch_description():
     return LaunchDescription([Node(package="a", executable="b", arguments=[reads, str(made)])])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.skipif(
@@ -1242,7 +1242,7 @@ def generate_launch_description():
             target_container=mine, composable_node_descriptions=[
                 ComposableNode(package="demo", plugin="demo::Talker", name="talker")])]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 BOX = {
     "isolation": "isolated",
     "executor": "multi",
@@ -1310,7 +1310,7 @@ COMPOSED_XML = """<launch>
     <composable_node pkg="image_proc" plugin="image_proc::CropNode" name="crop"/>
   </load_composable_node>
 </launch>
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_records_tell_containers_apart_though_the_earlier_ones_are_gone() -> None:
@@ -1358,7 +1358,7 @@ def generate_launch_description():
         ["-file=", os.path.join(os.path.dirname(__file__), "rover.xacro")]]),
         IncludeLaunchDescription([FindPackageShare("gone"), "/a.launch.py"], launch_arguments={
             "text": Command(["xacro ", os.path.join(os.path.dirname(__file__), "rover.xacro")])}.items())])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_a_condition_and_a_list_that_are_given_by_keyword_count(tmp_path: Path) -> None:
@@ -1378,7 +1378,7 @@ def generate_launch_description():
         Node(package="p", executable="e", name="gone", condition=IfCondition(predicate_expression="false")),
         Node(package="p", executable="e", name="kept", parameters=[{"names": ParameterValue(["a", "b"])}]),
     ])
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_containers_of_an_xml_launch_file_too(package: Path) -> None:

@@ -140,7 +140,7 @@ robot: r
 links: {base_link: {}}
 sensors:
   front: {preset: realsense/d435i, parent: base_link, xyz: [0.1, 0, 0.2], driver: none, options: {imu: true}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 def test_sensors_of_a_recording_have_their_presets(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ sensors:
 processes:
   drive: {external: true}
   camera_node: {external: true, node: /camera/camera}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.fixture

@@ -171,7 +171,7 @@ def test_the_root_is_the_base_where_another_link_would_be(tmp_path: Path) -> Non
 
 CONTROL = """<ros2_control name="sys" type="system"><hardware><plugin>a/B</plugin><param name="port">0.10</param>
 </hardware><joint name="shoulder"><command_interface name="position"><param name="min">-1</param></command_interface>
-<state_interface name="position"/>{more}</joint></ros2_control>"""
+<state_interface name="position"/>{more}</joint></ros2_control>"""  # noqa: E501 (a text as its reader has it)
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="2"/>'
 
 
@@ -333,7 +333,7 @@ def test_a_mesh_can_say_which_model_a_sensor_is(tmp_path: Path) -> None:
         base = fixed("roof_base_link").replace(
             '<link name="roof_base_link"/>', f'<link name="roof_base_link">{body}</link>'
         )
-        urdf = f"{HEAD}{base}{fixed('roof', 'roof_base_link', 'xyz=' + chr(34) + '0 0 0.0377' + chr(34))}</robot>"
+        urdf = f"{HEAD}{base}{fixed('roof', 'roof_base_link', 'xyz=' + chr(34) + '0 0 0.0377' + chr(34))}</robot>"  # noqa: E501 (a text as its reader has it)
         assert body in urdf
         text = imported(urdf, tmp_path)
         sensors = data(text).get("sensors", {})

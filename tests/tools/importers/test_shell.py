@@ -43,7 +43,7 @@ ROS_DOMAIN_ID=3 ros2 run drive node --ros-args -r __node:=base -r __ns:=/front -
 ros2 launch camera rs.launch.py name:=front
 python3 scripts/mission.py --fast
 wait
-""",
+""",  # noqa: E501 (a text as its reader has it)
     )
     (tmp_path / "drive.yaml").write_text(
         "/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8"

@@ -29,7 +29,7 @@ ARGUMENTS = [
         (0.3, 0.2, 0.1),
     ),
     (
-        "--frame-id base_link --child-frame-id lidar_link --ros-args -r __node:=a -p use_sim_time:=true",
+        "--frame-id base_link --child-frame-id lidar_link --ros-args -r __node:=a -p use_sim_time:=true",  # noqa: E501 (a text as its reader has it)
         "ros2",
         (0, 0, 0),
         (0, 0, 0),

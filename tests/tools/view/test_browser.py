@@ -260,7 +260,7 @@ robot: r
 links: {{base_link: {{visual: {{box: [0.1, 0.1, 0.1]}}}}}}
 frames: {{{json.dumps(name)}: {{parent: base_link, xyz: [1, 0, 0]}}}}
 sensors: {{{json.dumps(name + "s")}: {{preset: generic/camera, parent: base_link, xyz: [0, 0, 1]}}}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
     (tmp_path / "r.yaml").write_text(text, "utf-8")
     panel = Panel(server, session_of(tmp_path / "r.yaml"), edit=True)
     with page_of(address_of(server)) as page:

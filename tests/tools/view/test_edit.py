@@ -316,7 +316,7 @@ CASES = {
         "  tool: {parent: base_link, axis_angle: {axis: [0, 0, 2], angle: -30 deg}}",
     ),
     "what << brings is given anew": (
-        "x-a: &a {rpy: [0, 10 deg, 0], parent: base_link}\nframes: {b: {<<: *a},\n  tool: {<<: *a, xyz: [0, 0, 1]}}\n",
+        "x-a: &a {rpy: [0, 10 deg, 0], parent: base_link}\nframes: {b: {<<: *a},\n  tool: {<<: *a, xyz: [0, 0, 1]}}\n",  # noqa: E501 (a text as its reader has it)
         (0, 0, 1),
         (0, 25, 0),
         "  tool: {<<: *a, xyz: [0, 0, 1], rpy: [0, 25 deg, 0]}}",
@@ -362,7 +362,7 @@ ELSEWHERE = {
         "frames.one",
     ),
     "an anchor of a list": (
-        "frames:\n  one: {parent: base_link, xyz: &p [0, 0, 1]}\n  tool: {parent: base_link, xyz: *p}\n",
+        "frames:\n  one: {parent: base_link, xyz: &p [0, 0, 1]}\n  tool: {parent: base_link, xyz: *p}\n",  # noqa: E501 (a text as its reader has it)
         "frames.one",
     ),
     "a preset": ("sensors:\n  tool: {preset: generic/camera, parent: base_link}\n", "preset"),

@@ -33,7 +33,7 @@ frames:
   mast: {parent: base_link, xyz: [0, 0, 0.5]}
   lidar: {parent: mast, xyz: [0.1, 0, 0.3]}
 processes: {drive: {external: true, node: drive}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 START_NS = 1_700_000_000_000_000_000
 TOLERANCE = Offset(1e-3, math.radians(0.1))
 STATIC, JOINTS, DRIVE, ROGUE = (bytes([number] * 16) for number in (1, 2, 3, 4))
@@ -175,9 +175,7 @@ def test_a_stolen_edge_is_red_until_the_thief_has_left() -> None:
     assert not picture.wrong
 
 
-def test_a_frame_stays_a_ghost_where_a_thief_that_has_left_put_it_until_its_owner_sends_again() -> (
-    None
-):
+def test_a_frame_stays_where_a_departed_thief_put_it_until_its_owner_sends() -> None:
     live = Live()
     live.run()
     live.send(ROGUE, 4.1, ("base_link", "mast", Pose((2, 0, 0))))

@@ -175,7 +175,7 @@ joints:
   one: {type: prismatic, parent: a, child: b, axis: [1, 0, 0], limit: {lower: 0, upper: 1, effort: 1, velocity: 1}}
   two: {type: prismatic, parent: a, child: c, axis: [0, 1, 0], limit: {lower: -1, upper: 1, effort: 1, velocity: 1},
         mimic: {joint: one, multiplier: -2, offset: 0.1}}
-"""
+"""  # noqa: E501 (a text as its reader has it)
     robot = compile_robot(text, "r.yaml", PRESETS).robot
     assert robot
     poses = poses_in_roots(robot, {"one": 0.25})
@@ -306,7 +306,7 @@ robot: r
 links:
   base_link: {visual: {mesh: heavy.stl}}
   arm: {parent: base_link, xyz: [1, 0, 0], visual: {mesh: heavy.stl}, collision: [{box: [2, 2, 2]}]}
-"""
+"""  # noqa: E501 (a text as its reader has it)
 
 
 @pytest.mark.parametrize(("side_m", "scale"), [(0.25, 0.5), (1.0, 1.0), (4.0, 2.0)])

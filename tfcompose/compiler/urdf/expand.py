@@ -144,7 +144,7 @@ def expand(
         raise RejectedError([_where_used(_ended(outcome, "", files), use)])
     _refuse_unknown(given, files.served, file, use)
     names = tuple(_shown(name, file) for name in answer["files"])
-    places = tuple(tuple(place) if place else None for place in answer["places"])
+    places = tuple(place and tuple(place) for place in answer["places"])
     return Expansion(answer["text"], names, places, tuple(map(tuple, answer["comments"])))
 
 

@@ -575,10 +575,10 @@ class _Work:
             env=self._env(record),
             keys=keys,
             period_s=record.get("period", 0.0),
-            reader=reader,
+            reader=reader,  # type: ignore[arg-type]
             description=description,
             todo=tuple(todo),
-            loads=loads,  # type: ignore[arg-type]
+            loads=loads,
         )
 
     def _is_container(self, record: dict[str, Any]) -> bool:

@@ -686,8 +686,10 @@ def _output(given: Any, context: Context) -> str | list[str]:
         FailedError: if launch has no such word.
     """
     if isinstance(given, Mapping):
-        several = ([places] if isinstance(places, str) else places for places in given.values())
-        return sorted({place for places in several for place in places})
+        outputs: set[str] = set()
+        for places in given.values():
+            outputs.update([places] if isinstance(places, str) else places)
+        return sorted(outputs)
     word = text_of(given, context)
     if word not in _OUTPUTS:
         raise FailedError(f"output={word!r}")

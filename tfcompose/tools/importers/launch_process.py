@@ -498,18 +498,14 @@ def _watch(  # noqa: C901 (one hook after another)
         )
 
     def run(words: Any, *_args: Any, **more: Any) -> Any:
-        several = (
-            [os.fspath(one) if isinstance(one, os.PathLike) else str(one) for one in words]
-            if not isinstance(words, str)
-            else words.split()
-        )
+        argv = words.split() if isinstance(words, str) else list(map(str, words))
         try:
-            output = substitutions.of_command(several, " ".join(several))
+            output = substitutions.of_command(argv, " ".join(argv))
         except FailedError:
-            note(f"the command {' '.join(several)}")
+            note(f"the command {' '.join(argv)}")
             output = ""
         is_text = more.get("text") or more.get("universal_newlines") or more.get("encoding")
-        return subprocess.CompletedProcess(several, 0, output if is_text else output.encode(), "")
+        return subprocess.CompletedProcess(argv, 0, output if is_text else output.encode(), "")
 
     def system(command: Any) -> int:
         note(f"os.system({command!r})")

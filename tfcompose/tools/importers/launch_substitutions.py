@@ -210,10 +210,7 @@ class Substitution:
 
     def describe(self) -> str:
         """Return it for people."""
-        several = [
-            one.describe() if isinstance(one, Substitution) else plain(one) for one in self.args
-        ]
-        return f"{type(self).__name__}({', '.join(several)})"
+        return f"{type(self).__name__}({', '.join(map(plain, self.args))})"
 
 
 def _parts(value: Any) -> Any:
@@ -222,10 +219,10 @@ def _parts(value: Any) -> Any:
 
 def plain(value: Any) -> str:
     """Return a value that may have substitutions in it, for people."""
+    if isinstance(value, Substitution):
+        return value.describe()
     if isinstance(value, (list, tuple)):
-        return " ".join(
-            one.describe() if isinstance(one, Substitution) else plain(one) for one in value
-        )
+        return " ".join(map(plain, value))
     return str(getattr(value, "NAME", value))
 
 
@@ -507,12 +504,10 @@ class EqualsSubstitution(Substitution):
 def _same_number(left: str, right: str) -> bool:
     truths = {"true": 1.0, "false": 0.0}
     try:
-        a, b = (
-            truths[one.lower()] if one.lower() in truths else float(one) for one in (left, right)
-        )
+        numbers = [float(truths.get(text.lower(), text)) for text in (left, right)]
     except ValueError:
         return False
-    return a == b
+    return numbers[0] == numbers[1]
 
 
 class NotEqualsSubstitution(EqualsSubstitution):
@@ -572,15 +567,13 @@ class ParameterValue:
         if isinstance(self.value, list) and not any(
             isinstance(one, Substitution) for one in self.value
         ):
-            kind = (*getattr(self.value_type, "__args__", ()), None)[
-                0
-            ]  # the values of a list, one by one
-            return [
-                ParameterValue(one, value_type=str if isinstance(one, str) else kind).perform(
-                    context
-                )
-                for one in self.value
-            ]
+            # The values of a list, one by one.
+            kind = (*getattr(self.value_type, "__args__", ()), None)[0]
+            values = []
+            for item in self.value:
+                item_type = str if isinstance(item, str) else kind
+                values.append(ParameterValue(item, value_type=item_type).perform(context))
+            return values
         if self.value_type is None:
             return _typed_or_symbolic(self.value, context)
         if (symbolic := self._symbolic(context)) is not None:

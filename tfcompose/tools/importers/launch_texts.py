@@ -228,9 +228,10 @@ def _substitution(name: str, words: list[Any]) -> Any:
 
 def _several(words: list[Any]) -> list[Any]:
     """Return words as one text again, with spaces between them."""
-    return [one for word in words for one in (" ", *(word if isinstance(word, list) else [word]))][
-        1:
-    ]
+    parts: list[Any] = []
+    for word in words:
+        parts += [" ", *(word if isinstance(word, list) else [word])]
+    return parts[1:]
 
 
 def command_line(text: Any) -> list[Any]:
@@ -243,7 +244,7 @@ def command_line(text: Any) -> list[Any]:
     parts = substituted(text)
     parts = parts if isinstance(parts, list) else [parts]
     try:
-        split = [shlex.split(part) if isinstance(part, str) else None for part in parts]
+        split = list(map(_tokens_of, parts))
     except ValueError:
         return _quoted_words(parts)
     words: list[list[Any]] = []
@@ -265,23 +266,29 @@ def command_line(text: Any) -> list[Any]:
     return words
 
 
+def _tokens_of(part: Any) -> list[str] | None:
+    """Return the tokens of a text; a substitution has none."""
+    return shlex.split(part) if isinstance(part, str) else None
+
+
 def _quoted_words(parts: list[Any]) -> list[Any]:
     """Return the words of a command line in which quotes go around substitutions."""
-    text = "".join(
-        part if isinstance(part, str) else f"{BEGIN}{index}{END}"
-        for index, part in enumerate(parts)
-    )
+    texts = list(parts)
+    for index, part in enumerate(parts):
+        if not isinstance(part, str):
+            texts[index] = f"{BEGIN}{index}{END}"
+    text = "".join(texts)
     try:
         tokens = shlex.split(text)
     except ValueError:
         tokens = text.split()
-    return [
-        [
-            parts[int(piece)] if index % 2 else piece
-            for index, piece in enumerate(re.split(f"{BEGIN}(\\d+){END}", token))
-        ]
-        for token in tokens
-    ]
+    words = []
+    for token in tokens:
+        word: list[Any] = re.split(f"{BEGIN}(\\d+){END}", token)
+        for index in range(1, len(word), 2):
+            word[index] = parts[int(word[index])]
+        words.append(word)
+    return words
 
 
 # Actions

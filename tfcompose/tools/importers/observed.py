@@ -161,10 +161,13 @@ class Observed:
         sections, at = self.draft.sections, ("processes", name)
         node = next(node for node, process in self._owners.items() if process == name)
         new = self.draft.free_name(f"{name}_driver")
-        sections["processes"] = {
-            (new if one == name else one): keys | ({"node": node} if one == name else {})
-            for one, keys in sections["processes"].items()
-        }
+        renamed = {}
+        for process, keys in sections["processes"].items():
+            if process == name:
+                renamed[new] = keys | {"node": node}
+            else:
+                renamed[process] = keys
+        sections["processes"] = renamed
         self.draft.notes["processes", new] = self.draft.notes.pop(at, [])
         for keys in (*sections["frames"].values(), *sections["sensors"].values()):
             keys |= {key: new for key in ("owner", "driver") if keys.get(key) == name}

@@ -200,11 +200,12 @@ class _Writer:
         return entries
 
     def _joints(self) -> dict[str, Any]:
-        return {
-            edge.joint_name: self.values.joint(edge, MOVER if edge.free else None)
-            for edge in self.robot.edges
-            if self.fixed.get(edge.child) is not edge and edge.child not in self.brought
-        }
+        joints = {}
+        for edge in self.robot.edges:
+            if self.fixed.get(edge.child) is not edge and edge.child not in self.brought:
+                mover = MOVER if edge.free else None
+                joints[edge.joint_name] = self.values.joint(edge, mover)
+        return joints
 
     def _mount(self, edge: Edge, title: str = "frames") -> dict[str, Any]:
         """Return the keys of a fixed edge, which stand at its child."""
@@ -256,13 +257,15 @@ def sensor_keys(
             frames[sensor.names.get(edge.child, edge.child)] = values
     keys: dict[str, Any] = {"preset": sensor.preset, "parent": sensor.mount.parent}
     keys |= {**pose, **_joint_name(sensor.mount)}
-    keys |= {"options": sensor.options} if sensor.options else {}
-    without = {"driver": "none"} if sensor.driven else {}
-    return (
-        keys
-        | ({"tf": "driver", "driver": driver} if driver else without)
-        | ({"frames": frames} if frames else {})
-    )
+    if sensor.options:
+        keys["options"] = sensor.options
+    if driver:
+        keys |= {"tf": "driver", "driver": driver}
+    elif sensor.driven:
+        keys["driver"] = "none"
+    if frames:
+        keys["frames"] = frames
+    return keys
 
 
 def _joint_name(edge: Edge) -> dict[str, str]:

@@ -162,8 +162,9 @@ def _axis(joint: Joint) -> list[float]:
 
     Its digits are fewer.
     """
-    near = 0.98 < joint.axis_length < 1.02  # noqa: PLR2004 (another length is a finding of its own)
-    return [float(f"{part * joint.axis_length:.15g}") if near else part for part in joint.axis]
+    if not 0.98 < joint.axis_length < 1.02:  # noqa: PLR2004 (another length is a finding of its own)
+        return list(joint.axis)
+    return [float(f"{part * joint.axis_length:.15g}") for part in joint.axis]
 
 
 def _motion(joint: Joint) -> dict[str, Any]:
@@ -187,10 +188,9 @@ def _motion(joint: Joint) -> dict[str, Any]:
     if joint.dynamics:
         values["dynamics"] = asdict(joint.dynamics)
     if joint.safety:
-        values["safety_controller"] = {
-            key: position(value) if key in _SOFT_LIMITS else value
-            for key, value in asdict(joint.safety).items()
-        }
+        safety = asdict(joint.safety)
+        safety |= {key: position(safety[key]) for key in safety.keys() & _SOFT_LIMITS}
+        values["safety_controller"] = safety
     if reference:
         ends = {"rising": reference.rising, "falling": reference.falling}
         values["calibration"] = {

@@ -10,6 +10,7 @@ from textwrap import dedent, indent
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.numbers import number
+from tfcompose.foundation.text import masked
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -156,11 +157,11 @@ def dedented(block: str) -> Literal:
 def comment(texts: Iterable[str], depth: int = 0) -> list[str]:
     """Return texts as lines of comment, folded where they are long."""
     before = "  " * depth + "# "
-    printed = (
-        "".join(char if char.isprintable() else "?" for char in " ".join(one.split()))
-        for one in texts
-    )
-    return [before + line for one in printed for line in _folded(one, WIDTH - len(before))]
+    lines = []
+    for text in texts:
+        printed = masked(" ".join(text.split()), "?")
+        lines += [before + line for line in _folded(printed, WIDTH - len(before))]
+    return lines
 
 
 def _folded(line: str, width: int) -> list[str]:

@@ -121,7 +121,7 @@ def test_each_check_finds_what_it_is_about(
 
 
 def test_no_line_of_the_package_is_wider_than_a_page() -> None:
-    """Not even one that ruff is told to leave alone; texts in tests are as their readers have them."""
+    """Not even one that ruff is told to leave alone."""
     assert not [
         f"{file.relative_to(ROOT)}:{number}"
         for file in sorted(PACKAGE.rglob("*.py"))

@@ -1,6 +1,7 @@
 """Text at a human width: the limits of style that no linter of the project checks."""
 
 import ast
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from tests.support.house import PACKAGE, ROOT
 
 WIDTH = 99
+_PRAGMA = re.compile(r"  # (?:noqa|type): .*")
 MOST_POSITIONAL = 5
 Comprehension = ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp
 
@@ -121,10 +123,10 @@ def test_each_check_finds_what_it_is_about(
 
 
 def test_no_line_of_the_package_is_wider_than_a_page() -> None:
-    """Not even one that ruff is told to leave alone."""
+    """Not even one that ruff is told to leave alone; what linters are told may stand behind it."""
     assert not [
         f"{file.relative_to(ROOT)}:{number}"
         for file in sorted(PACKAGE.rglob("*.py"))
         for number, line in enumerate(file.read_text("utf-8").splitlines(), 1)
-        if len(line) > WIDTH
+        if len(_PRAGMA.sub("", line)) > WIDTH
     ]

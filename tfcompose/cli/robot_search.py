@@ -13,7 +13,8 @@ YAML_ENDINGS = (".yaml", ".yml")
 #: What a robot file has at the begin of a line: its first key, or, with that misspelt, two others
 #: of its keys.
 _ROBOT = re.compile(
-    rb"^tfcompose\s*:|\A(?=[\s\S]*^robot\s*:)(?=[\s\S]*^(?:links|joints|frames|sensors|parts)\s*:)",
+    rb"^tfcompose\s*:|\A(?=[\s\S]*^robot\s*:)"
+    rb"(?=[\s\S]*^(?:links|joints|frames|sensors|parts)\s*:)",
     re.MULTILINE,
 )
 

@@ -125,7 +125,8 @@ class Quantity:
 #: A variable in the notation of a shell, of launch files or of templates; or names and numbers in
 #: an expression.
 _NAMED = re.compile(
-    r"(?:\$\(\s*(?:var|arg)\s+|\{\{\s*|\$)([\w.]+)\s*(?:\)|\}\})?|([A-Za-z_]\w*(?:\s*[-+*/]\s*[\w.]+)*)"
+    r"(?:\$\(\s*(?:var|arg)\s+|\{\{\s*|\$)([\w.]+)\s*(?:\)|\}\})?"
+    r"|([A-Za-z_]\w*(?:\s*[-+*/]\s*[\w.]+)*)"
 )
 
 

@@ -101,7 +101,8 @@ def _elsewhere(asset: Asset) -> bool:
 
 
 _RELATIVE = re.compile(
-    r"""(<(?:mesh|texture)\s[^<>]*?\bfilename\s*=\s*)(["'])(?!/|[A-Za-z][A-Za-z0-9+.-]*://)([^<>]+?)\2"""
+    r"""(<(?:mesh|texture)\s[^<>]*?\bfilename\s*=\s*)(["'])"""
+    r"""(?!/|[A-Za-z][A-Za-z0-9+.-]*://)([^<>]+?)\2"""
 )
 
 

@@ -42,7 +42,8 @@ _PORT = "7447"
 #: alone; its ports hold 120. What stands in the variable goes over what rmw_cyclonedds writes
 #: itself.
 _CYCLONE_ALONE = (
-    "<CycloneDDS><Domain><Discovery><MaxAutoParticipantIndex>119</MaxAutoParticipantIndex></Discovery></Domain>"
+    "<CycloneDDS><Domain><Discovery><MaxAutoParticipantIndex>119"
+    "</MaxAutoParticipantIndex></Discovery></Domain>"
     "</CycloneDDS>"
 )
 

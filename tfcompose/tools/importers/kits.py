@@ -341,7 +341,8 @@ class _Clearpath:
             )
 
     def _of_platform(self) -> str:
-        return f"package://clearpath_platform_description/urdf/{self.platform}/{self.platform}.urdf.xacro"
+        file = f"{self.platform}/{self.platform}.urdf.xacro"
+        return f"package://clearpath_platform_description/urdf/{file}"
 
     def _link(self, name: str, entry: dict[str, Any], path: Steps) -> dict[str, Any]:
         """Return a link's entry with its mesh as an address.

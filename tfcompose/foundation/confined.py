@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 from dataclasses import dataclass
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final
 
 from tfcompose.foundation.shape import fits
@@ -27,6 +28,8 @@ MOST_ANSWER_BYTES: Final = 64 << 20
 MOST_PRINTED_BYTES: Final = 1 << 20
 #: Lists and mappings of an answer: each takes memory that its text does not.
 _MOST_CONTAINERS: Final = 4_000_000
+#: Characters of a path or a name.
+_LONGEST_QUESTION: Final = 4096
 
 
 #: A question's answer: a message, and bytes that follow it.
@@ -71,8 +74,8 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
     reads, to_child = os.pipe()
     from_child, writes = os.pipe()
     inherited = [reads, writes, *shared]
-    path = f"import sys; sys.path[:] = {sys.path!r}"
-    program = f"{path}; from {module} import main; main(*{inherited})"
+    program = f"import sys; sys.path[:] = {_module_path()!r}; from {module} import main"
+    program += f"; main(*{inherited})"
     outcome, printed = Outcome(), bytearray()
     with (
         os.fdopen(to_child, "wb", buffering=0) as sink,
@@ -109,6 +112,13 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
     return outcome
 
 
+def _module_path() -> list[str]:
+    """Return where modules are: not in the working folder, which python -m adds."""
+    own, here = str(Path(__file__).parents[2]), os.path.realpath("")
+    paths = [path for path in sys.path if path and os.path.realpath(path) != here]
+    return paths if own in paths else [*paths, own]
+
+
 def _end(process: subprocess.Popen[bytes], outcome: Outcome) -> None:
     outcome.timed_out = True
     process.kill()
@@ -129,16 +139,18 @@ def _converse(
 ) -> Any:
     """Return the answer to a request, None if the process ends before."""
     _send(sink, request, b"")
+    is_first = True  # then nothing of a stranger's has run
     while message := _receive(source):
         (key, value), *others = message.items()
         if key == "answer" and not others:
             return value
-        if key == "missing" and fits(value, [str]):
-            outcome.missing = outcome.missing or tuple(value)
-        elif key in answers and isinstance(value, str):
+        if key == "missing" and is_first and fits(value, [str]):
+            outcome.missing = tuple(value)
+        elif key in answers and isinstance(value, str) and len(value) <= _LONGEST_QUESTION:
             _send(sink, *answers[key](value))
         else:
             raise _RefusedError("it asks what nothing answers")
+        is_first = False
     return None
 
 

@@ -54,7 +54,8 @@ _OF_KERNEL: Final = re.compile(r"/(dev|proc|run|sys)(/|$)")
 _HOME: Final = re.compile(r"/home/[^/]+")
 #: Files that lie beside a robot file, and are about it.
 _DESCRIPTIONS: Final = (".launch", ".py", ".srdf", ".urdf", ".xacro", ".xml", ".yaml", ".yml")
-_PACKAGE_NAME: Final = re.compile(r"<name>\s*[^<\s]+\s*</name>")
+_PACKAGE_NAME: Final = re.compile(rb"<name>\s*[^<\s]+\s*</name>")
+_MOST_OF_MANIFEST: Final = 1_000_000
 _MANIFEST: Final = "package.xml"
 #: Folders of a package whose files name those in the others, as ../urdf/arm.xacro.
 _LAYOUT: Final = frozenset({"config", "launch", "robots", "urdf", "xacro"})
@@ -158,19 +159,7 @@ class Reach:
         """
         if not self.allows(path):
             raise OutsideError(path)
-        file = os.open(
-            posixpath.realpath(path), os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
-        )  # a pipe would be waited for
-        try:
-            if not stat.S_ISREG(os.fstat(file).st_mode):
-                raise OSError(0, "not a plain file", path)
-            with os.fdopen(file, "rb", closefd=False) as stream:
-                data = stream.read(most + 1)
-        finally:
-            os.close(file)
-        if len(data) > most:
-            raise OSError(0, f"larger than {most:,} bytes", path)
-        return data
+        return _read_plain(posixpath.realpath(path), path, most)
 
     def names_in(self, folder: str) -> list[str]:
         """Return the names in a folder, in order.
@@ -190,6 +179,26 @@ class Reach:
             _grant(root, _DEPTH, grants)
         grants.paths.extend(self._libraries)
         return grants
+
+
+def _read_plain(real: str, path: str, most: int) -> bytes:
+    """Return the bytes of a file that findings call ``path``.
+
+    Raises:
+        OSError: if it cannot be read, is no plain file, or has more than so many bytes.
+    """
+    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK  # a pipe would be waited for
+    file = os.open(real, flags)
+    try:
+        if not stat.S_ISREG(os.fstat(file).st_mode):
+            raise OSError(0, "not a plain file", path)
+        with os.fdopen(file, "rb", closefd=False) as stream:
+            data = stream.read(most + 1)
+    finally:
+        os.close(file)
+    if len(data) > most:
+        raise OSError(0, f"larger than {most:,} bytes", path)
+    return data
 
 
 def _grant(root: str, depth: int, grants: Grants) -> None:
@@ -231,11 +240,12 @@ def _home() -> str:
 
 def is_package(folder: str) -> bool:
     """Return whether a folder is a ROS package."""
+    manifest = posixpath.join(folder, _MANIFEST)
     try:
-        text = Path(folder, _MANIFEST).read_text("utf-8", "replace")
-    except OSError:
+        data = _read_plain(manifest, manifest, _MOST_OF_MANIFEST)
+    except (OSError, ValueError):  # not there, or no path
         return False
-    return _PACKAGE_NAME.search(text) is not None
+    return _PACKAGE_NAME.search(data) is not None
 
 
 def _above(folder: str, name: str) -> str:

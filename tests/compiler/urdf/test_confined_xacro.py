@@ -148,6 +148,29 @@ def test_an_optional_file_may_be_missing_where_arguments_are_given() -> None:
     assert expand.expand(file, Packages(disk()), {"a": "b"}).text
 
 
+@pytest.mark.parametrize("name", ["../secrets", "..", "/etc", "arm/../../secrets", ".ssh"])
+def test_a_path_is_no_package(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("prefix/share/arm", "prefix/secrets", "secrets", "prefix/share/.ssh"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "a.yaml").write_text(HIDDEN, "utf-8")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+    (found,) = lint(f"<link name=\"${{xacro.load_yaml('$(find {name})/a.yaml')}}\"/>")
+    assert (found.code, found.span and found.span.line) == ("TF724", 2)
+
+
+def test_a_manifest_that_has_no_end_is_not_read(tmp_path: Path) -> None:
+    for name, target in (("a", "/dev/zero"), ("b", "/etc/passwd")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "package.xml").symlink_to(target)
+    found = part_of(
+        "packages: {p: ../a}\nparts: {arm: {xacro: ../a/arm.xacro, parent: base_link}}"
+    )
+    assert [one.code for one in found] == ["TF001"]
+    write("<link name=\"${xacro.load_yaml('$(find p)/a.yaml')}\"/>", file="arm.xacro")
+    found = part_of("packages: {p: ../a}\nparts: {arm: {xacro: arm.xacro, parent: base_link}}")
+    assert [one.code for one in found] == ["TF021"]
+
+
 def test_with_trust_everything_is_read_and_expressions_are_not_confined(tmp_path: Path) -> None:
     (tmp_path / "secret.yaml").write_text("height: high", "utf-8")
     line = "<link name=\"${xacro.load_yaml('../secret.yaml').height}\"/>"
@@ -258,6 +281,8 @@ STOPPED = {
 READ = {"read": "r.xacro"}
 HOSTILE: dict[str, list[Any]] = {
     "nothing": [],
+    "a kernel that lacks something": [READ, {"missing": ["whatever"]}, {"answer": OF_FILE}],
+    "a long question": [{"read": "x" * 5000}, {"answer": OF_FILE}],
     "no mapping": [[]],
     "another question": [{"write": "r.xacro"}],
     "a question that is no text": [{"read": ["r.xacro"]}],
@@ -284,6 +309,13 @@ HOSTILE: dict[str, list[Any]] = {
     "stopped in half a macro": [
         READ,
         {"answer": STOPPED | {"macros": [["a"], [None, None], ["a", "/etc/passwd"]]}},
+    ],
+    "stopped in many macros": [
+        READ,
+        {
+            "answer": STOPPED
+            | {"macros": [["a", "r.xacro"]] * 100_000, "files": ["r.xacro"] * 10**5}
+        },
     ],
     "stopped for a long reason": [READ, {"answer": STOPPED | {"reason": "x" * 1_000_000}}],
     "an unknown kind": [READ, {"answer": STOPPED | {"kind": "whatever"}}],

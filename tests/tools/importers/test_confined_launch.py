@@ -3,6 +3,7 @@
 import json
 import os
 import platform
+import re
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +120,8 @@ def test_a_launch_file_that_lies_outside_is_not_included(
 ) -> None:
     write("<launch><node pkg='far' exec='away'/></launch>", str(tmp_path / "far/far.launch.xml"))
     file = write(
-        f"<launch><include file='{tmp_path}/far/far.launch.xml'/>\n<node pkg='a' exec='b'/></launch>",  # noqa: E501 (a text as its reader has it)
+        f"<launch><include file='{tmp_path}/far/far.launch.xml'/>\n"
+        "<node pkg='a' exec='b'/></launch>",
         "a.launch.xml",
     )
     _, data = import_of(file, code=None)
@@ -261,6 +263,11 @@ HOSTILE: dict[str, Any] = {
     "an argument without choices": _answer(
         {"kind": "argument", "at": [], "name": "a", "value": "b"}
     ),
+    "lines": _answer(
+        {"kind": "todo", "at": ["", 1], "text": "a\nlinks: {evil: {}}\rjoints: {}\u2028xml: {}"},
+        {"kind": "skipped", "at": ["", 1], "text": "a\nlinks: {evil: {}}"},
+        _record(name="a\nb: {}", when=["a\nlinks: {evil: {}}"]),
+    ),
     "half characters": _answer(_record(name="\ud800", argv=["\udcff"])),
     "control characters": _answer(_record(name="a\x1b[2J\x00", argv=["\x1b]0;a\x07"])),
     "a description elsewhere": _answer(
@@ -300,6 +307,7 @@ def test_a_process_that_was_taken_over_shows_no_other_file(
     except SystemExit as error:
         assert error.code in {1, 2}  # noqa: PT017 (either is no traceback)
     printed = capsys.readouterr()
+    assert not re.search(r"^ *(links|joints|xml)", printed.out, re.MULTILINE)
     assert HIDDEN not in printed.out + printed.err
     assert "\x1b" not in printed.out + printed.err
     assert "Traceback" not in printed.err

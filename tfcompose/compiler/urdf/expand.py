@@ -32,17 +32,23 @@ if TYPE_CHECKING:
 #: The module that runs xacro, confined.
 PROCESS = "tfcompose.compiler.urdf.xacro_process"
 #: How a file declares an argument, and how it asks for one.
-_ARGUMENT = re.compile(r"""<xacro:arg\b[^>]*?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)""")
-#: What xacro's messages name, and how that begins in a file.
-_NAMED = (
-    (re.compile(r"when evaluating expression '(.+)'"), r"\$\{{\s*{}\s*\}}"),
-    (re.compile(r"unknown macro name: (xacro:\S+)"), r"<{}(?=[\s/>])"),
+_ARGUMENT = re.compile(
+    r"""<xacro:arg\b[^>]{0,4000}?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)"""
 )
+#: What xacro's messages name, and what stands before and after that in a file.
+_NAMED = (
+    (re.compile(r"when evaluating expression '(.+)'"), r"\$\{\s*", r"\s*\}"),
+    (re.compile(r"unknown macro name: (xacro:\S+)"), "<", r"(?=[\s/>])"),
+)
+#: So many words of an expression are searched for: each begin in a file is tried with all.
+_MOST_WORDS = 20
 _WORD = re.compile(r"""["']?(\w+)["']?""")
 #: At most so many of the macros around an error are named.
 _MOST_MACROS = 5
-#: Of each file that is read.
-_MOST_BYTES = 16_000_000
+#: Files that are read, and bytes of each.
+_MOST_FILES, _MOST_BYTES = 10_000, 16_000_000
+#: The name of a package: no path.
+_PACKAGE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 #: Bytes of an expression that the process keeps for when it ends.
 _NOTED = 4000
 _OUTSIDE = (
@@ -68,8 +74,8 @@ _STOPPED = {
     "at": _MARK,
 }
 _PAIR, _IN_PLACE = 2, 3
-#: Characters of a reason.
-_LONGEST = 4000
+#: Characters of a reason, and files and macros around it.
+_LONGEST, _DEEPEST = 4000, 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +174,7 @@ class _Files:
 
     def __init__(self, file: str, packages: Packages, reach: Reach, use: Use | None) -> None:
         self.file, self._packages, self._reach = file, packages, reach
-        #: Absolute paths of files that were read, and paths of those that were not.
+        #: Absolute paths of files that were read, and the first path that was not.
         self.served: dict[str, None] = {}
         self.refused: list[str] = []
         is_of_user = use is None or use.at.file.startswith("--")  # named on the command line
@@ -187,7 +193,7 @@ class _Files:
         return posixpath.abspath(name) in self.served
 
     def _find(self, name: str) -> tuple[Any, bytes]:
-        folder = self._packages.folder(name, self.file)
+        folder = self._packages.folder(name, self.file) if _PACKAGE.fullmatch(name) else None
         if folder is None:
             return {"folder": None}, b""
         named = self._packages.named.get(name)
@@ -199,6 +205,8 @@ class _Files:
         return {"folder": posixpath.abspath(folder)}, b""  # it takes files from other folders
 
     def _read(self, path: str) -> tuple[Any, bytes]:
+        if len(self.served) > _MOST_FILES:
+            return self._refuse(path)
         try:
             data = self._reach.read(path, _MOST_BYTES)
         except OutsideError:
@@ -217,7 +225,7 @@ class _Files:
             return {"error": [error.errno, error.strerror]}, b""
 
     def _refuse(self, path: str) -> tuple[Any, bytes]:
-        self.refused.append(path)
+        self.refused = self.refused or [path]
         return {"outside": True}, b""
 
 
@@ -309,11 +317,12 @@ class _Stop:
                 return None
             return tuple(value) if files.has_served(value[0]) else None
 
-        macros = [pair for pair in answer["macros"] if len(pair) == _PAIR and None not in pair]
+        macros = answer["macros"][-_DEEPEST:]
+        macros = [pair for pair in macros if len(pair) == _PAIR and None not in pair]
         return cls(
             answer["kind"],
             answer["reason"][:_LONGEST],
-            list(filter(files.has_served, answer["files"])),
+            list(filter(files.has_served, answer["files"][-_DEEPEST:])),
             [(name, file) for name, file in macros if files.has_served(file)],
             mark(answer["error"]),
             mark(answer["at"]),
@@ -402,7 +411,7 @@ def _ended(outcome: Outcome, noted: str, files: _Files) -> Finding:
         message = by_signal if code < 0 else f"xacro gave up with code {code}"
     full = f"{message}: {noted}" if noted else message
     found = finding("TF008", full, Span(file), help=_ALONE.format(file=file))
-    words = r"\s+".join(map(re.escape, noted.split()))
+    words = _pattern_of(noted)
     return _at_words(found, words, [(file, 0)]) if words and files.has_served(file) else found
 
 
@@ -420,18 +429,25 @@ def _text_in(noted: IO[bytes]) -> str:
 def _definition(file: str | None, macro: str) -> Span | None:
     """Return where a file defines a macro, or None."""
     return _first(
-        file, rf"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?{re.escape(macro)}["']""", 0
+        file,
+        rf"""<xacro:macro\s[^>]{{0,4000}}?\bname\s*=\s*["'](?:xacro:)?{re.escape(macro)}["']""",
+        0,
     )
 
 
 def _named_at(message: str, file: str, line: int) -> Iterator[Span]:
     """Yield where the file has what the message names, from a line on."""
-    for naming, pattern in _NAMED:
+    for naming, before, after in _NAMED:
         for found in naming.finditer(message):
-            words = r"\s+".join(re.escape(word) for word in found[1].split())
-            at = _first(file, pattern.format(words), line)
+            end = after if len(found[1].split()) <= _MOST_WORDS else ""
+            at = _first(file, before + _pattern_of(found[1]) + end, line)
             if at:
                 yield at
+
+
+def _pattern_of(text: str) -> str:
+    """Return the pattern of the first words of a text, however it is broken into lines."""
+    return r"\s+".join(map(re.escape, text.split()[:_MOST_WORDS]))
 
 
 def _first(file: str | None, pattern: str, line: int) -> Span | None:

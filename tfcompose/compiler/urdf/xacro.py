@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 #: How a file defines a macro, up to its name, and the macro's parameters in that tag.
-_MACRO = re.compile(r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
+_MACRO = re.compile(r"""<xacro:macro\s[^>]{0,4000}?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
+#: Characters of a tag.
+_LONGEST = 100_000
 _PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 
 
@@ -55,6 +57,7 @@ def macros_in(text: str) -> dict[str, str]:
     """Return the parameters of each macro that a xacro file defines, by macro name."""
     macros = {}
     for found in _MACRO.finditer(text):
-        params = _PARAMS.search(text[found.start() : text.find(">", found.end())])
+        end = text.find(">", found.end(), found.end() + _LONGEST)
+        params = _PARAMS.search(text[found.start() : end]) if end >= 0 else None
         macros[found[1]] = " ".join((params[1] or params[2] or "").split()) if params else ""
     return macros

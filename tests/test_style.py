@@ -130,3 +130,28 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
         for number, line in enumerate(file.read_text("utf-8").splitlines(), 1)
         if len(_PRAGMA.sub("", line)) > WIDTH
     ]
+
+
+#: How many statements each wing has at most. A commit that raises one says why.
+MOST_STATEMENTS = {
+    "foundation": 1_600,
+    "model": 2_128,
+    "spec": 4_632,
+    "compiler": 9_284,
+    "tf": 5_264,
+    "guard": 4_033,
+    "launcher": 3_810,
+    "cli": 5_366,
+    "tools": 11_423,
+}
+
+
+def statements_of(wing: str) -> int:
+    files = (PACKAGE / wing).rglob("*.py")
+    trees = [ast.parse(file.read_text("utf-8")) for file in files]
+    return sum(isinstance(node, ast.stmt) for tree in trees for node in ast.walk(tree))
+
+
+@pytest.mark.parametrize("wing", MOST_STATEMENTS)
+def test_a_wing_does_not_grow_unnoticed(wing: str) -> None:
+    assert statements_of(wing) <= MOST_STATEMENTS[wing]

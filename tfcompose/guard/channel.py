@@ -4,8 +4,8 @@ Orders in, events out, and what the next guard must know.
 
 Without a launcher there are no orders, and events go to the guard's own output. What a guard
 leaves to the one that follows it, should it die, the launcher keeps without looking into it:
-``ipc.MEMORY_FD`` names the environment variable that holds the descriptor of a file with the
-memory, one JSON object, by the TF topics that a judge watches.
+``model.variables.MEMORY_FD`` names the environment variable that holds the descriptor of a file
+with the memory, one JSON object, by the TF topics that a judge watches.
 """
 
 from __future__ import annotations

@@ -139,7 +139,7 @@ MOST_STATEMENTS = {
     "spec": 4_632,
     "compiler": 9_284,
     "tf": 5_264,
-    "guard": 4_033,
+    "guard": 4_041,
     "launcher": 3_810,
     "cli": 5_366,
     "tools": 11_423,

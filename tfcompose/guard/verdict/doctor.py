@@ -1,343 +1,18 @@
-"""The doctor: everything that is wrong with a tree, by small functions from its state to findings.
-
-Those that stand here say whether the tree serves what needs it: scans, points and images with a
-frame and a stamp, and moving joints.
-"""
+"""Everything that is wrong with a tree: small functions from its state to findings, in order."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from statistics import median
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
-from tfcompose.foundation.text import duration, listed
-from tfcompose.foundation.tree import way_up
-from tfcompose.guard.verdict import publishers, rates, setup, stamps, tree, verify
-from tfcompose.guard.verdict.stamps import (
-    SLOW_S,
-    by_publisher,
-    least_delay_s,
-    names_of,
-    other_clock,
-)
-from tfcompose.tf.live.arrivals import KEPT_NS
-from tfcompose.tf.live.state import who
+from tfcompose.guard.verdict import consumers, publishers, rates, setup, stamps, tree, verify
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from tfcompose.tf.live.edges import EdgeState
-    from tfcompose.tf.live.state import MovingJoint, StampedData, Topic, TreeState
-
-
-JOINT_STATE = "sensor_msgs/msg/JointState"
-KEPT_S = KEPT_NS / 1e9
-#: Stamps that are older on arrival make lookups of "now", and of new data, fail for so long;
-#: costmaps wait 0.3 s.
-LATE_S = 0.3
-#: Who waits for a transform rarely waits longer.
-LACK_S = 0.3
-#: A clock, or a driver, that is ahead by more.
-AHEAD_S = 0.05
-#: A clock that is farther off is another clock.
-HOUR_S = 3600.0
-FEWEST = 3
-
-
-def data_frame_unknown(state: TreeState) -> Iterator[Finding]:
-    """Data come in a frame that is not in the tree."""
-    frames = {frame for edge in state.taken for frame in (edge.parent, edge.child)}
-    for each in state.stamped:
-        if each.frame in frames or not frames:
-            continue
-        who_sends = listed(each.nodes) or "somebody"
-        if not each.frame:
-            message = (
-                f"{each.topic} from {who_sends} has no frame_id, so nobody can say where it was"
-                " measured"
-            )
-            yield finding("TF840", message, None, help="set the driver's frame_id")
-            continue
-        message = (
-            f"{each.topic} from {who_sends} is in the frame {each.frame}, which nobody publishes"
-        )
-        plain = each.frame.removeprefix("/")
-        otherwise = (
-            "set the driver's frame_id to a frame of the tree, or publish the edge that leads to"
-            f" {each.frame}"
-        )
-        advice = did_you_mean(each.frame, frames, otherwise)
-        prefixed = sorted(
-            name for name in frames if name.rpartition("/")[2] == plain.rpartition("/")[2]
-        )
-        if prefixed:
-            advice = f"is it meant to be {listed(prefixed)}? A frame_prefix is on one side only"
-        if plain in frames:
-            message = (
-                f"{each.topic} from {who_sends} is in the frame {each.frame}: tf2 refuses names"
-                " that begin with /"
-            )
-            advice = f"set the driver's frame_id to {plain}"
-        yield finding("TF840", message, None, help=advice)
-
-
-def data_beyond_tf(state: TreeState) -> Iterator[Finding]:
-    """The stamps of data and of the tree do not meet: every lookup for them extrapolates."""
-    simulated = state.simulated
-    for each in state.stamped:
-        sender = listed(each.nodes) or "somebody"
-        for lack_s, age_s, edge in _latest_above(state, each):
-            fault = _off_clock(state, each, edge, age_s, simulated=simulated)
-            if fault:
-                message = (
-                    f"{each.topic} from {sender} {fault}: no lookup can combine it with"
-                    f" {edge.name}"
-                )
-                yield finding("TF841", message, None, help=_clock_help(each, age_s))
-            elif lack_s > LACK_S:
-                message = (
-                    f"{each.topic} from {sender} is stamped {duration(lack_s)} after the newest"
-                    f" {edge.name}"
-                )
-                message += f" from {who(edge)}"
-                yield finding(
-                    "TF841",
-                    f"{message}: extrapolation into the future",
-                    None,
-                    help=_ahead_help(each, age_s),
-                )
-            elif -lack_s > KEPT_S:
-                message = (
-                    f"{each.topic} from {sender} is stamped {duration(lack_s)} before {edge.name},"
-                    " and tf2 keeps 10 s"
-                )
-                advice = (
-                    "stamp with the time of the measurement, by the same clock; or give listeners"
-                    " a longer cache_time"
-                )
-                yield finding(
-                    "TF841", f"{message}: extrapolation into the past", None, help=advice
-                )
-
-
-def late_stamps(state: TreeState) -> Iterator[Finding]:
-    """An edge's stamps are old when they come: lookups of new data extrapolate into the future."""
-    waiting = keeps_data_waiting(state)
-
-    def late_s(edge: EdgeState) -> float:
-        under_way_s = -state.skews_s.get(edge.stream.gid or b"", 0.0)
-        return least_delay_s(edge) - (
-            under_way_s if under_way_s >= SLOW_S else 0.0
-        )  # that part is a finding of its own
-
-    def is_late(edge: EdgeState) -> bool:
-        return LATE_S <= late_s(edge) <= KEPT_S and (edge.parent, edge.child) not in waiting
-
-    for edges in by_publisher(state, is_late):
-        late = duration(late_s(edges[0]))
-        message = f"{names_of(edges)} from {who(edges[0])} arrives {late} after its stamp"
-        notes = [
-            Note(
-                f"lookups at the current time, or of newer data, extrapolate {late} into the"
-                " future"
-            )
-        ]
-        advice = (
-            "stamp with the time of the measurement and send at once; is the node overloaded, or"
-            " its clock behind?"
-        )
-        yield finding("TF833", message, None, severity="warning", notes=notes, help=advice)
-
-
-def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, float, EdgeState]]:
-    """Return of the edge above the data that is behind the others.
-
-    How far it is behind the data, and their age.
-    """
-    if len(each.delays_s) < FEWEST:
-        return []
-    age_s = median(each.delays_s)
-    ways = [(_delay_s(edge) - age_s, age_s, edge) for edge in _moving_above(state, each.frame)]
-    return sorted(ways, key=lambda way: -way[0])[:1]
-
-
-def keeps_data_waiting(state: TreeState) -> set[tuple[str, str]]:
-    """Return the edges, parent and child, whose stamps lag data that need them.
-
-    They are reported with the data.
-    """
-    found = [way for each in state.stamped for way in _latest_above(state, each)]
-    return {(edge.parent, edge.child) for lack_s, _, edge in found if lack_s > LACK_S}
-
-
-def _off_clock(
-    state: TreeState, each: StampedData, edge: EdgeState, age_s: float, *, simulated: bool
-) -> str:
-    """Return how data are of another clock than an edge.
-
-    Nothing where they are only late or ahead.
-    """
-    if each.stamp_ns is None or KEPT_S < abs(age_s) < HOUR_S:
-        return ""
-    apart_ns = (
-        each.stamp_ns - edge.stream.stamp_ns - (each.received_ns - edge.stream.arrivals.last_ns)
-    )
-    if abs(apart_ns) <= KEPT_NS:
-        return ""  # a recording that is played without its clock, perhaps
-    if each.stamp_ns == 0:
-        return "has no stamp"
-    fault = other_clock(each.stamp_ns, each.received_ns, state.clock_ns, simulated=simulated)
-    return f"is {fault}" if fault else ""
-
-
-def _clock_help(each: StampedData, age_s: float) -> str:
-    if each.stamp_ns == 0:
-        return (
-            "set header.stamp in the driver; a node with use_sim_time stamps 0 while there is no"
-            " /clock"
-        )
-    if age_s < -AHEAD_S:
-        return _ahead_help(each, age_s)
-    return (
-        "set use_sim_time alike for all nodes, and let the driver stamp with ROS time, not with"
-        " its device's"
-    )
-
-
-def _ahead_help(each: StampedData, age_s: float) -> str:
-    if age_s < -AHEAD_S:
-        return (
-            f"the clock behind {each.topic} is {duration(age_s)} ahead: sync it, or let the driver"
-            " stamp with ROS time"
-        )
-    advice = "the edge is late: stamp it with the time of the measurement and send at once"
-    return f"{advice}; listeners may wait, with a timeout"
-
-
-def _delay_s(edge: EdgeState) -> float:
-    return edge.timing.delay_s or 0.0
-
-
-def _moving_above(state: TreeState, frame: str) -> list[EdgeState]:
-    """Return the moving edges from a frame to its root, the newest of each frame."""
-    newest: dict[str, EdgeState] = {}
-    for edge in state.taken:
-        known = newest.get(edge.child)
-        if known is None or known.age_s > edge.age_s:
-            newest[edge.child] = edge
-    parents = {child: edge.parent for child, edge in newest.items()}
-    way = [newest[child] for child in way_up(frame, parents.get) if child in newest]
-    return [edge for edge in way if not edge.stream.static]
-
-
-# Joints.
-
-
-def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
-    """Joint states come, and no node turns them into transforms."""
-    missing = _missing(state)
-    for topic in _joint_topics(state):
-        if (
-            not topic.publishers
-            or _transformers(state, topic)
-            or (state.moving_joints and not missing)
-        ):
-            continue
-        message = (
-            f"{listed(topic.publishers)} publishes {topic.name}, and no node that publishes TF"
-            " listens to it"
-        )
-        notes = (
-            [Note(f"missing: {listed([f'{j.parent} → {j.child}' for j in missing])}")]
-            if missing
-            else []
-        )
-        advice = (
-            "start robot_state_publisher with the robot's description, or let tfcompose up publish"
-            " the joints"
-        )
-        yield finding("TF842", message, None, severity="warning", notes=notes, help=advice)
-
-
-def no_joint_states(state: TreeState) -> Iterator[Finding]:
-    """A robot state publisher waits for joint states that no node publishes."""
-    missing = _missing(state)
-    for topic in _joint_topics(state):
-        nodes = _transformers(state, topic)
-        if topic.publishers or not nodes or not missing:
-            continue
-        edges = listed([f"{joint.parent} → {joint.child}" for joint in missing])
-        message = (
-            f"{listed(nodes)} waits for {topic.name}, which nobody publishes; missing: {edges}"
-        )
-        advice = (
-            "start joint_state_broadcaster or joint_state_publisher; is the topic remapped, or in"
-            " a namespace?"
-        )
-        yield finding("TF843", message, None, help=advice)
-
-
-def joint_without_state(state: TreeState) -> Iterator[Finding]:
-    """Joint states come, and a joint of the description is not in them."""
-    if not state.joint_names:
-        return
-    absent = [
-        joint
-        for joint in _missing(state)
-        if not joint.mimic and joint.name not in state.joint_names
-    ]
-    heard = [topic for topic in _joint_topics(state) if _transformers(state, topic)]
-    if absent and heard:
-        message = (
-            f"{listed([joint.name for joint in absent])}: no state on"
-            f" {listed([topic.name for topic in heard])}"
-        )
-        notes = [
-            Note(f"missing: {listed([f'{joint.parent} → {joint.child}' for joint in absent])}")
-        ]
-        advice = (
-            f"{listed([node for topic in heard for node in topic.publishers])} should send them:"
-            " is a joint misspelt?"
-        )
-        yield finding("TF844", message, None, notes=notes, help=advice)
-
-
-def _missing(state: TreeState) -> list[MovingJoint]:
-    """Return the moving joints whose frames are not published; a frame_prefix may precede them."""
-    children = {edge.child for edge in state.taken}
-    plain = children | {child.rpartition("/")[2] for child in children}
-    return [joint for joint in state.moving_joints if joint.child not in plain]
-
-
-def _joint_topics(state: TreeState) -> list[Topic]:
-    """Return the topics of joint states that are meant.
-
-    Those named ``joint_states``, but for robots beside this one.
-
-    A robot beside has TF topics of its own, in a namespace below this one's.
-    """
-    own = _namespace(state.topics[0])
-    spaces = {_namespace(topic.name) for topic in state.typed(TF_MESSAGE) if topic.publishers}
-    neighbours = tuple(
-        f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/")
-    )
-    named = [topic for topic in state.typed(JOINT_STATE) if topic.name.endswith("/joint_states")]
-    return [
-        topic
-        for topic in named
-        if topic.name.startswith(f"{own}/") and not topic.name.startswith(neighbours)
-    ]
-
-
-def _namespace(topic: str) -> str:
-    return topic.rpartition("/")[0]
-
-
-def _transformers(state: TreeState, topic: Topic) -> list[str]:
-    writers = {one.node for one in state.publishers if one.node}
-    return [node for node in topic.readers if node in writers]
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.tf.live.state import TreeState
 
 
 @dataclass(frozen=True, slots=True)
@@ -383,18 +58,18 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
     stamps.wrong_clock,
     stamps.host_clock_off,
     stamps.stamps_ahead,
-    late_stamps,
+    consumers.late_stamps,
     stamps.stamp_repeated,
     stamps.stamp_went_back,
     rates.fell_silent,
     rates.fixed_left,
     rates.low_rate,
     rates.gap,
-    data_frame_unknown,
-    data_beyond_tf,
-    joint_states_unheard,
-    no_joint_states,
-    joint_without_state,
+    consumers.data_frame_unknown,
+    consumers.data_beyond_tf,
+    consumers.joint_states_unheard,
+    consumers.no_joint_states,
+    consumers.joint_without_state,
 )
 
 

@@ -180,6 +180,7 @@ def _run_command(name: str, command: CommandModule, words: list[str]) -> int:
             sys.stdout.write(parser.format_help())
             return 0
         options = tool_commands.add_options(name, parser, words)
+        parser.set_defaults(commands=all_commands)  # for commands that are about commands
         arguments = parser.parse_args(words)
         if getattr(arguments, "show_args", False):
             from tfcompose.cli.args import show_args

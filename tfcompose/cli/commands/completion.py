@@ -79,11 +79,10 @@ def run(arguments: Namespace) -> int:
     """
     if arguments.at is not None or arguments.line is not None:
         from tfcompose.cli.completing import candidates, split_line
-        from tfcompose.cli.parser import all_commands
 
         words = arguments.words if arguments.line is None else split_line(arguments.line)
         at = len(words) - 1 if arguments.at is None else arguments.at
-        found, files = candidates(all_commands(), words, at)
+        found, files = candidates(arguments.commands(), words, at)
         last = words[at] if 0 <= at < len(words) else ""
         kept = max((last.rfind(one) + 1 for one in arguments.breaks), default=0)
         for one in found:

@@ -30,12 +30,11 @@ def run(arguments: Namespace) -> int:
     from pathlib import Path
 
     from tfcompose.cli.documentation import for_terminal, html, page, topics
-    from tfcompose.cli.parser import all_commands
     from tfcompose.cli.terminal import table_width
     from tfcompose.cli.tool_commands import report_problems
     from tfcompose.foundation.findings import did_you_mean
 
-    commands = all_commands()
+    commands = arguments.commands()
     report_problems()
     if arguments.html:
         try:

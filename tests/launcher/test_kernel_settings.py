@@ -85,8 +85,10 @@ CASES = {
 }
 ASKS_AS_NOBODY = """
 import os
+from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.model.plan import PlanProcess, Schedule
+CATALOGUE.load()  # the installation may be of another user
 if not os.getuid():
     os.setuid(65534)
 before = {asks}

@@ -31,6 +31,8 @@ NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF015", "TF016", "TF606", 
 NOT_OF_A_LINE |= {"TF720", "TF721", "TF722"}
 #: Of a command line: tests/compiler/urdf/test_mesh.py.
 NOT_OF_A_LINE |= {"TF726"}
+#: Of what xacro may not do: tests/compiler/urdf/test_confined_xacro.py.
+NOT_OF_A_LINE |= {"TF021", "TF022"}
 #: Of what is imported: tests/tools/importers/test_shell.py.
 NOT_OF_A_LINE |= {"TF020"}
 #: Codes of the running robot, of its plan and of its surroundings.

@@ -303,7 +303,7 @@ def test_joints_gets_its_parameters_on_its_command_line() -> None:
     )
     plan = next(file.text for file in emit(robot) if file.path == "plan.json")
     argv = read_plan(plan, "plan.json").process("joints").argv
-    assert argv[5:] == (
+    assert argv[4:] == (
         "--ros-args",
         "-p",
         "ignore_timestamp:=true",

@@ -86,7 +86,7 @@ def test_the_parts_that_need_no_ros_import_none() -> None:
     names = ["environment", "joint_codec", "processes", "tf_codec"]
     code = "import sys; " + "; ".join(f"import tfcompose.tf.ros.{name}" for name in names)
     code += (
-        "; import tfcompose.launcher.publishers.simulate, tfcompose.guard.__main__;"
+        "; import tfcompose.launcher.publishers.simulate, tfcompose.guard.start;"
         " sys.exit('rclpy' in sys.modules)"
     )
     assert processes.run([sys.executable, "-c", code]).returncode == 0

@@ -39,8 +39,8 @@ IMPORTS = {
     "import tf_transformations$": (
         "from tfcompose.tf.tf2 import transformations as tf_transformations"
     ),
-    "import tf2_ros$": "from tfcompose import tf2 as tf2_ros",
-    "import tf2_py as tf2$": "from tfcompose import tf2",
+    "import tf2_ros$": "from tfcompose.tf import tf2 as tf2_ros",
+    "import tf2_py as tf2$": "from tfcompose.tf import tf2",
     "import tf2_geometry_msgs$": "from tfcompose.tf.tf2 import messages as tf2_geometry_msgs",
 }
 S = 1_000_000_000

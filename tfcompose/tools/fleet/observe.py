@@ -105,6 +105,7 @@ class FleetObserver:
         )
         self._parents = {child: parent for parent, child in ends}
         self._sessions: dict[str, Any] = {}
+        self._subscribers: list[Any] = []
         self._ended = threading.Event()
         self._threads = [
             threading.Thread(
@@ -116,10 +117,12 @@ class FleetObserver:
             thread.start()
 
     def close(self) -> None:
-        """End the sessions."""
+        """End the sessions after their subscribers: no thread of theirs calls Python at exit."""
         self._ended.set()
         for thread in self._threads:
             thread.join()
+        for subscriber in self._subscribers:
+            subscriber.undeclare()
         for session in self._sessions.values():
             session.close()
 
@@ -218,7 +221,10 @@ class FleetObserver:
             for robot, one in self.fleet.robots.items():
                 for static in (False, True) if one.router == router else ():
                     key = f"{self.fleet.key_of(robot)}/{'tf_static' if static else 'tf'}"
-                    session.declare_subscriber(key, partial(self._take, robot, static))
+                    subscriber = session.declare_subscriber(
+                        key, partial(self._take, robot, static)
+                    )
+                    self._subscribers.append(subscriber)
             return
 
     def _take(self, robot: str, static: bool, sample: Any) -> None:  # noqa: FBT001 (given by partial)

@@ -259,7 +259,7 @@ _RECORDS: dict[str, Any] = {
         "plugin": str,
         "period": _NUMBER,
         "after": {"*": str},
-        "extra_arguments?": _PARAMETERS,
+        f"{EXTRA_ARGUMENTS.name}?": _PARAMETERS,
     },
     "include": _AT
     | {

@@ -1,6 +1,7 @@
 """The process that a stranger's file runs in: what it may send, print and take."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -101,6 +102,8 @@ def test_it_ends_with_who_started_it() -> None:
     pid = int(process.stdout.readline())
     until(lambda: "Seccomp:\t2" in status_of(pid))
     assert os.getsid(pid) == pid
+    (capabilities,) = re.findall(r"CapEff:\t(\w+)", status_of(pid))
+    assert int(capabilities, 16) & ~0b110 == 0
     process.kill()
     process.wait()
     until(lambda: "State:\tZ" in status_of(pid) or not status_of(pid))

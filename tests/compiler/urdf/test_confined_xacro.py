@@ -279,17 +279,18 @@ STOPPED = {
     "at": None,
 }
 READ = {"read": "r.xacro"}
+OUTSIDE = "../secret.xacro"
 HOSTILE: dict[str, list[Any]] = {
     "nothing": [],
     "a kernel that lacks something": [READ, {"missing": ["whatever"]}, {"answer": OF_FILE}],
-    "a long question": [{"read": "x" * 5000}, {"answer": OF_FILE}],
+    "a long question": [READ, {"read": "x" * 5000}, {"answer": OF_FILE}],
     "no mapping": [[]],
     "another question": [{"write": "r.xacro"}],
     "a question that is no text": [{"read": ["r.xacro"]}],
     "no answer": [{"answer": None}],
     "a text of half characters": [READ, {"answer": OF_FILE | {"text": "\ud800"}}],
     "files that were not read": [{"answer": OF_FILE}],
-    "another file": [READ, {"answer": OF_FILE | {"files": ["/etc/passwd"]}}],
+    "another file": [READ, {"answer": OF_FILE | {"files": [OUTSIDE]}}],
     "a place in no file": [READ, {"answer": OF_FILE | {"places": [[1, 1, 1], None]}}],
     "a place before the file": [READ, {"answer": OF_FILE | {"places": [[0, -1, 1], None]}}],
     "a place of two numbers": [READ, {"answer": OF_FILE | {"places": [[0, 1], None]}}],
@@ -301,14 +302,12 @@ HOSTILE: dict[str, list[Any]] = {
         {"answer": OF_FILE | {"places": [[0, 10**9, 10**9]] * 2}},
     ],
     "a place far behind its line": [READ, {"answer": OF_FILE | {"places": [[0, 1, 10**9]] * 2}}],
-    "stopped in another file": [
-        {"answer": STOPPED | {"files": ["/etc/passwd"], "at": ["/etc/passwd", 1, 0]}}
-    ],
-    "stopped with broken XML elsewhere": [{"answer": STOPPED | {"error": ["/etc/passwd", 1, 0]}}],
+    "stopped in another file": [{"answer": STOPPED | {"files": [OUTSIDE], "at": [OUTSIDE, 1, 0]}}],
+    "stopped with broken XML elsewhere": [{"answer": STOPPED | {"error": [OUTSIDE, 1, 0]}}],
     "stopped at no place": [READ, {"answer": STOPPED | {"error": [1, 2, 3], "at": ["r.xacro"]}}],
     "stopped in half a macro": [
         READ,
-        {"answer": STOPPED | {"macros": [["a"], [None, None], ["a", "/etc/passwd"]]}},
+        {"answer": STOPPED | {"macros": [["a"], [None, None], ["a", OUTSIDE]]}},
     ],
     "stopped in many macros": [
         READ,
@@ -319,7 +318,7 @@ HOSTILE: dict[str, list[Any]] = {
     ],
     "stopped for a long reason": [READ, {"answer": STOPPED | {"reason": "x" * 1_000_000}}],
     "an unknown kind": [READ, {"answer": STOPPED | {"kind": "whatever"}}],
-    "a secret": [{"read": "/etc/passwd"}, {"read": "r.xacro"}, {"answer": OF_FILE}],
+    "a secret": [{"read": OUTSIDE}, {"read": "r.xacro"}, {"answer": OF_FILE}],
 }
 
 
@@ -333,6 +332,7 @@ def test_a_process_that_was_taken_over_shows_no_other_file(
     of_part: bool,
 ) -> None:
     monkeypatch.setattr(expand, "PROCESS", "tests.support.hostile_child")
+    Path(OUTSIDE).write_text(f"<robot name='{HIDDEN}'><link name='a'/></robot>\n", "utf-8")
     write()
     Path("hostile.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines), "utf-8")
     if of_part:
@@ -341,6 +341,23 @@ def test_a_process_that_was_taken_over_shows_no_other_file(
     printed = capsys.readouterr()
     assert HIDDEN not in printed.out + printed.err
     assert "Traceback" not in printed.err
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("a secret", "TF021"), ("another file", "TF008"), ("files that were not read", "TF008"),
+        ("a long question", "TF008"), ("a text of half characters", "TF008"),
+    ],
+)  # fmt: skip
+def test_what_such_a_process_sends_is_refused(
+    name: str, code: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(expand, "PROCESS", "tests.support.hostile_child")
+    text = "".join(json.dumps(line) + "\n" for line in HOSTILE[name])
+    Path("hostile.jsonl").write_text(text, "utf-8")
+    (found,) = lint()
+    assert (found.code, found.span and found.span.file) == (code, "r.xacro")
 
 
 #: Lets a program believe that the kernel does not have these calls, as an older one.

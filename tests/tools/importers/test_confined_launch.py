@@ -240,10 +240,12 @@ HOSTILE: dict[str, Any] = {
     "a record that is none": _answer(7),
     "a kind that there is not": _answer(_record(kind="whatever")),
     "no kind": _answer({}),
-    "a place elsewhere": _answer({"kind": "todo", "at": ["/etc/passwd", 1], "text": "see"}),
-    "a place of one part": _answer({"kind": "todo", "at": ["/etc/passwd"], "text": "see"}),
+    "a place elsewhere": _answer(
+        {"kind": "todo", "at": ["../secret.launch.py", 1], "text": "see"}
+    ),
+    "a place of one part": _answer({"kind": "todo", "at": ["../secret.launch.py"], "text": "see"}),
     "a place the wrong way round": _answer(
-        {"kind": "todo", "at": [1, "/etc/passwd"], "text": "see"}
+        {"kind": "todo", "at": [1, "../secret.launch.py"], "text": "see"}
     ),
     "a place far below": _answer({"kind": "todo", "at": ["", 10**9], "text": "see"}),
     "stopped for a long reason": _answer(_record(), stopped="x" * 10**6, line=10**12),
@@ -274,14 +276,14 @@ HOSTILE: dict[str, Any] = {
         _record(
             package="robot_state_publisher",
             executable="robot_state_publisher",
-            argv=["/etc/passwd.urdf"],
+            argv=["../secret.urdf"],
         )
     ),
     "a description of what is elsewhere": _answer(
         _record(
             package="robot_state_publisher",
             executable="robot_state_publisher",
-            params=[{"robot_description": '\x02{"file": "/etc/passwd", "args": {}}\x03'}],
+            params=[{"robot_description": '\x02{"file": "../secret.urdf", "args": {}}\x03'}],
         )
     ),
     "a mark that is none": _answer(
@@ -300,6 +302,10 @@ def test_a_process_that_was_taken_over_shows_no_other_file(
     line: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(launch, "PROCESS", "tests.support.hostile_child")
+    robot = f"<robot name='r'><link name='{HIDDEN}'/></robot>\n"
+    Path("../secret.urdf").write_text(robot, "utf-8")
+    program = f"HIDDEN = '{HIDDEN}'\ndef generate_launch_description():\n    pass\n"
+    Path("../secret.launch.py").write_text(program, "utf-8")
     write("" if line is None else json.dumps(line) + "\n", "hostile.jsonl")
     write("\n", "a.launch.py")
     try:

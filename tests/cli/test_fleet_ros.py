@@ -3,12 +3,14 @@
 Each on its own topics, one guard for both.
 """
 
-import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.support import processes
 
 pytestmark = pytest.mark.ros
 
@@ -27,7 +29,7 @@ with open_node("stranger", "", args=["-r", f"/tf:={topic}"]) as node:
 
 
 def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_offence(
-    start: Callable[..., Any], tmp_path: Path
+    start: Callable[..., Any], domain: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "stranger.py").write_text(STRANGER, encoding="utf-8")
     robot = start("up", ROBOT)
@@ -53,9 +55,15 @@ def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_off
         2,
     )
     assert missing.process.wait(60) == 1
-    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    start("stranger", "/rover2/tf", "rover1/odom", "rover1/base_link", PYTHONPATH=path)
-    robot.until_says("/stranger")
+    program = [sys.executable, str(tmp_path / "stranger.py")]
+    stranger = processes.start(
+        [*program, "/rover2/tf", "rover1/odom", "rover1/base_link"], env=domain.environment
+    )
+    try:
+        robot.until_says("/stranger")
+    finally:
+        stranger.kill()
+        stranger.wait()
     offence = next(line for line in robot.lines if "/stranger" in line)
     assert "TF803" in offence, robot.lines
     assert "no robot_description" not in robot.output

@@ -77,6 +77,8 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
     program = f"import sys; sys.path[:] = {_module_path()!r}; from {module} import main"
     program += f"; main(*{inherited})"
     outcome, printed = Outcome(), bytearray()
+    env = dict(os.environ if environment is None else environment)
+    env.pop("PYTHONPYCACHEPREFIX", None)  # a folder that it may not read
     with (
         os.fdopen(to_child, "wb", buffering=0) as sink,
         os.fdopen(from_child, "rb") as source,
@@ -87,7 +89,7 @@ def run_confined(  # noqa: PLR0913 (what a process needs)
             stderr=subprocess.STDOUT,
             pass_fds=inherited,
             start_new_session=True,
-            env=environment,
+            env=env,
         ) as process,
     ):
         os.close(reads)

@@ -115,6 +115,15 @@ made = [os.environ["SETTING"], text, sorted(os.listdir(folder)), os.path.exists(
     assert made == ["set", "kept", ["config", "package.xml"], True]
 
 
+def test_a_folder_for_compiled_files_is_no_finding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PYTHONPYCACHEPREFIX", str(tmp_path / "pyc"))
+    monkeypatch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
+    assert made_by("made = 1") == 1
+    assert "may not read" not in printed_errors(capsys)
+
+
 def test_a_launch_file_that_lies_outside_is_not_included(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

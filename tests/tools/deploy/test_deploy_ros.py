@@ -5,7 +5,10 @@ import re
 import signal
 import subprocess
 import sys
+import sysconfig
+import venv
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -266,12 +269,14 @@ def test_clocks_that_are_apart_are_found_before_the_start(computers: Computers) 
     assert deploy(computers, ROBOT).returncode == 0
     before = current(computers)
     shifted = computers.folder / "shifted"
-    shifted.mkdir()
-    (shifted / "sitecustomize.py").write_text(SHIFTED)
+    venv.create(shifted, symlinks=True)
+    (packages,) = shifted.glob("lib/python*/site-packages")
+    (packages / "sitecustomize.py").write_text(SHIFTED)
+    here = [sysconfig.get_path("purelib"), str(Path(__file__).parents[3])]
+    lines = [f"import site; site.addsitedir({folder!r})\n" for folder in here]
+    (packages / "here.pth").write_text("".join(lines))
     python = shifted / "python"
-    python.write_text(
-        f'#!/bin/sh\necho welcome\nPYTHONPATH="{shifted}:$PYTHONPATH" exec {sys.executable} "$@"\n'
-    )
+    python.write_text(f'#!/bin/sh\necho welcome\nexec {shifted}/bin/python "$@"\n')
     python.chmod(0o755)
     ahead = MOVED.replace("10.77.0.4, port: 2222", f"10.77.0.4, port: 2222, python: {python}")
     done = deploy(computers, ahead)

@@ -158,6 +158,9 @@ CALLS = {
     "mincore": 27,
 }
 
+#: Those to which no length is a length: they would take the machine's name away.
+_HARMLESS = {"sethostname": (_NONE, -1), "setdomainname": (_NONE, -1)}
+
 
 class Try:
     """What the tries need: the C library, and what others have that must not be reached."""
@@ -423,10 +426,11 @@ def _resolve_name() -> None:
 
 
 def _by_ctypes(t: Try) -> dict[str, Callable[[], Any]]:
-    def made(number: int) -> Callable[[], Any]:
-        return lambda: t.call(number, _BAD_FD, _NONE, _NONE, _NONE, _NONE, _NONE)
+    def made(name: str) -> Callable[[], Any]:
+        arguments = _HARMLESS.get(name, (_BAD_FD, _NONE, _NONE, _NONE, _NONE, _NONE))
+        return lambda: t.call(CALLS[name], *arguments)
 
-    named = {f"syscall {name}": made(number) for name, number in CALLS.items()}
+    named = {f"syscall {name}": made(name) for name in CALLS}
     return named | {
         "libc open for writing": lambda: _checked(t.libc.open(t.path("kept").encode(), os.O_RDWR)),
         "libc open with a high bit set": lambda: t.call(

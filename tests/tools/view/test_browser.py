@@ -205,6 +205,7 @@ def test_the_tree_selects_closes_and_hides_what_is_below_a_frame(
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_arrow_keys_lead_through_the_tree(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     with page_of(address_of(server)) as page:

@@ -253,6 +253,12 @@ class _Export:
         self.named: dict[str, Code] = {}
         self._variables: dict[str, str] = {}
         self._delays_s = _delays_s(self.known)
+        #: The components that each container loads, by its name.
+        self._components: dict[str, list[PlanProcess]] = {}
+        for process in self.processes:
+            if process.component:
+                container = process.component.container
+                self._components.setdefault(container, []).append(process)
 
     def actions(self, stock: list[PlanEdge] | None) -> Iterator[Code]:
         """Yield the actions in order.
@@ -382,19 +388,12 @@ class _Export:
     def _unlike(self, process: PlanProcess) -> Iterator[str]:
         """Yield what launch does otherwise with a process."""
         yield from _unlike(process)
-        loads = [one.name for one in self._loaded_by(process)]
+        loads = [one.name for one in self._components.get(process.name, [])]
         if loads and process.restart != "no":
             yield (
                 f"when {process.name} is started again, it has none of its components:"
                 f" {', '.join(loads)}"
             )
-
-    def _loaded_by(self, container: PlanProcess) -> list[PlanProcess]:
-        return [
-            one
-            for one in self.processes
-            if one.component and one.component.container == container.name
-        ]
 
     def _started(self, process: PlanProcess) -> Code:
         if process.component:
@@ -497,7 +496,7 @@ class _Export:
             *([items(given, "parameters")] if given else []),
             *more,
         ]
-        if loaded := self._loaded_by(process):
+        if loaded := self._components.get(process.name, []):
             components = [
                 self._component(one) for one in loaded if self._comes_with_container(one)
             ]

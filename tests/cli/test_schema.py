@@ -2,9 +2,9 @@
 
 import json
 import re
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jsonschema
 import pytest
@@ -14,8 +14,12 @@ from tfcompose.cli.compiling import library
 from tfcompose.cli.schemas import LANGUAGES, schema_text
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.spec.language import validate_node_preset, validate_preset
-from tfcompose.spec.load import load
+from tfcompose.spec.language import validate_file, validate_preset
+from tfcompose.spec.language.node_preset import NodePresetSpec
+from tfcompose.spec.load import Source, load
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 ROOT = Path(__file__).parents[2]
 HEAD = "tfcompose: 1\nrobot: r\n"
@@ -180,7 +184,9 @@ def test_presets_have_no_expressions(language: str, file: str, line: str) -> Non
             text[: text.index("optics:")]
             + "optics:\n  image:\n    frame: '{name}_optical_frame'\n"
         )
-    validate = {"preset": validate_preset, "node": validate_node_preset}[language]
+    validate: Callable[[Source], object] = validate_preset
+    if language == "node":
+        validate = partial(validate_file, NodePresetSpec)
     value = "true" if "backward" in line or "one_of" in line else "1"
     fine, wrong = (load(text + line.format(one), file) for one in (value, '"${a}"'))
     validate(fine)

@@ -29,7 +29,8 @@ from tfcompose.compiler.resolve import Library
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.compiler.urdf.xacro import Expansion, Use
 from tfcompose.foundation.findings import Edit, Finding, RejectedError, Span
-from tfcompose.spec.language import profiles_in, set_value, validate_node_preset
+from tfcompose.spec.language import profiles_in, set_value, validate_file
+from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.load import Source, load
 
 ROOT = Path(__file__).parents[2]
@@ -280,7 +281,7 @@ def node_presets() -> Iterator[Case]:
 
 
 def of_node_preset(text: str, file: str) -> Iterable[Finding]:
-    validate_node_preset(load(text, file))
+    validate_file(NodePresetSpec, load(text, file))
     return ()
 
 

@@ -64,8 +64,7 @@ class Linter:
             return list(error.findings)
         given = replace(given_by(self.arguments), environment=files.environment_of(source))
         if not self.has_one_file:  # an argument is one of any of the files
-            declared = source.data.get("args")
-            names = given.args.keys() & (declared if isinstance(declared, dict) else {}).keys()
+            names = given.args.keys() & source.mapping("args").keys()
             given = replace(given, args={name: given.args[name] for name in names})
         variants = _Variants(source, overlays, given, files, files.disk_of(source))
         requested = self.arguments.profiles
@@ -121,7 +120,7 @@ class _Variants:
 
     def in_combinations(self, profiles: Sequence[str]) -> tuple[list[Finding], list[Compiled]]:
         """Return the findings for each combination of argument values, and what was compiled."""
-        if "args" not in self.source.data and not self.overlays:
+        if not self.source.has(("args",)) and not self.overlays:
             alone = self._compile(self.given, profiles)
             return list(alone.found), [alone]
         from tfcompose.cli.combinations import combinations, merged
@@ -162,7 +161,7 @@ class _Variants:
         more: list[Finding] = []
         variants = list(judged)
         for profile, inside in profiles_in(self.source).items():
-            if "when" in inside and "args" in self.source.data:
+            if "when" in inside and self.source.has(("args",)):
                 continue  # it is laid over where its condition holds
             variant = self._compile(self.given, [profile])
             variants.append(variant)

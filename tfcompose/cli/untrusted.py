@@ -78,9 +78,8 @@ def declared_environment(source: Source, environment: Mapping[str, str]) -> dict
     It is one of the declared choices, a switch or a number: a stranger may declare that an
     argument reads any variable, and findings name values.
     """
-    args = source.data.get("args")
     declared: dict[str, str] = {}
-    for spec in args.values() if isinstance(args, dict) else ():
+    for spec in source.mapping("args").values():
         name = spec.get("env") if isinstance(spec, dict) else None
         value = environment.get(name) if isinstance(name, str) else None
         if value is not None and (value in _choices(spec) or _PLAIN.fullmatch(value)):
@@ -144,8 +143,7 @@ class UntrustedFiles:
 
     def disk_for(self, source: Source) -> Disk:
         """Return the same for a robot file, which may read packages under ``packages``."""
-        packages = source.data.get("packages")
-        for name, folder in packages.items() if isinstance(packages, dict) else ():
+        for name, folder in source.mapping("packages").items():
             if isinstance(folder, str):
                 path = path_named(folder, source.at(("packages", name)))
                 if is_package(posixpath.realpath(path)):

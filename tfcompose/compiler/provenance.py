@@ -46,12 +46,8 @@ def values_of(edge: Edge, sources: Sequence[Source]) -> list[str]:
 def _given_values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Source, Path, Any]]:
     for source in sources:
         for entry in _entries(edge, source):
-            data: Any = source.data
-            for step in entry:
-                data = data.get(step) if isinstance(data, dict) else None
-            if isinstance(data, dict) and (
-                source.at((*entry, "parent")) == edge.at or not edge.given
-            ):
+            data = source.mapping(*entry)
+            if data and (source.at((*entry, "parent")) == edge.at or not edge.given):
                 yield from ((source, (*entry, key), data[key]) for key in _KEYS if key in data)
                 return
 
@@ -67,9 +63,7 @@ def _entries(edge: Edge, source: Source) -> Iterator[Path]:
         else {"joints": edge.joint_name}
     )
     for section, name in (named | dict.fromkeys(("frames", "links", "parts"), edge.child)).items():
-        entries = source.data.get(section)
-        if not isinstance(entries, dict):
-            continue
+        entries = source.mapping(section)
         ends = (name[begin:] for begin in range(len(name) + 1))
         known = (
             sorted(entries, key=len, reverse=True)

@@ -113,7 +113,7 @@ def test_what_is_not_there_has_the_place_of_what_is_around_it() -> None:
     source = load(TEXT, "f")
     assert source.at(("links", "base_link", "mass", "kg")) == source.at(("links", "base_link"))
     assert source.at_key(("links", "arm")) == source.at_key(("links",))
-    assert Source("f", {}, Place(Span("f"))).at(("a",)) == Span("f")
+    assert Source("f", Place(Span("f")), {}).at(("a",)) == Span("f")
 
 
 def test_the_first_of_two_equal_keys_counts_and_the_second_is_a_finding_that_shows_the_first() -> (

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tfcompose.model.robot import Robot
     from tfcompose.spec.language.robot import ComponentSpec, HardwareSpec, RobotSpec
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.load import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,16 +40,16 @@ class _Known(Collection[str]):
         return len(self.names)
 
 
-def with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+def with_blocks(robot: Robot, spec: RobotSpec) -> tuple[Robot, list[Finding]]:
     """Return the robot with its hardware and raw blocks."""
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
-    hardware = _hardware_of(spec.ros2_control, source)
+    hardware = tuple(
+        _hardware(name, declared, spec) for name, declared in spec.ros2_control.items()
+    )
     children = {edge.child for edge in robot.edges}
     frames = [frame for frame in robot.frames if frame in robot.links or frame in children]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
-    blocks, found = _blocks_of(
-        spec.xml, source, _Known(frames, robot.excuses), _Known(joints, robot.excuses)
-    )
+    blocks, found = _blocks_of(spec, _Known(frames, robot.excuses), _Known(joints, robot.excuses))
     found += unknown_joints(hardware, _Known(moving, robot.excuses))
     return (
         replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)),
@@ -57,28 +57,23 @@ def with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, l
     )
 
 
-def _hardware_of(specs: dict[str, HardwareSpec], source: Source) -> tuple[Hardware, ...]:
-    """Return the hardware components with the places of their joints."""
-    return tuple(_hardware(name, spec, source) for name, spec in specs.items())
-
-
-def _hardware(name: str, spec: HardwareSpec, source: Source) -> Hardware:
+def _hardware(name: str, declared: HardwareSpec, spec: RobotSpec) -> Hardware:
     at: Path = ("ros2_control", name)
-    kinds = (("joint", spec.joints), ("sensor", spec.sensors), ("gpio", spec.gpios))
+    kinds = (("joint", declared.joints), ("sensor", declared.sensors), ("gpio", declared.gpios))
     components = tuple(
-        _component(kind, inner, one, source.at_key((*at, f"{kind}s", inner)))
+        _component(kind, inner, one, spec.at_key((*at, f"{kind}s", inner)))
         for kind, several in kinds
         for inner, one in several.items()
     )
     return Hardware(
         name,
-        spec.plugin,
-        spec.type,
-        at=source.at_key(at),
-        params=spec.params,
+        declared.plugin,
+        declared.type,
+        at=spec.at_key(at),
+        params=declared.params,
         components=components,
-        rw_rate=spec.rw_rate,
-        is_async=spec.is_async,
+        rw_rate=declared.rw_rate,
+        is_async=declared.is_async,
     )
 
 
@@ -92,7 +87,7 @@ def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component
 
 
 def _blocks_of(
-    texts: dict[str, str], source: Source, frames: Collection[str], joints: Collection[str]
+    spec: RobotSpec, frames: Collection[str], joints: Collection[str]
 ) -> tuple[tuple[Block, ...], list[Finding]]:
     """Return the raw blocks, and what is wrong with them.
 
@@ -100,28 +95,28 @@ def _blocks_of(
     """
     found: list[Finding] = []
     blocks = []
-    for name, text in texts.items():
+    for name, text in spec.xml.items():
         at: Path = ("xml", name)
         try:
-            root = read_block(text, source.file)
+            root = read_block(text, spec.spans.file)
         except RejectedError as error:
             found += [
-                replace(one, span=_in_file(one.span, text, source, at)) for one in error.findings
+                replace(one, span=_in_file(one.span, text, spec, at)) for one in error.findings
             ]
             continue
-        blocks.append(Block(name, source.at(at), text))
-        for one in (*faults_of(root, frames, joints), *unexpanded(text, source.file)):
-            found.append(replace(one, span=_in_file(one.span, text, source, at)))
+        blocks.append(Block(name, spec.at(at), text))
+        for one in (*faults_of(root, frames, joints), *unexpanded(text, spec.spans.file)):
+            found.append(replace(one, span=_in_file(one.span, text, spec, at)))
     return tuple(blocks), found
 
 
-def _in_file(span: Span | None, text: str, source: Source, at: Path) -> Span:
+def _in_file(span: Span | None, text: str, spec: RobotSpec, at: Path) -> Span:
     """Return the place in the robot file of a place in the block, whose text starts at line 2.
 
     Only in a literal block (``|``) are the lines those of the file; elsewhere it is the whole
     value.
     """
-    value, key = source.at(at), source.at_key(at)
+    value, key = spec.at(at), spec.at_key(at)
     lines = text.rstrip("\n").count("\n") + 1
     if span is None or value.end_line - value.line < lines:
         return value

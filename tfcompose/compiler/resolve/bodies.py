@@ -25,7 +25,8 @@ from tfcompose.spec.language.values import COLOURS
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
     from tfcompose.spec.language import bodies as specs
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Path
 
 FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
@@ -37,7 +38,7 @@ class Bodies:
     ``found`` holds what is wrong with the files of meshes and textures.
     """
 
-    source: Source
+    spec: RobotSpec
     packages: Packages = field(default_factory=Packages)
     found: list[Finding] = field(default_factory=list)
     _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(
@@ -46,7 +47,7 @@ class Bodies:
 
     def link(self, name: str, body: specs.LinkSpec) -> Link:
         """Return the link with its shapes and, where it has a mass, its inertia."""
-        place = self.source.at_key(("links", name))
+        place = self.spec.at_key(("links", name))
         if (
             id(body) not in self._known
         ):  # aliases of one anchor are one object, and have the same shapes
@@ -77,7 +78,7 @@ class Bodies:
             material = self._material(shape.material, (*at, "material"))
         elif shape.color:
             material = Material(
-                colour_name(shape.color), shape.color, at=self.source.at((*at, "color"))
+                colour_name(shape.color), shape.color, at=self.spec.at((*at, "color"))
             )
         pose = pose_of(shape)
         if shape.box:
@@ -91,7 +92,7 @@ class Bodies:
         if shape.capsule:
             return Shape("capsule", (shape.capsule.radius, shape.capsule.length), pose, material)
         if shape.mesh:
-            place = self.source.at((*at, "mesh", "uri"))
+            place = self.spec.at((*at, "mesh", "uri"))
             mesh, wrong = self.packages.asset(shape.mesh.uri, place)
             self.found += [wrong] if wrong else []
             return Shape("mesh", shape.mesh.scale, pose, material, mesh)
@@ -102,7 +103,7 @@ class Bodies:
         for index, shape in enumerate(shapes):
             if any(getattr(shape, form) for form in FORMS):
                 in_list = (*at, index)
-                made.append(self.shape(shape, in_list if self.source.has(in_list) else at))
+                made.append(self.shape(shape, in_list if self.spec.spans.has(in_list) else at))
         return tuple(made)
 
     def _material(self, given: specs.Material, at: Path) -> Material:
@@ -112,14 +113,14 @@ class Bodies:
         """
         texture = None
         if given.texture is not None:
-            texture, wrong = self.packages.asset(given.texture, self.source.at((*at, "texture")))
+            texture, wrong = self.packages.asset(given.texture, self.spec.at((*at, "texture")))
             self.found += [wrong] if wrong else []
         name, rgba = given.name, given.rgba
         if name is None:
             rgba = rgba if rgba or texture else (0.5, 0.5, 0.5, 1.0)
             name = colour_name(rgba or ())
             name = name if texture is None else f"{name}_{_word(texture.uri)}"
-        return Material(name, rgba, texture, self.source.at(at))
+        return Material(name, rgba, texture, self.spec.at(at))
 
     def _inertial(
         self,
@@ -128,7 +129,7 @@ class Bodies:
         collisions: tuple[Shape, ...],
         at: Path,
     ) -> Inertial | None:
-        shapes, place = collisions or visuals, self.source.at_key(at[:2])
+        shapes, place = collisions or visuals, self.spec.at_key(at[:2])
         pose = Pose(given.xyz or (0.0, 0.0, 0.0), rotation_of(given) or Pose().quat_xyzw)
         if given.inertia and given.mass:
             i = given.inertia
@@ -136,7 +137,7 @@ class Bodies:
             return Inertial(
                 given.mass, pose, tensor, traces(given.mass, visuals, collisions), place
             )
-        moments = self.moments(shapes, self.source.at_key(at)) if shapes else None
+        moments = self.moments(shapes, self.spec.at_key(at)) if shapes else None
         if moments is None:
             return None
         density = given.density or (given.mass or 0.0) / moments.volume

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve.poses import Draft
     from tfcompose.spec.language.calibration import Entry
     from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Source
 
     Reader = Callable[[str], str]
 
@@ -43,18 +42,17 @@ def calibrated(
     drafts: Sequence[Draft],
     frames: Collection[str],
     spec: RobotSpec,
-    source: Source,
     read: Reader | None,
 ) -> tuple[list[Draft], list[Finding]]:
     """Return the drafts with measured calibrations, and what is wrong with calibrations."""
-    work = _Work(_Files(read), frozenset(frames), spec, source)
+    work = _Work(_Files(read), frozenset(frames), spec)
     for draft in drafts:
         if draft.group:
             work.inside.setdefault(draft.group, set()).add(draft.edge.child)
     result = [work.own(draft) for draft in drafts]
     for index, name in enumerate(spec.calibrations):
         path = ("calibrations", index)
-        result = work.apply(name, source.at(path), result)
+        result = work.apply(name, spec.at(path), result)
     return result, [*work.files.found, *work.found]
 
 
@@ -126,7 +124,6 @@ class _Work:
     files: _Files
     frames: frozenset[str]
     spec: RobotSpec
-    source: Source
     found: list[Finding] = field(default_factory=list)
     used: set[int] = field(default_factory=set)
     inside: dict[tuple[str, str], set[str]] = field(default_factory=dict)
@@ -136,7 +133,7 @@ class _Work:
         declared = _declared(draft, self.spec)
         if declared is None:
             return draft
-        at = self.source.at((*draft.at, "calibration", "file"))
+        at = self.spec.at((*draft.at, "calibration", "file"))
         file = self.files.get(declared.file, at, declared.format)
         match = self._pick(draft, declared, file, at)
         return self._measured(draft, match, file, declared, at) if match else draft
@@ -287,7 +284,7 @@ class _Work:
 
     def _unused(self, file: CalibrationFile, at: Span) -> None:
         for entry in file.entries:
-            if id(entry) in self.used or self.source.is_variant:  # the file alone may use it
+            if id(entry) in self.used or self.spec.spans.is_variant:  # the file alone may use it
                 continue
             advice = (
                 "calibration: beside the mount takes it"

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Edge, Robot
     from tfcompose.spec.language.node_preset import ClaimSpec, NodePresetSpec
     from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.load import Path
 
 
-def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+def settled(robot: Robot, spec: RobotSpec) -> tuple[Robot, list[Finding]]:
     """Return the robot with claims settled by parameters, and claims that cannot be settled."""
-    work = _Work(robot, spec, source)
+    work = _Work(robot, spec)
     processes = tuple(work.process(process) for process in robot.processes)
     edges = tuple(work.edge(edge) for edge in robot.edges)
     return (
@@ -40,7 +40,6 @@ def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[
 class _Work:
     robot: Robot
     spec: RobotSpec
-    source: Source
     found: list[Finding] = field(default_factory=list)
     claims: list[Claim] = field(default_factory=list)
     publishers: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -130,7 +129,7 @@ class _Work:
             names = node_preset_names()
             advice = did_you_mean(name, names, f"there is {', '.join(names)}")
             self.found.append(
-                finding("TF601", f"unknown node preset {name}", self.source.at(path), help=advice)
+                finding("TF601", f"unknown node preset {name}", self.spec.at(path), help=advice)
             )
         except RejectedError as error:
             self.found += error.findings
@@ -311,7 +310,7 @@ class _Work:
         self.found.append(finding("TF331", message, claimant.node.at, help=advice))
 
     def _at(self, claimant: Claimant, key: str) -> Span:
-        return self.source.at((*claimant.node.path, "params", *key.split(".")))
+        return self.spec.at((*claimant.node.path, "params", *key.split(".")))
 
 
 @dataclass(slots=True)

@@ -40,14 +40,12 @@ _PROGRAMS = {
 
 def container_process(name: str, declared: ContainerSpec, validated: Validated) -> Process:
     """Return the process of a container; it is ready when it can load."""
-    spec, source = validated.spec, validated.source
+    spec = validated.spec
     at: Path = ("containers", name)
     namespace = namespace_of(declared, spec.ros.namespace)
-    node = Node(
-        full_name(namespace, declared.node or name), source.at_key(at), at, declared.params
-    )
+    node = Node(full_name(namespace, declared.node or name), spec.at_key(at), at, declared.params)
     kind: ProcessKind = "external" if declared.external else "run"
-    process = Process(name, kind, at=source.at_key(at), ros_nodes=(node,), loads=True)
+    process = Process(name, kind, at=spec.at_key(at), ros_nodes=(node,), loads=True)
     process = replace(
         process, **how(declared, namespace, "external" if declared.external else "container")
     )
@@ -88,7 +86,7 @@ def component_findings(path: Path, process: Process, validated: Validated) -> It
 
     No such container, and what it cannot have.
     """
-    spec, source = validated.spec, validated.source
+    spec = validated.spec
     component = process.component
     if component is None:
         return
@@ -101,11 +99,11 @@ def component_findings(path: Path, process: Process, validated: Validated) -> It
             )
         advice = did_you_mean(name, known, otherwise)
         message = f"the container of {process.name} is {name}, which is not a container"
-        yield finding("TF813", message, source.at((*path, "container")), help=advice)
+        yield finding("TF813", message, spec.at((*path, "container")), help=advice)
     if process.ready and process.ready.kind in {"exit", "log"}:
         what = "end" if process.ready.kind == "exit" else "output"
         message = f"{process.name} is a component, and has no {what} of its own"
-        place = source.at_key((*path, "ready", process.ready.kind))
+        place = spec.at_key((*path, "ready", process.ready.kind))
         yield finding(
             "TF107", message, place, help="wait for edges, a topic, a service or a lifecycle state"
         )
@@ -114,11 +112,11 @@ def component_findings(path: Path, process: Process, validated: Validated) -> It
         ("extra_arguments", component.extra_arguments),
     ):
         for key, value in values.items():
-            if (wrong := _not_a_parameter(value)) and source.has((*path, where)):
+            if (wrong := _not_a_parameter(value)) and spec.spans.has((*path, where)):
                 exact: Path = (*path, where, *key.split("."))
-                at = exact if source.has(exact) else (*path, where)
+                at = exact if spec.spans.has(exact) else (*path, where)
                 yield finding(
-                    "TF103", f"{process.name}: {key} is {wrong}", source.at(at), help=_KINDS
+                    "TF103", f"{process.name}: {key} is {wrong}", spec.at(at), help=_KINDS
                 )
 
 

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language import Validated
     from tfcompose.spec.language.pose import EdgeKeys
     from tfcompose.spec.language.robot import JointSpec, RobotSpec
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.load import Path, Spans
 
 
 @dataclass(slots=True)
@@ -63,22 +63,17 @@ class Drafts:
         """What the user wrote."""
         return self.validated.spec
 
-    @property
-    def source(self) -> Source:
-        """Where it stands."""
-        return self.validated.source
-
     def add_frames(self) -> None:
         """Take the bare frames; one without a parent is a root, said so."""
         for name, frame in self.spec.frames.items():
-            self.frames.setdefault(name, self.source.at_key(("frames", name)))
+            self.frames.setdefault(name, self.spec.at_key(("frames", name)))
             if frame.parent is not None:
                 self.add(("frames", name), frame.parent, name, frame, joint_name=frame.joint)
 
     def add_links(self) -> None:
         """Take the bodies; one with a parent has a fixed edge."""
         for name, link in self.spec.links.items():
-            at = self.source.at_key(("links", name))
+            at = self.spec.at_key(("links", name))
             self.frames.setdefault(name, at)
             self.links[name] = self.bodies.link(name, link)
             if link.parent is not None:
@@ -87,8 +82,8 @@ class Drafts:
     def add_joints(self) -> None:
         """Take the edges between bodies."""
         for name, joint in self.spec.joints.items():
-            moving = joint_of(name, joint, self.source)
-            self.found += idle_joint_keys(name, joint, self.source)
+            moving = joint_of(name, joint, self.spec)
+            self.found += idle_joint_keys(name, joint, self.spec)
             self.add(
                 ("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name
             )
@@ -162,7 +157,7 @@ class Drafts:
         notes = [Note(f"{first} is defined here", there[first]), Note("and here", brought[first])]
         advice = f"{else_[0]}a prefix of its own, prefix: {part.name}/{else_[1]}"
         message = f"the part {part.name} brings the {kind} {first}{more}, which already exists"
-        place = self.source.at_key(("parts", part.name))
+        place = self.spec.at_key(("parts", part.name))
         self.found.append(finding("TF505", message, place, notes=notes, help=advice))
 
     def add(  # noqa: PLR0913 (an edge has that many parts)
@@ -190,24 +185,24 @@ class Drafts:
             kind=self._kind(owner, keys, joint),
             pose=pose_of(keys, place or child),
             owner=owner,
-            at=self.source.at((*at, "parent")),
+            at=self.spec.at((*at, "parent")),
             rate=keys.rate,
             joint=joint,
             free=free,
             joint_name=joint_name or "",
             joint_at=named_at,
-            child_at=self.source.at((*at, "child")) if at[0] == "joints" else None,
+            child_at=self.spec.at((*at, "child")) if at[0] == "joints" else None,
             entry=at,
-            owner_at=self.source.at((*at, "owner")) if keys.owner else None,
+            owner_at=self.spec.at((*at, "owner")) if keys.owner else None,
             sensor=sensor.name if sensor else None,
-            rate_at=self.source.at((*at, "rate")) if keys.rate else None,
+            rate_at=self.spec.at((*at, "rate")) if keys.rate else None,
             switched=parents[1:],
             optical_edits=(
-                partial(optical_edits, at, keys, self.source) if is_optical(child) else tuple
+                partial(optical_edits, at, keys, self.spec.spans) if is_optical(child) else tuple
             ),
         )
-        relative_at = self.source.at((*at, "relative_to")) if keys.relative_to else None
-        place_at = self.source.at((*at, "place")) if place else None
+        relative_at = self.spec.at((*at, "relative_to")) if keys.relative_to else None
+        place_at = self.spec.at((*at, "place")) if place else None
         self.edges.append(
             Draft(
                 edge,
@@ -225,7 +220,7 @@ class Drafts:
 
         Return its place.
         """
-        place = self.source.at_key(at) if at[0] == "joints" else self.source.at((*at, "joint"))
+        place = self.spec.at_key(at) if at[0] == "joints" else self.spec.at((*at, "joint"))
         if name in self.joints:
             notes = [Note("the other one", self.joints[name])]
             self.found.append(
@@ -253,50 +248,49 @@ _IDLE = {
 }
 
 
-def joint_of(name: str, spec: JointSpec, source: Source) -> Joint | None:
+def joint_of(name: str, declared: JointSpec, spec: RobotSpec) -> Joint | None:
     """Return the joint with a unit axis, or None where it is fixed."""
-    kind: Any = spec.type
+    kind: Any = declared.type
     if kind == "fixed":
         return None
-    length = norm(spec.axis)
-    x, y, z = spec.axis
-    mimic = spec.mimic
+    length = norm(declared.axis)
+    x, y, z = declared.axis
+    mimic = declared.mimic
     return Joint(
         name=name,
         type=kind,
-        at=source.at_key(("joints", name)),
-        mimic_at=source.exactly_at(("joints", name, "mimic", "joint")),
+        at=spec.at_key(("joints", name)),
+        mimic_at=spec.spans.exactly_at(("joints", name, "mimic", "joint")),
         axis=(x / length, y / length, z / length),
-        limit=spec.limit,
+        limit=declared.limit,
         mimic=mimic.joint if mimic else None,
         multiplier=mimic.multiplier if mimic else 1.0,
         offset=mimic.offset if mimic else 0.0,
         axis_length=length,
-        dynamics=spec.dynamics,
-        safety=spec.safety_controller,
-        reference=spec.calibration,
+        dynamics=declared.dynamics,
+        safety=declared.safety_controller,
+        reference=declared.calibration,
     )
 
 
-def idle_joint_keys(name: str, joint: JointSpec, source: Source) -> Iterator[Finding]:
+def idle_joint_keys(name: str, joint: JointSpec, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding where a joint has keys that joints of its type do not use."""
     at: Path = ("joints", name)
-    idle = source.in_order(at, joint.model_fields_set & {*_IDLE.get(joint.type, ())})
+    unused = joint.model_fields_set & {*_IDLE.get(joint.type, ())}
     advice = (
         "leave it out" if joint.type in FREE else f"leave it out; if {name} moves, type: {_MOVING}"
     )
     if joint.type == "continuous" and joint.limit:
         at = (*at, "limit")
-        idle = source.in_order(
-            at, [key for key in ("lower", "upper") if getattr(joint.limit, key) is not None]
-        )
+        unused = {key for key in ("lower", "upper") if getattr(joint.limit, key) is not None}
         advice = "leave it out; if there is an end, type: revolute"
+    idle = sorted(unused, key=lambda key: spec.at_key((*at, key)))
     if idle:
         message = (
             f"the joint {name} is {joint.type}: {', '.join(idle)} {'have' if idle[1:] else 'has'}"
             " no effect"
         )
-        yield finding("TF727", message, source.at_key((*at, idle[0])), help=advice)
+        yield finding("TF727", message, spec.at_key((*at, idle[0])), help=advice)
 
 
 _SECTIONS = ("frames", "links", "joints", "sensors", "parts", "processes")
@@ -308,48 +302,48 @@ _MAPPINGS = {
 }
 
 
-def source_numbers(spec: RobotSpec, source: Source) -> tuple[SourceNumbers, ...]:
+def source_numbers(spec: RobotSpec) -> tuple[SourceNumbers, ...]:
     """Return the numbers of every pose and joint limit of the spec."""
     return tuple(
         found
         for section in _SECTIONS
         for name, entry in getattr(spec, section).items()
-        for found in _of(entry, (section, name), source)
+        for found in _of(entry, (section, name), spec.spans)
     )
 
 
-def _of(spec: Spec, path: Path, source: Source) -> Iterator[SourceNumbers]:
-    for key in spec.model_fields_set:
-        value, here = getattr(spec, key), (*path, key)
+def _of(entry: Spec, path: Path, spans: Spans) -> Iterator[SourceNumbers]:
+    for key in entry.model_fields_set:
+        value, here = getattr(entry, key), (*path, key)
         if key in _LISTS and value is not None:
-            yield _numbers(dict(enumerate(value)), here, source)
+            yield _numbers(dict(enumerate(value)), here, spans)
         elif key in _MAPPINGS and isinstance(value, (Spec, Limit)):
             given = {
-                step: getattr(value, step) for step in _MAPPINGS[key] if source.has((*here, step))
+                step: getattr(value, step) for step in _MAPPINGS[key] if spans.has((*here, step))
             }
             numbers = {step: number for step, number in given.items() if number is not None}
             if numbers:
-                yield _numbers(numbers, here, source)
+                yield _numbers(numbers, here, spans)
         elif isinstance(value, Spec):
-            yield from _of(value, here, source)
+            yield from _of(value, here, spans)
         elif isinstance(value, (tuple, dict)) and key != "params":
-            yield from _inside(value, here, source)
+            yield from _inside(value, here, spans)
 
 
-def _inside(value: Any, path: Path, source: Source) -> Iterator[SourceNumbers]:
+def _inside(value: Any, path: Path, spans: Spans) -> Iterator[SourceNumbers]:
     """Yield the numbers in a list or mapping; one item may stand for a list of it."""
     for step, item in value.items() if isinstance(value, dict) else enumerate(value):
         if isinstance(item, Spec):
             here = (*path, step)
-            yield from _of(item, here if source.has(here) else path, source)
+            yield from _of(item, here if spans.has(here) else path, spans)
 
 
-def _numbers(numbers: dict[Any, float], path: Path, source: Source) -> SourceNumbers:
+def _numbers(numbers: dict[Any, float], path: Path, spans: Spans) -> SourceNumbers:
     steps = list(numbers)
     values = tuple(numbers.values())
     with_unit = tuple(isinstance(value, WithUnit) for value in values)
     return SourceNumbers(
-        path, tuple(map(float, values)), with_unit, lambda index: source.at((*path, steps[index]))
+        path, tuple(map(float, values)), with_unit, lambda index: spans.at((*path, steps[index]))
     )
 
 
@@ -370,25 +364,25 @@ _OTHER_POSES = ("relative_to", "place", "calibration")
 _OPTICAL_IN = ("frames", "links", "joints")
 
 
-def optical_edits(path: Path, keys: EdgeKeys, source: Source) -> tuple[Edit, ...]:
+def optical_edits(path: Path, keys: EdgeKeys, spans: Spans) -> tuple[Edit, ...]:
     """Return edits that rotate the frame of the entry at ``path``, none if others would move."""
-    if path[0] not in _OPTICAL_IN or source.at(path).file != source.at((*path, "parent")).file:
+    if path[0] not in _OPTICAL_IN or spans.at(path).file != spans.at((*path, "parent")).file:
         return ()
-    rotations = [key for key in _OPTICAL if source.has_key((*path, key))]
-    if len(rotations) > 1 or any(source.has_key((*path, key)) for key in _OTHER_POSES):
+    rotations = [key for key in _OPTICAL if spans.has_key((*path, key))]
+    if len(rotations) > 1 or any(spans.has_key((*path, key)) for key in _OTHER_POSES):
         return ()
     if rotations:
         key = rotations[0]
-        edits = _replaced(getattr(keys, key), _OPTICAL[key], (*path, key), source)
+        edits = _replaced(getattr(keys, key), _OPTICAL[key], (*path, key), spans)
     else:
-        edits = [_insertion(path, source)]
-    spans = [source.at((*path, "parent")), *(edit.span for edit in edits)]
-    return tuple(edits) if all(_is_alone(span, path, source) for span in spans) else ()
+        edits = [_insertion(path, spans)]
+    edited = [spans.at((*path, "parent")), *(edit.span for edit in edits)]
+    return tuple(edits) if all(_is_alone(span, path, spans) for span in edited) else ()
 
 
-def _insertion(path: Path, source: Source) -> Edit:
+def _insertion(path: Path, spans: Spans) -> Edit:
     """Return the edit that writes the rotation after the parent."""
-    parent, entry = source.at((*path, "parent")), source.places.nearest(path)
+    parent, entry = spans.at((*path, "parent")), spans.places.nearest(path)
     first = min(
         (key.span for key in entry.keys.values()), key=lambda span: (span.line, span.column)
     )
@@ -396,11 +390,11 @@ def _insertion(path: Path, source: Source) -> Edit:
         at = (parent.end_line, parent.end_column)
         return Edit(Span(parent.file, *at, *at), f", {_RPY}")
     at = (parent.end_line + 1, 1)
-    indent = " " * (source.at_key((*path, "parent")).column - 1)
+    indent = " " * (spans.at_key((*path, "parent")).column - 1)
     return Edit(Span(parent.file, *at, *at), f"{indent}{_RPY}\n")
 
 
-def _replaced(old: Any, new: Any, path: Path, source: Source) -> list[Edit]:
+def _replaced(old: Any, new: Any, path: Path, spans: Spans) -> list[Edit]:
     """Return the edits that put each scalar of ``new`` in the place of that of ``old``.
 
     None where the forms differ.
@@ -409,24 +403,24 @@ def _replaced(old: Any, new: Any, path: Path, source: Source) -> list[Edit]:
         return [
             edit
             for key, item in new.items()
-            for edit in _replaced(getattr(old, key, None), item, (*path, key), source)
+            for edit in _replaced(getattr(old, key, None), item, (*path, key), spans)
         ]
     if isinstance(new, list):
         pairs = zip(old, new, strict=True) if isinstance(old, tuple) else ()
         return [
             edit
             for index, pair in enumerate(pairs)
-            for edit in _replaced(*pair, (*path, index), source)
+            for edit in _replaced(*pair, (*path, index), spans)
         ]
     is_same = old == (new if isinstance(old, str) else quantity(new).value)
-    return [Edit(source.at(path), new)] if isinstance(old, (str, float)) and not is_same else []
+    return [Edit(spans.at(path), new)] if isinstance(old, (str, float)) and not is_same else []
 
 
-def _is_alone(span: Span, path: Path, source: Source) -> bool:
+def _is_alone(span: Span, path: Path, spans: Spans) -> bool:
     """Whether what is at the span belongs to this entry alone, and to no alias of it."""
     others = (
         other
-        for other, place in source.places.walk()
+        for other, place in spans.places.walk()
         if other[: len(path)] != path and place.span == span
     )
     return next(others, None) is None

@@ -58,7 +58,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     """
     spec = part.declared
     key = "urdf" if spec.urdf is not None else "xacro"
-    at = part.source.at((*part.at, key))
+    at = part.spec.at((*part.at, key))
     file = packages.path_of(spec.urdf or spec.xacro or "", at)
     files: tuple[str, ...] = (file,)
     bolted = _bolted(part, read(file)) if spec.macro is not None else {}
@@ -121,7 +121,7 @@ def _expanded(
 
 def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
     """Return a value with each ``${file(PATH)}`` made absolute from the robot file's folder."""
-    at = part.source.at(path)
+    at = part.spec.at(path)
 
     def absolute(call: re.Match[str]) -> str:
         place = path_named(call[2], at)
@@ -185,7 +185,7 @@ def _loose(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
         )
         message = f"the macro {part.declared.macro} is attached to {parent} by {what}"
         raise RejectedError(
-            [finding("TF313", message, part.source.at((*part.at, "parent")), help=advice)]
+            [finding("TF313", message, part.spec.at((*part.at, "parent")), help=advice)]
         )
     if part.declared.joint is None:
         part.declared = part.declared.model_copy(
@@ -200,8 +200,8 @@ def _use(
     """Return how the part uses the file: as a whole, or a call of its macro."""
     spec, at = part.declared, part.at
     if spec.macro is None:
-        return Use(part.source.at((*at, "xacro")))
-    places = (part.source.at((*at, "include", index)) for index in range(len(spec.include)))
+        return Use(part.spec.at((*at, "xacro")))
+    places = (part.spec.at((*at, "include", index)) for index in range(len(spec.include)))
     files = (
         *(packages.path_of(one, place) for one, place in zip(spec.include, places, strict=True)),
         file,
@@ -210,15 +210,15 @@ def _use(
     blocks = [bolted[_ORIGIN]] if _ORIGIN in bolted else []
     for name, value in spec.params.items():
         if _is_markup(value):
-            _refuse_broken(name, value, part.source.at((*at, "params", name)))
+            _refuse_broken(name, value, part.spec.at((*at, "params", name)))
         block = _block(value)
         if block is None:
             words[name] = _word(_with_files(value, (*at, "params", name), part, disk))
         else:
             blocks.append(block)
-    named = {name: part.source.at_key((*at, "params", name)) for name in spec.params}
+    named = {name: part.spec.at_key((*at, "params", name)) for name in spec.params}
     return Use(
-        part.source.at((*at, "macro")),
+        part.spec.at((*at, "macro")),
         spec.macro,
         words,
         blocks=tuple(blocks),

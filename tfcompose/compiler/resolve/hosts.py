@@ -10,10 +10,9 @@ from tfcompose.model.robot import Host
 if TYPE_CHECKING:
     from tfcompose.model.robot import Process
     from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Source
 
 
-def hosts_of(spec: RobotSpec, source: Source) -> dict[str, Host]:
+def hosts_of(spec: RobotSpec) -> dict[str, Host]:
     """Return the computers that the file declares, by name.
 
     Ssh finds one by its name if nothing else is said.
@@ -25,13 +24,13 @@ def hosts_of(spec: RobotSpec, source: Source) -> dict[str, Host]:
             one.python,
             one.setup,
             one.node_selector,
-            at=source.at_key(("hosts", name)),
+            at=spec.at_key(("hosts", name)),
         )
         for name, one in spec.hosts.items()
     }
 
 
-def with_host_place(process: Process, source: Source) -> Process:
+def with_host_place(process: Process, spec: RobotSpec) -> Process:
     """Return the process with the place of its host.
 
     A component that runs where its container does has none.
@@ -41,6 +40,6 @@ def with_host_place(process: Process, source: Source) -> Process:
         ("containers", process.name),
         ("sensors", process.name, "driver"),
     ):
-        if process.host is not None and source.has((*path, "host")):
-            return replace(process, host_at=source.at((*path, "host")))
+        if process.host is not None and spec.spans.has((*path, "host")):
+            return replace(process, host_at=spec.at((*path, "host")))
     return process

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.urdf.packages import Disk
     from tfcompose.model.robot import Node, Process, Robot
     from tfcompose.spec.language.robot import RobotSpec, RosSpec
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.load import Path
 
 
 TF_TOPICS = ("/tf", "/tf_static")
@@ -46,36 +46,34 @@ def topics_below(namespace: str, isolate: str) -> dict[str, str]:
 
 
 def isolate(
-    robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None = None
+    robot: Robot, spec: RobotSpec, disk: Disk | None = None
 ) -> tuple[Robot, list[Finding]]:
     """Return the robot with its processes' topics moved, and frames and files in them named.
 
     And what is wrong.
     """
-    found = _wrong(robot, spec, source)
+    found = _wrong(robot, spec)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
     processes = []
-    filler = _Filler(robot, source, disk)
+    filler = _Filler(robot, spec, disk)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
         processes.append(filler.filled(moved))
     return replace(robot, processes=tuple(processes)), [*found, *filler.found]
 
 
-def _wrong(robot: Robot, spec: RobotSpec, source: Source) -> list[Finding]:
+def _wrong(robot: Robot, spec: RobotSpec) -> list[Finding]:
     found, ros = [], spec.ros
     has_parts = spec.parts or any(section == "parts" for section, _ in robot.broken)
     named = robot.ros.namespace or has_parts or (ros.isolate == "frames" and ros.frame_prefix)
     if ros.isolate != "none" and not named:
         message = f"isolate: {ros.isolate} needs a namespace"
         found.append(
-            finding(
-                "TF304", message, source.at(("ros", "isolate")), help="ros: {namespace: robot1}"
-            )
+            finding("TF304", message, spec.at(("ros", "isolate")), help="ros: {namespace: robot1}")
         )
     for index, frame in enumerate(ros.shared_frames):
         if frame not in robot.frames and not robot.excuses(frame):
-            place = source.at(("ros", "shared_frames", index))
+            place = spec.at(("ros", "shared_frames", index))
             advice = did_you_mean(frame, robot.frames, "remove it")
             found.append(
                 finding("TF203", f"shared_frames: unknown frame {frame}", place, help=advice)
@@ -88,16 +86,16 @@ class _Filler:
     """Fills in processes; ``found`` is what cannot be."""
 
     robot: Robot
-    source: Source
+    spec: RobotSpec
     disk: Disk | None
     found: list[Finding] = field(default_factory=list)
 
     def filled(self, process: Process) -> Process:
         """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
         section: Path = ("processes", process.name)
-        if self.source.has(("containers", process.name)):
+        if self.spec.spans.has(("containers", process.name)):
             section = ("containers", process.name)
-        elif not self.source.has(section):
+        elif not self.spec.spans.has(section):
             section = ("sensors", process.name, "driver")
         done = replace(
             process,
@@ -135,14 +133,14 @@ class _Filler:
     def _frame(self, frame: str, path: Path) -> str:
         if frame not in self.robot.frames and not self.robot.excuses(frame):
             advice = did_you_mean(frame, self.robot.frames)
-            at = self.source.at(path)
+            at = self.spec.at(path)
             self.found.append(
                 finding("TF203", f"${{frame({frame})}}: unknown frame {frame}", at, help=advice)
             )
         return self.robot.final(frame)
 
     def _file(self, name: str, path: Path) -> str:
-        at = self.source.at(path)
+        at = self.spec.at(path)
         place = path_named(name, at)
         if name.startswith("/"):
             advice = (
@@ -166,7 +164,7 @@ class _Filler:
         """
         if cwd is None or cwd.startswith(("/", "${")):
             return self._fill(cwd, path)  # type: ignore[no-any-return]
-        at = self.source.at(path)
+        at = self.spec.at(path)
         place = path_named(cwd, at)
         if self.disk and not self.disk.is_folder(place):
             advice = "a path is relative to the file that writes it"
@@ -187,5 +185,5 @@ class _Filler:
                     " start only"
                 )
                 advice = "write it among the arguments of run"
-                place = self.source.at((*node.path, "params", key))
+                place = self.spec.at((*node.path, "params", key))
                 self.found.append(finding("TF816", message, place, help=advice))

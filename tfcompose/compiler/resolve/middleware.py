@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Robot
     from tfcompose.spec.language.process import ProcessSpec
     from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Source
 
 _RMW = "RMW_IMPLEMENTATION"
 #: The router does not flush this line unless it writes to a terminal.
@@ -43,7 +42,7 @@ def is_own_router(name: str, declared: ProcessSpec | None, spec: RobotSpec) -> b
     return spec.ros.rmw == "zenoh" and name == ROUTER and not says_how(declared)
 
 
-def own_router(spec: RobotSpec, source: Source) -> list[Process]:
+def own_router(spec: RobotSpec) -> list[Process]:
     """Return the Zenoh router's process, unless the robot has one or needs none."""
     declared = spec.processes.get(ROUTER)
     runs_it = any(
@@ -56,7 +55,7 @@ def own_router(spec: RobotSpec, source: Source) -> list[Process]:
     process = Process(
         ROUTER,
         "run",
-        at=source.at_key(path),
+        at=spec.at_key(path),
         argv=(ROUTER_PROGRAM,),
         restart="on-failure",
         emulate_tty=True,
@@ -99,41 +98,41 @@ def _routers(robot: Robot) -> list[Process]:
     ]
 
 
-def wrong_middleware(robot: Robot, spec: RobotSpec, source: Source) -> Iterator[Finding]:
+def wrong_middleware(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     """Yield what the middleware cannot do, conflicts, and hosts that do not reach the router."""
     ros = robot.ros
     if spec.ros.router and ros.rmw != "zenoh":
         advice = "ros: {rmw: zenoh}, or remove router"
         yield finding(
-            "TF107", "router goes with rmw: zenoh", source.at_key(("ros", "router")), help=advice
+            "TF107", "router goes with rmw: zenoh", spec.at_key(("ros", "router")), help=advice
         )
     if ros.rmw is None:
         return
-    yield from _not_supported(robot, source)
-    yield from _disagreeing(robot, source)
+    yield from _not_supported(robot, spec)
+    yield from _disagreeing(robot, spec)
     if ros.rmw == "zenoh":
-        yield from _wrong_routers(robot, source)
+        yield from _wrong_routers(robot, spec)
 
 
-def _not_supported(robot: Robot, source: Source) -> Iterator[Finding]:
-    ros, at = robot.ros, source.at(("ros", "rmw"))
+def _not_supported(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
+    ros, at = robot.ros, spec.at(("ros", "rmw"))
     if ros.rmw == "fastdds":
         return
     if robot.guard.mode == "strict" and robot.guard.fence == "partition":
         message = (
             f"guard: {{fence: partition}} needs Fast DDS, and rmw: {ros.rmw} has no partitions"
         )
-        place = source.at(("guard", "fence")) if source.has(("guard", "fence")) else at
+        place = spec.at(("guard", "fence")) if spec.spans.has(("guard", "fence")) else at
         yield finding(
             "TF870", message, place, help="remove fence: strict fences off by remapping then"
         )
     if ros.rmw == "zenoh" and ros.discovery == "off":
         message = "rmw: zenoh does not know discovery: off: whoever reaches the router is found"
         advice = "discovery: localhost, where the router listens to its own computer alone"
-        yield finding("TF870", message, source.at(("ros", "discovery")), help=advice)
+        yield finding("TF870", message, spec.at(("ros", "discovery")), help=advice)
 
 
-def _disagreeing(robot: Robot, source: Source) -> Iterator[Finding]:
+def _disagreeing(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding for each process that is given another middleware.
 
     It finds none of the others.
@@ -149,14 +148,14 @@ def _disagreeing(robot: Robot, source: Source) -> Iterator[Finding]:
             ("sensors", process.name, "driver"),
         )
         paths = [(*section, "env", _RMW) for section in sections]
-        place = next((source.at(path) for path in paths if source.has(path)), process.at)
+        place = next((spec.at(path) for path in paths if spec.spans.has(path)), process.at)
         message = f"{process.name} is given {_RMW}={own}, and the robot has rmw: {robot.ros.rmw}"
-        notes = [Note("set here", source.at(("ros", "rmw")))]
+        notes = [Note("set here", spec.at(("ros", "rmw")))]
         advice = f"remove {_RMW} from its env: {process.name} finds none of the others with it"
         yield finding("TF871", message, place, notes=notes, help=advice)
 
 
-def _wrong_routers(robot: Robot, source: Source) -> Iterator[Finding]:
+def _wrong_routers(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     routers = _routers(robot)
     for more in routers[1:]:
         notes = [Note(f"{routers[0].name} is defined here", routers[0].at)]
@@ -184,4 +183,4 @@ def _wrong_routers(robot: Robot, source: Source) -> Iterator[Finding]:
             f" {home or 'another computer'}"
         )
         advice = f"ros: {{router: tcp/{address}:7447}}, the address of {home or 'that computer'}"
-        yield finding("TF873", message, source.at(("ros", "rmw")), help=advice)
+        yield finding("TF873", message, spec.at(("ros", "rmw")), help=advice)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve.presets import Sensor
     from tfcompose.model.robot import OpticsKind
     from tfcompose.spec.language.optics import OpticsSourceSpec, OpticsSpec
-    from tfcompose.spec.load import Source
+    from tfcompose.spec.language.robot import RobotSpec
 
 #: Keys of the language that ``Optics`` has under the same name; those that are left out stay as
 #: they are there.
@@ -37,7 +37,7 @@ _REPLACES = {"elevations": ("channels", "vertical"), "channels": ("elevations",)
 
 
 def optics_of(
-    sensor: Sensor, frames: Collection[str], renamed: Callable[[str], str], source: Source
+    sensor: Sensor, frames: Collection[str], renamed: Callable[[str], str], spec: RobotSpec
 ) -> tuple[tuple[Optics, ...], list[Finding]]:
     """Return the optics of the sensor's streams in ``frames``, and what is wrong with them.
 
@@ -53,12 +53,12 @@ def optics_of(
             advice = f"frame: {sensor.named(preset.mount)}; {sensor.spec.preset} has "
             advice += f"the streams {', '.join(preset.optics)}" if preset.optics else "no streams"
             message = f"the stream {stream} has no frame"
-            found.append(finding("TF102", message, source.at_key(at), help=advice))
+            found.append(finding("TF102", message, spec.at_key(at), help=advice))
             continue
         frame = sensor.named(pattern)
         if own and own.frame and frame not in frames:
             advice = did_you_mean(frame, frames, f"there is {', '.join(frames)}")
-            place = source.at((*at, "frame"))
+            place = spec.at((*at, "frame"))
             found.append(
                 finding("TF203", f"{sensor.name} has no frame {frame}", place, help=advice)
             )
@@ -71,10 +71,10 @@ def optics_of(
         if kind is None:
             advice = "kind: camera, lidar, radar or ultrasonic"
             message = f"{preset.kind} sees nothing: the stream {stream} has no kind"
-            found.append(finding("TF102", message, source.at_key(at), help=advice))
+            found.append(finding("TF102", message, spec.at_key(at), help=advice))
             continue
-        place = source.at_key(at) if own else source.at_key(at[:2])
-        values, sources = _merged(base, own, str(source.at_key(at)))
+        place = spec.at_key(at) if own else spec.at_key(at[:2])
+        values, sources = _merged(base, own, str(spec.at_key(at)))
         values.setdefault("active", kind != "camera")
         made.append(Optics(stream, renamed(frame), kind, place, sources=tuple(sources), **values))
     return tuple(made), found

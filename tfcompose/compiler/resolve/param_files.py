@@ -21,22 +21,22 @@ if TYPE_CHECKING:
     from tfcompose.compiler.urdf.packages import Packages
     from tfcompose.foundation.findings import Span
     from tfcompose.model.robot import Node, Process, Robot
-    from tfcompose.spec.load import Source
+    from tfcompose.spec.language.robot import RobotSpec
 
 
 def with_param_files(
     robot: Robot,
     own: Container[str],
-    source: Source,
+    spec: RobotSpec,
     read: Callable[[str], str] | None,
     packages: Packages,
 ) -> tuple[Robot, list[Finding]]:
     """Return the robot with parameters read from files, and what is wrong with the files.
 
-    ``own`` are the processes of the source; those of parts have theirs. A file may be in a
+    ``own`` are the processes of the file; those of parts have theirs. A file may be in a
     package.
     """
-    work = _Work(source, read, packages, robot.ros.namespace)
+    work = _Work(spec, read, packages, robot.ros.namespace)
     processes = list(robot.processes)
     for index, process in enumerate(processes):
         if process.name in own:
@@ -49,7 +49,7 @@ def with_param_files(
 
 @dataclass(slots=True)
 class _Work:
-    source: Source
+    spec: RobotSpec
     read: Callable[[str], str] | None
     packages: Packages
     namespace: str
@@ -88,9 +88,9 @@ class _Work:
         }
         paths = {key: (*node.path, "params", key) for key in inline}
         places |= {
-            key: (self.source.at_key(path),)
+            key: (self.spec.at_key(path),)
             for key, path in paths.items()
-            if self.source.has_key(path)
+            if self.spec.spans.has_key(path)
         }
         return replace(node, params=_laid_over(params, inline), places=places)
 
@@ -104,7 +104,7 @@ class _Work:
             if isinstance(named, str)
             else [(one, (*at, i)) for i, one in enumerate(named)]
         )
-        return [(file, self.source.at(path)) for file, path in paths]
+        return [(file, self.spec.at(path)) for file, path in paths]
 
     def _params_in(
         self, file: str, at: Span, node: Node, process: Process, without: list[Finding]

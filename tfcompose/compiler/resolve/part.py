@@ -47,7 +47,6 @@ class PartEntry:
     name: str
     declared: PartSpec
     spec: RobotSpec
-    source: Source
     outer_prefix: str
     is_broken: bool = False
     found: list[Finding] = field(default_factory=list)
@@ -60,7 +59,7 @@ class PartEntry:
     @property
     def place(self) -> Span:
         """The place of its name."""
-        return self.source.at_key(self.at)
+        return self.spec.at_key(self.at)
 
     @property
     def prefix(self) -> str:
@@ -97,7 +96,7 @@ class PartEntry:
         """Return the values that the holder gives the part's arguments."""
         at = (*self.at, "args")
         return {
-            name: GivenArg(value, self.source.at((*at, name)))
+            name: GivenArg(value, self.spec.at((*at, name)))
             for name, value in self.declared.args.items()
         }
 
@@ -112,7 +111,7 @@ class PartEntry:
             "isolate": self.isolate,
         }
         source, found = as_part(
-            inner, self.source, self.at, self.spec.ros, settings, self.declared.vars
+            inner, self.spec.spans, self.at, self.spec.ros, settings, self.declared.vars
         )
         self.found += found
         return source
@@ -124,7 +123,7 @@ class PartEntry:
         """
         if not _PREFIX.fullmatch(self.prefix):
             at, advice = (
-                self.source.at((*self.at, "prefix")),
+                self.spec.at((*self.at, "prefix")),
                 "letters, digits and _: left_, or left/",
             )
             raise RejectedError(
@@ -136,7 +135,7 @@ class PartEntry:
         names = Names(self.name, self.prefix, shared, self.declared.is_alone)
         again = renamed(robot, names)
         if self.declared.owner is not None:
-            at = self.source.at((*self.at, "owner"))
+            at = self.spec.at((*self.at, "owner"))
             again = replace(
                 again, edges=tuple(_owned(edge, self.declared.owner, at) for edge in again.edges)
             )
@@ -149,7 +148,7 @@ class PartEntry:
         if root not in robot.frames:
             if robot.excuses(root):
                 raise RejectedError([])
-            at, advice = self.source.at((*self.at, "root")), did_you_mean(root, robot.frames)
+            at, advice = self.spec.at((*self.at, "root")), did_you_mean(root, robot.frames)
             raise RejectedError(
                 [finding("TF203", f"the part {self.name} has no frame {root}", at, help=advice)]
             )
@@ -168,7 +167,7 @@ class PartEntry:
         held = (edge.parent for edge in robot.edges if edge.parent in names.shared)
         listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
         what = f"has several roots: {listed}" if roots else f"is a child of {listed} already"
-        at = self.source.at((*self.at, "parent"))
+        at = self.spec.at((*self.at, "parent"))
         advice = (
             f"choose one: root: {roots[0]}"
             if roots

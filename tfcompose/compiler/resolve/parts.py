@@ -57,13 +57,12 @@ class Parts:
 
         Those that cannot be had are findings.
         """
-        spec, source, joined = validated.spec, validated.source, []
+        spec, joined = validated.spec, []
         for name, declared in spec.parts.items():
             part = PartEntry(
                 name,
                 declared,
                 spec,
-                source=source,
                 outer_prefix=prefix,
                 is_broken=("parts", name) in validated.broken,
             )
@@ -97,7 +96,7 @@ class Parts:
         return made.robot, made.implied
 
     def _resolved(self, part: PartEntry, named: str, read: Reader) -> Robot:
-        at = part.source.at((*part.at, "spec"))
+        at = part.spec.at((*part.at, "spec"))
         file = path_named(named, at)
         if file in self.files:
             circle = " → ".join([*self.files[self.files.index(file) :], file])
@@ -136,7 +135,7 @@ def _useless(part: PartEntry, file: str, validated: Validated) -> list[Finding]:
     found = []
     for section, name in validated.unused:
         if section == "vars" and name in given and name not in known:
-            at = part.source.at_key((*part.at, "vars", name))
+            at = part.spec.at_key((*part.at, "vars", name))
             advice = did_you_mean(name, known, "remove it")
             found.append(
                 finding("TF105", f"{file} does not use the variable {name}", at, help=advice)

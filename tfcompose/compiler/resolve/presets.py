@@ -14,7 +14,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
-from tfcompose.spec.language import load_named, validate_node_preset, validate_preset
+from tfcompose.spec.language import load_named, validate_file, validate_preset
+from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.overlay import extended_by, lay_over, without
 from tfcompose.spec.language.preset import PresetSpec
 from tfcompose.spec.load import load
@@ -22,9 +23,8 @@ from tfcompose.spec.load import load
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from tfcompose.spec.language.node_preset import NodePresetSpec
     from tfcompose.spec.language.preset import Option, PresetFrame
-    from tfcompose.spec.language.robot import SensorSpec
+    from tfcompose.spec.language.robot import RobotSpec, SensorSpec
     from tfcompose.spec.load import Path, Source
 
 
@@ -99,33 +99,33 @@ def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
 
 
 def sensor_of(
-    name: str, spec: SensorSpec, library: Library, source: Source
+    name: str, declared: SensorSpec, library: Library, spec: RobotSpec
 ) -> tuple[Sensor | None, list[Finding]]:
     """Return the sensor with its preset and options, or None and why not."""
     at: Path = ("sensors", name)
-    span = source.at((*at, "preset"))
+    span = spec.at((*at, "preset"))
     try:
-        plain = library.get(spec.preset)
-        options, found = decided(plain, spec, at, source)
+        plain = library.get(declared.preset)
+        options, found = decided(plain, declared, at, spec)
         choices = {
             key: options[key] for key, option in plain.options.items() if option.type == "choice"
         }
-        preset = library.get(spec.preset, choices)
+        preset = library.get(declared.preset, choices)
     except KeyError:
-        return None, [_no_preset(spec.preset, library, span)]
+        return None, [_no_preset(declared.preset, library, span)]
     except RejectedError as error:
         return None, list(error.findings)
-    hidden = library.hides(spec.preset)
+    hidden = library.hides(declared.preset)
     if hidden:
         message = (
-            f"{spec.preset} is {library.file(spec.preset)}, which takes precedence over"
+            f"{declared.preset} is {library.file(declared.preset)}, which takes precedence over"
             " tfcompose's own preset"
         )
         notes = [Note("its own", Span(hidden))]
         found.append(finding("TF607", message, span, notes=notes, help="give it another name"))
-    sensor = Sensor(name, spec, preset, options, DRIVER)
+    sensor = Sensor(name, declared, preset, options, DRIVER)
     if _publisher(sensor) == TFCOMPOSE:
-        sensor = Sensor(name, spec, preset, options, TFCOMPOSE)
+        sensor = Sensor(name, declared, preset, options, TFCOMPOSE)
     return sensor, found
 
 
@@ -164,22 +164,22 @@ def _publisher(sensor: Sensor) -> str:
 
 
 def decided(
-    preset: PresetSpec, spec: SensorSpec, at: Path, source: Source
+    preset: PresetSpec, declared: SensorSpec, at: Path, spec: RobotSpec
 ) -> tuple[dict[str, Any], list[Finding]]:
     """Return the values of the preset's options, and what is wrong with those given."""
     options = {key: option.default for key, option in preset.options.items()}
     found = []
-    for key, value in spec.options.items():
-        place = source.at((*at, "options", key))
+    for key, value in declared.options.items():
+        place = spec.at((*at, "options", key))
         if key not in preset.options:
             there = (
-                f"{spec.preset} has {', '.join(preset.options)}"
+                f"{declared.preset} has {', '.join(preset.options)}"
                 if preset.options
-                else f"{spec.preset} has none"
+                else f"{declared.preset} has none"
             )
             advice = did_you_mean(key, preset.options, there)
             found.append(
-                finding("TF603", f"{spec.preset} has no option {key}", place, help=advice)
+                finding("TF603", f"{declared.preset} has no option {key}", place, help=advice)
             )
             continue
         chosen = _as_text(value) if preset.options[key].type == "choice" else value
@@ -388,4 +388,4 @@ def node_preset(name: str) -> NodePresetSpec:
     """
     file = _node_files()[name]
     place = f"presets/nodes/{file.parent.name}/{file.name}"
-    return validate_node_preset(load(file.read_text("utf-8"), place))
+    return validate_file(NodePresetSpec, load(file.read_text("utf-8"), place))

@@ -51,20 +51,20 @@ if TYPE_CHECKING:
         Started,
     )
     from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.load import Path
 
 
 def user_process(
     name: str, declared: ProcessSpec, validated: Validated
 ) -> tuple[Process | None, list[Finding]]:
     """Return the process that the user describes, or None and what is missing."""
-    spec, source = validated.spec, validated.source
+    spec = validated.spec
     at: Path = ("processes", name)
-    place = source.at_key(at)
+    place = spec.at_key(at)
     if name in BUILT_IN:
-        return None, built_in_keys(name, declared, source)
+        return None, built_in_keys(name, declared, spec)
     namespace = namespace_of(declared, spec.ros.namespace)
-    nodes, found = nodes_of(name, declared, namespace, source)
+    nodes, found = nodes_of(name, declared, namespace, spec)
     if declared.external:
         keys = how(declared, namespace, "external")
         return replace(Process(name, "external", at=place, ros_nodes=nodes), **keys), found
@@ -97,7 +97,7 @@ def user_process(
             finding(
                 "TF102",
                 f"{name}: run needs package and executable",
-                source.at_key(at),
+                spec.at_key(at),
                 help=advice,
             )
         ]
@@ -125,7 +125,7 @@ def _simulated(
         return None, []
     else:
         message = f"{process.name}: simulate needs circle, fixed or joints"
-        return None, [finding("TF102", message, validated.source.at_key(at))]
+        return None, [finding("TF102", message, validated.spec.at_key(at))]
     return replace(process, simulate=simulation), []
 
 
@@ -143,7 +143,7 @@ def _is_way_refused(name: str, validated: Validated) -> bool:
     )
 
 
-def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Finding]:
+def name_clashes(processes: list[Process], spec: RobotSpec) -> list[Finding]:
     """Return a finding for each name that a sensor and a process, or two processes, share.
 
     A sensor may have the name of the process that drives it.
@@ -153,7 +153,7 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
     for name, sensor in spec.sensors.items():
         driven_by_it = sensor.driver is not None and sensor.driver.process == name
         if name in spec.processes and not driven_by_it:
-            first[name] = Process(name, "external", at=source.at_key(("sensors", name)))
+            first[name] = Process(name, "external", at=spec.at_key(("sensors", name)))
     for process in processes:
         other = first.setdefault(process.name, process)
         if other.at != process.at:
@@ -171,7 +171,7 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
 
 def unknown_names(
     processes: list[Process],
-    source: Source,
+    spec: RobotSpec,
     known: Collection[str],
     broken: Collection[tuple[str, str]],
 ) -> list[Finding]:
@@ -186,13 +186,13 @@ def unknown_names(
     found = []
     for process in processes:
         section = next(
-            (one for one in ("processes", "containers") if source.has((one, process.name))),
+            (one for one in ("processes", "containers") if spec.spans.has((one, process.name))),
             "sensors",
         )
         inside = ("driver", "after") if section == "sensors" else ("after",)
         for other, what in process.after.items():
             if what == "done" and other in lasting:
-                place = source.at((section, process.name, *inside, other))
+                place = spec.at((section, process.name, *inside, other))
                 message = f"{process.name} waits until {other} is done, which never happens"
                 found.append(
                     finding("TF813", message, place, help=f"after: {{{other}: ready}}, or started")
@@ -200,7 +200,7 @@ def unknown_names(
             elif process.component and other == process.component.container:
                 continue  # it was not written here
             elif other not in known and other not in refused and not other.startswith(missing):
-                place = source.at_key((section, process.name, *inside, other))
+                place = spec.at_key((section, process.name, *inside, other))
                 names = sorted(name for name in known if name != process.name)
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
                 found.append(
@@ -318,12 +318,12 @@ _JOINTS_PARAMS: dict[str, Any] = {"publish_frequency": 30.0, "ignore_timestamp":
 _KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
 
 
-def built_in(spec: RobotSpec, source: Source) -> list[Process]:
+def built_in(spec: RobotSpec) -> list[Process]:
     """Return tfcompose's own processes, with what stands of them under ``processes``."""
     own = []
     for name in BUILT_IN:
         declared = spec.processes.get(name)
-        at = source.at_key(("processes", name)) if declared else source.at_key(("robot",))
+        at = spec.at_key(("processes", name)) if declared else spec.at_key(("robot",))
         path: Path = ("processes", name)
         params = declared.params if declared and name == JOINTS else {}
         node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at, path, params)
@@ -358,7 +358,7 @@ def added(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Pr
     return replace(process, host=process.host or (static.host if static else None))
 
 
-def built_in_keys(name: str, declared: ProcessSpec, source: Source) -> list[Finding]:
+def built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> list[Finding]:
     """Return findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
     known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
@@ -371,14 +371,14 @@ def built_in_keys(name: str, declared: ProcessSpec, source: Source) -> list[Find
         )
     found = [
         finding(
-            "TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice
+            "TF101", f"{name} is built in and has no {key}", spec.at_key((*at, key)), help=advice
         )
         for key in wrong
     ]
-    return found + (_joints_params(declared.params, source) if name == JOINTS else [])
+    return found + (_joints_params(declared.params, spec) if name == JOINTS else [])
 
 
-def _joints_params(params: dict[str, Any], source: Source) -> list[Finding]:
+def _joints_params(params: dict[str, Any], spec: RobotSpec) -> list[Finding]:
     """Return findings about the parameters of ``joints``."""
     found = []
     for name, value in params.items():
@@ -387,37 +387,37 @@ def _joints_params(params: dict[str, Any], source: Source) -> list[Finding]:
         if example is None:
             advice = did_you_mean(name, _JOINTS_PARAMS, f"it has {' and '.join(_JOINTS_PARAMS)}")
             found.append(
-                finding("TF101", f"joints has no parameter {name}", source.at_key(at), help=advice)
+                finding("TF101", f"joints has no parameter {name}", spec.at_key(at), help=advice)
             )
         elif isinstance(value, bool) != isinstance(example, bool) or not isinstance(
             value, (bool, int, float)
         ):
             advice = f"for example {name}: {str(example).lower()}"
             what = "true or false" if isinstance(example, bool) else "a number of hertz"
-            found.append(finding("TF103", f"{name} is {what}", source.at(at), help=advice))
+            found.append(finding("TF103", f"{name} is {what}", spec.at(at), help=advice))
         elif not isinstance(value, bool) and not 0 < value < math.inf:
             advice = "leave it out, and every joint state is published"
-            found.append(finding("TF106", f"{name} has to be above 0", source.at(at), help=advice))
+            found.append(finding("TF106", f"{name} has to be above 0", spec.at(at), help=advice))
     return found
 
 
-def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
+def idle_keys(spec: RobotSpec) -> list[Finding]:
     """Return a finding for each key of a process that does nothing there."""
     declared: dict[Path, tuple[str, Started | None]] = {}
     declared |= {("processes", name): (name, process) for name, process in spec.processes.items()}
-    found: list[Finding] = [*_idle_of_containers(spec, source)]
+    found: list[Finding] = [*_idle_of_containers(spec)]
     declared |= {
         ("sensors", name, "driver"): (f"the driver of {name}", s.driver)
         for name, s in spec.sensors.items()
     }
     for path, (name, process) in declared.items():
         if process is not None:
-            found += _idle_rate(path, name, process, source)
-            found += _idle(path, name, process, source)
+            found += _idle_rate(path, name, process, spec)
+            found += _idle(path, name, process, spec)
     return found
 
 
-def _idle_of_containers(spec: RobotSpec, source: Source) -> Iterator[Finding]:
+def _idle_of_containers(spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding for each key of an external container, where it has no effect."""
     for name, container in spec.containers.items():
         works = keys_of("external") | {"external"}
@@ -426,10 +426,10 @@ def _idle_of_containers(spec: RobotSpec, source: Source) -> Iterator[Finding]:
                 f"{name} is external, so {key} has no effect",
                 "remove it: it is for whoever starts it",
             )
-            yield finding("TF851", message, source.at_key(("containers", name, key)), help=advice)
+            yield finding("TF851", message, spec.at_key(("containers", name, key)), help=advice)
 
 
-def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
+def _idle_rate(path: Path, name: str, process: Started, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding about a rate: only ``joints`` has one."""
     if process.rate is None or path == ("processes", JOINTS):
         return
@@ -439,10 +439,10 @@ def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Itera
     elif path == ("processes", STATIC):
         advice = "remove it; fixed edges are sent once"
     message = f"{name} has no rate; only the process joints has"
-    yield finding("TF101", message, source.at_key((*path, "rate")), help=advice)
+    yield finding("TF101", message, spec.at_key((*path, "rate")), help=advice)
 
 
-def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
+def _idle(path: Path, name: str, process: Started, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding for each key beside external or simulate that does nothing.
 
     Where an overlay puts that in the place of something else, the keys below it are meant for what
@@ -452,7 +452,7 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
     way = "component" if process.component else way
     if (
         way == "run"
-        or (*path, way) in source.replaced
+        or (*path, way) in spec.spans.replaced
         or (way == "simulate" and path[0] == "sensors")
     ):
         return  # no driver is simulated: that is refused
@@ -468,7 +468,7 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
             f"{name} is {what}, so {key} has no effect",
             f"remove it: it is for {whom}",
         )
-        yield finding("TF851", message, source.at_key((*path, key)), help=advice)
+        yield finding("TF851", message, spec.at_key((*path, key)), help=advice)
 
 
 _WORDS = {
@@ -479,22 +479,22 @@ _WORDS = {
 }
 
 
-def unreached(process: Process, source: Source) -> list[Finding]:
+def unreached(process: Process, spec: RobotSpec) -> list[Finding]:
     """Return findings about files without parameters and keys that reach no node."""
     at: Path = ("processes", process.name)
     names_params_file = any("${params_file}" in text for text in process.texts)
     if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
         keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
-        given = [key for key in keys if getattr(process, key) and source.has((*at, key))]
-        return [_not_reached(key, process, source.at_key((*at, key))) for key in given]
+        given = [key for key in keys if getattr(process, key) and spec.spans.has((*at, key))]
+        return [_not_reached(key, process, spec.at_key((*at, key))) for key in given]
     if (
         not names_params_file
         or any(node.params for node in process.ros_nodes)
-        or not source.has((*at, "run"))
+        or not spec.spans.has((*at, "run"))
     ):
         return []
     message = f"{process.name} is given ${{params_file}}, and has no parameters"
-    return [finding("TF816", message, source.at((*at, "run")), help="params: {…}")]
+    return [finding("TF816", message, spec.at((*at, "run")), help="params: {…}")]
 
 
 def _not_reached(key: str, process: Process, at: Span) -> Finding:
@@ -563,12 +563,12 @@ def _usual(declared: ProcessSpec) -> str | None:
 
 
 def nodes_of(
-    name: str, declared: ProcessSpec, namespace: str, source: Source
+    name: str, declared: ProcessSpec, namespace: str, spec: RobotSpec
 ) -> tuple[tuple[Node, ...], list[Finding]]:
     """Return the nodes of a process, at least one, and what is wrong with them."""
     at: Path = ("processes", name)
     if not declared.nodes:
-        place = source.at(("processes", name, "node")) if declared.node else source.at_key(at)
+        place = spec.at(("processes", name, "node")) if declared.node else spec.at_key(at)
         own_name = (declared.node.name if declared.node else None) or _usual(declared) or name
         return (
             Node(full_name(namespace, own_name), place, at, declared.params, declared.lifecycle),
@@ -578,7 +578,7 @@ def nodes_of(
         message = f"{name} has nodes, and {key} names none of them"
         found.append(
             finding(
-                "TF107", message, source.at_key((*at, key)), help="write it under one of its nodes"
+                "TF107", message, spec.at_key((*at, key)), help="write it under one of its nodes"
             )
         )
     for key in declared.params:
@@ -586,11 +586,11 @@ def nodes_of(
             f"write it under nodes: {{{next(iter(declared.nodes))}: {{params: {{{key}: …}}}}}}"
         )
         message = f"{name} has nodes, and the parameter {key} names none of them"
-        found.append(finding("TF107", message, source.at_key((*at, "params", key)), help=advice))
+        found.append(finding("TF107", message, spec.at_key((*at, "params", key)), help=advice))
     nodes = [
         Node(
             full_name(namespace, node),
-            source.at_key((*at, "nodes", node)),
+            spec.at_key((*at, "nodes", node)),
             (*at, "nodes", node),
             own.params,
             own.lifecycle,
@@ -604,7 +604,7 @@ def nodes_of(
 PERIOD_S = 6.0
 
 
-def with_positions(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+def with_positions(robot: Robot, spec: RobotSpec) -> tuple[Robot, list[Finding]]:
     """Return the robot whose simulated joint states cover every independent joint.
 
     A joint that mimics another is left out: it follows, and the process computes it. Where nothing
@@ -619,7 +619,7 @@ def with_positions(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot
         simulation = process.simulate
         if simulation and simulation.kind == "joints" and wanted is not None:
             if isinstance(wanted, dict):
-                found += _wrong_positions(wanted, robot, process, source)
+                found += _wrong_positions(wanted, robot, process, spec)
             processes.append(replace(process, simulate=_with_joints(simulation, wanted, robot)))
         else:
             processes.append(process)
@@ -648,13 +648,13 @@ def _with_joints(simulation: Simulation, wanted: str | dict[str, Any], robot: Ro
 
 
 def _wrong_positions(
-    wanted: dict[str, Any], robot: Robot, process: Process, source: Source
+    wanted: dict[str, Any], robot: Robot, process: Process, spec: RobotSpec
 ) -> Iterator[Finding]:
     """Yield a finding for each joint that is not there, or cannot move as it should."""
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     movable = [name for name, joint in joints.items() if _has_position(joint)]
     for name, what in wanted.items():
-        place = source.at_key(("processes", process.name, "simulate", "joints", name))
+        place = spec.at_key(("processes", process.name, "simulate", "joints", name))
         joint = joints.get(name)
         if joint and joint.mimic:
             advice = f"give the position of {joint.mimic}"

@@ -113,14 +113,14 @@ class _Work:
         """Return the robot and what was found; each step knows what the ones before it refused."""
         self.broken.update(self.validated.broken)
         if self.holder is None:
-            self.sections = sections_of(self.spec, self.source, self.read)
+            self.sections = sections_of(self.spec, self.read)
         of_tools = processes_of(self.sections, self.found)
         own = _processes(self.validated, self.found, of_tools, is_part=self.holder is not None)
         started = {process.name for process in own}
         self.broken |= {("processes", name) for name in self.spec.processes if name not in started}
         packages = self._packages()
         self._join_parts(packages)
-        bodies = Bodies(self.source, packages)
+        bodies = Bodies(self.spec, packages)
         simulated = frozenset(one.name for one in self._everybody(own) if one.kind == "simulate")
         drafts = Drafts(self.validated, simulated, bodies)
         self._draft(drafts)
@@ -134,41 +134,35 @@ class _Work:
             self.validated.conditions,
         )
         edges = solver.solve()
-        own = [with_host_place(process, self.source) for process in (*own, *drafts.drivers)]
+        own = [with_host_place(process, self.spec) for process in (*own, *drafts.drivers)]
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
         self.found += unnamed_nodes(edges, own, self.spec, self.broken)
         robot = self._take(
-            with_positions(
-                self._robot(drafts, edges, self._everybody(own)), self.spec, self.source
-            )
+            with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec)
         )
         if any(node.params for process in own for node in process.ros_nodes):
             from tfcompose.compiler.resolve.param_files import with_param_files
 
             own_names = frozenset(one.name for one in own)
-            robot = self._take(
-                with_param_files(robot, own_names, self.source, self.read, packages)
-            )
+            robot = self._take(with_param_files(robot, own_names, self.spec, self.read, packages))
         if self.spec.ros2_control or self.spec.xml:
             from tfcompose.compiler.resolve.blocks import with_blocks
 
-            robot = self._take(with_blocks(robot, self.spec, self.source))
+            robot = self._take(with_blocks(robot, self.spec))
         robot = replace(robot, base=self._base(robot))
         if self.spec.ros.state_publisher == "stock":
             from tfcompose.compiler.resolve.stock import with_stock
 
             robot = self._take(with_stock(robot))
-        robot = self._take(isolate(robot, self.spec, self.source, self.disk))
+        robot = self._take(isolate(robot, self.spec, self.disk))
         if has_claims(self.spec):
             from tfcompose.compiler.resolve.claims import settled
 
-            robot = self._take(settled(robot, self.spec, self.source))
-        self.found += [
-            one for process in robot.processes for one in unreached(process, self.source)
-        ]
+            robot = self._take(settled(robot, self.spec))
+        self.found += [one for process in robot.processes for one in unreached(process, self.spec)]
         self.found += self._wrong_components(robot)
         if self.holder is None:
-            self.found += wrong_middleware(robot, self.spec, self.source)
+            self.found += wrong_middleware(robot, self.spec)
             self.found += check_sections(self.sections, robot)
             robot = with_router(robot)
         return Resolved(robot, (*self.of_parts, *self.found), self.collected)
@@ -190,7 +184,7 @@ class _Work:
 
     def _packages(self) -> Packages:
         places = {
-            name: (folder, self.source.at(("packages", name)))
+            name: (folder, self.spec.at(("packages", name)))
             for name, folder in self.spec.packages.items()
         }
         return Packages(self.disk, places)
@@ -201,7 +195,7 @@ class _Work:
             return
         from tfcompose.compiler.resolve.parts import Parts
 
-        files, environment = (self.source.file,), self.validated.given.environment
+        files, environment = (self.spec.spans.file,), self.validated.given.environment
         parts = self.holder or Parts(
             self.library,
             self.read,
@@ -228,7 +222,7 @@ class _Work:
         drafts.add_joints()
         presets = self._presets()
         for name, declared in self.spec.sensors.items():
-            sensor, refused = sensor_of(name, declared, presets, self.source)
+            sensor, refused = sensor_of(name, declared, presets, self.spec)
             self.found += refused
             if sensor:
                 add_sensor(drafts, sensor)
@@ -244,7 +238,7 @@ class _Work:
         if not self.spec.preset_path:
             return self.library
         places = [
-            self.source.at(("preset_path", index)) for index in range(len(self.spec.preset_path))
+            self.spec.at(("preset_path", index)) for index in range(len(self.spec.preset_path))
         ]
         folders = [
             path_named(folder, at)
@@ -268,9 +262,7 @@ class _Work:
             return drafts.edges
         from tfcompose.compiler.resolve.calibration import calibrated
 
-        measured, refused = calibrated(
-            drafts.edges, drafts.frames, self.spec, self.source, self.read
-        )
+        measured, refused = calibrated(drafts.edges, drafts.frames, self.spec, self.read)
         self.found += refused
         return measured
 
@@ -286,9 +278,7 @@ class _Work:
             if not robot.excuses(base):
                 advice = did_you_mean(base, robot.frames)
                 self.found.append(
-                    finding(
-                        "TF203", f"unknown frame {base}", self.source.at(("base",)), help=advice
-                    )
+                    finding("TF203", f"unknown frame {base}", self.spec.at(("base",)), help=advice)
                 )
             return None
         if "base_link" in robot.frames:
@@ -300,27 +290,27 @@ class _Work:
         return roots[0] if len(roots) == 1 else None
 
     def _limits(self) -> dict[str, float]:
-        limits, refused = limits_of(self.spec, self.source)
+        limits, refused = limits_of(self.spec)
         self.found += refused
         return limits
 
     def _wrong_names(self, own: list[Process]) -> list[Finding]:
         everybody = self._everybody(own)
         return [
-            *name_clashes(everybody, self.spec, self.source),
-            *idle_keys(self.spec, self.source),
+            *name_clashes(everybody, self.spec),
+            *idle_keys(self.spec),
             *unknown_names(
-                own, self.source, frozenset(process.name for process in everybody), self.broken
+                own, self.spec, frozenset(process.name for process in everybody), self.broken
             ),
         ]
 
     def _robot(self, drafts: Drafts, edges: tuple[Edge, ...], everybody: list[Process]) -> Robot:
         parts = [part.robot for part in self.joined]
         in_tree = [part.robot for part in self.joined if not part.declared.is_alone]
-        numbers = source_numbers(self.spec, self.source)
+        numbers = source_numbers(self.spec)
         return Robot(
             name=self.spec.robot,
-            file=self.source.file,
+            file=self.spec.spans.file,
             frames=drafts.frames,
             edges=_with_rates(edges, everybody),
             links=with_colours(drafts.links),
@@ -331,7 +321,7 @@ class _Work:
             sensors=tuple(drafts.sensors),
             claims=tuple(one for part in parts for one in part.claims),
             source_numbers=numbers + tuple(one for part in parts for one in part.source_numbers),
-            unused={path: self.source.at_key(path) for path in self.validated.unused},
+            unused={path: self.spec.at_key(path) for path in self.validated.unused},
             args=self.validated.args,
             environment=reduce(
                 or_, (part.environment for part in parts), self.validated.environment
@@ -346,16 +336,14 @@ class _Work:
             refused=tuple(
                 at
                 for entry in sorted(self.validated.broken)
-                if (at := self.source.exactly_at(entry))
+                if (at := self.spec.spans.exactly_at(entry))
             ),
             part_notes=self.collected.notes,
-            is_variant=self.source.is_variant,
-            zones=zones_of(self.spec, self.source)
-            + tuple(zone for part in in_tree for zone in part.zones),
+            is_variant=self.spec.spans.is_variant,
+            zones=zones_of(self.spec) + tuple(zone for part in in_tree for zone in part.zones),
             limits=self._limits(),
             conditions=self.validated.conditions,
-            hosts=reduce(or_, (part.hosts for part in parts[::-1]), {})
-            | hosts_of(self.spec, self.source),
+            hosts=reduce(or_, (part.hosts for part in parts[::-1]), {}) | hosts_of(self.spec),
             sections=as_sections(self.sections),
         )
 
@@ -385,9 +373,9 @@ def _has_calibrations(spec: RobotSpec) -> bool:
 def _processes(
     validated: Validated, found: list[Finding], of_tools: list[Process], *, is_part: bool
 ) -> list[Process]:
-    processes = built_in(validated.spec, validated.source)
+    processes = built_in(validated.spec)
     spec = validated.spec
-    processes += [] if is_part else own_router(spec, validated.source)
+    processes += [] if is_part else own_router(spec)
     processes += of_tools
     processes += [
         container_process(name, declared, validated) for name, declared in spec.containers.items()
@@ -395,7 +383,7 @@ def _processes(
     names = {process.name for process in of_tools}
     for name, declared in spec.processes.items():
         if is_own_router(name, declared, spec) or name in names:
-            found += built_in_keys(name, declared, validated.source)
+            found += built_in_keys(name, declared, validated.spec)
             continue
         process, refused = user_process(name, declared, validated)
         found += refused

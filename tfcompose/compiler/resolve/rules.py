@@ -15,7 +15,6 @@ from tfcompose.spec.language.rules import RuleSpec
 
 if TYPE_CHECKING:
     from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Source
 
 #: What a limit can be, by its unit in the catalogue: its dimension, what that is called, and one
 #: way to write it.
@@ -26,14 +25,14 @@ _KINDS = {
 }
 
 
-def limits_of(spec: RobotSpec, source: Source) -> tuple[dict[str, float], list[Finding]]:
+def limits_of(spec: RobotSpec) -> tuple[dict[str, float], list[Finding]]:
     """Return the limits that the file sets, in SI by code, and what is wrong with them."""
     limits, found = {}, []
     for word, setting in spec.rules.items():
         code = code_of(word)
         if code is None or not isinstance(setting, RuleSpec) or setting.limit is None:
             continue
-        place = source.at(("rules", word, "limit"))
+        place = spec.at(("rules", word, "limit"))
         known = CATALOGUE[code].limit
         if known is None:
             others = ", ".join(one.code for one in CATALOGUE.values() if one.limit)
@@ -49,12 +48,12 @@ def limits_of(spec: RobotSpec, source: Source) -> tuple[dict[str, float], list[F
     return limits, found
 
 
-def zones_of(spec: RobotSpec, source: Source) -> tuple[Zone, ...]:
+def zones_of(spec: RobotSpec) -> tuple[Zone, ...]:
     """Return the zones that the file wants to be seen."""
     return tuple(
         Zone(
             name,
-            source.at_key(("coverage", name)),
+            spec.at_key(("coverage", name)),
             one.frame,
             center=one.center,
             size=one.box,

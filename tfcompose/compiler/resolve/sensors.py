@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.language import Validated
     from tfcompose.spec.language.preset import DriverClaim, PresetDriver, PresetFrame
     from tfcompose.spec.language.robot import FrameOverride, RobotSpec
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.load import Path
 
 
 def add_sensor(drafts: Drafts, sensor: Sensor) -> None:
@@ -61,7 +61,7 @@ class _Mounting:
     def place(self, *keys: str) -> Span:
         """Return the place of the sensor, or of the value of a key in it."""
         at: Path = ("sensors", self.sensor.name, *keys)
-        return self.drafts.source.at(at) if keys else self.drafts.source.at_key(at)
+        return self.drafts.spec.at(at) if keys else self.drafts.spec.at_key(at)
 
     def renamed(self, name: str) -> str:
         own = self.sensor.spec.frames.get(name)
@@ -185,7 +185,7 @@ class _Mounting:
             (option for option in ("serial", "serial_number") if option in preset.options), ""
         )
         inside = (sensor.named(preset.mount), *sensor.frames())
-        optics, wrong = optics_of(sensor, inside, self.renamed, self.drafts.source)
+        optics, wrong = optics_of(sensor, inside, self.renamed, self.drafts.spec)
         self.drafts.found += wrong
         return MountedSensor(
             sensor.name,
@@ -210,12 +210,12 @@ class _Mounting:
         )
 
     def check_overrides(self, mount: str) -> None:
-        sensor, source = self.sensor, self.drafts.source
+        sensor, spec = self.sensor, self.drafts.spec
         original = sensor.named(sensor.preset.mount)
         known = [*sensor.frames(), original]
         at: Path = ("sensors", sensor.name, "frames")
         for name, own in sensor.spec.frames.items():
-            place = source.at_key((*at, name))
+            place = spec.at_key((*at, name))
             if name not in known:
                 advice = did_you_mean(name, known, f"there is {', '.join(known)}")
                 self.drafts.found.append(
@@ -225,14 +225,14 @@ class _Mounting:
                 advice = did_you_mean(own.parent, known, f"there is {', '.join(known)}")
                 message = f"{sensor.name} has no frame {own.parent}"
                 self.drafts.found.append(
-                    finding("TF203", message, source.at((*at, name, "parent")), help=advice)
+                    finding("TF203", message, spec.at((*at, name, "parent")), help=advice)
                 )
         mounted = sensor.spec.frames.get(original)
         if mounted and (mounted.xyz or mounted.parent or mounted.joint or rotation_of(mounted)):
             advice = f"its pose and joint are those of {sensor.name}"
             message = f"{mount} is the mount, and has no pose inside"
             self.drafts.found.append(
-                finding("TF106", message, source.at_key((*at, original)), help=advice)
+                finding("TF106", message, spec.at_key((*at, original)), help=advice)
             )
         if mount in sensor.frames():
             message = f"{mount} is a frame inside {sensor.name} already"
@@ -269,7 +269,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     None.
     """
     driver, declared = sensor.preset.driver, sensor.spec.driver
-    spec, source = validated.spec, validated.source
+    spec = validated.spec
     at: Path = ("sensors", sensor.name, "driver")
     if declared and declared.process is not None:
         return None, _named_driver(sensor, declared.process, validated)
@@ -279,7 +279,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
             finding(
                 "TF604",
                 "a driver cannot be simulated",
-                source.at_key((*at, "simulate")),
+                spec.at_key((*at, "simulate")),
                 help=advice,
             )
         ]
@@ -294,7 +294,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     params = (declared.params if declared else {}) | _node_parameters(
         sensor, computed, launched=launched
     )
-    place = source.at_key(at[:2])
+    place = spec.at_key(at[:2])
     state = driver.lifecycle if driver and run is None else None
     node = Node(
         driver_node(sensor, spec),
@@ -323,8 +323,8 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     elif driver:
         process = replace(process, package=driver.package, executable=driver.executable)
     return process, [
-        *_given_parameters(sensor, computed, source),
-        *_unreached(sensor, spec, source),
+        *_given_parameters(sensor, computed, spec),
+        *_unreached(sensor, spec),
     ]
 
 
@@ -334,14 +334,14 @@ def _says_not_how(name: str, validated: Validated) -> list[Finding]:
     if {(*at, "component"), (*at, "container")} & validated.refused:
         return []
     advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, or external: true"
-    place = validated.source.at_key((*at, "run"))
+    place = validated.spec.at_key((*at, "run"))
     return [finding("TF102", f"the driver of {name} does not say how it runs", place, help=advice)]
 
 
 def further_processes(sensor: Sensor, validated: Validated) -> Iterator[Process]:
     """Yield the additional processes of a sensor's driver, if its preset starts it."""
     driver, declared = sensor.preset.driver, sensor.spec.driver
-    spec, source = validated.spec, validated.source
+    spec = validated.spec
     if driver is None or (
         declared and (declared.process or declared.run or declared.external or declared.simulate)
     ):
@@ -358,7 +358,7 @@ def further_processes(sensor: Sensor, validated: Validated) -> Iterator[Process]
         if not sensor.holds(one.when):
             continue
         namespace = full_name(above, sensor.named(one.namespace)).strip("/")
-        name, place = f"{sensor.name}_{suffix}", source.at_key(at)
+        name, place = f"{sensor.name}_{suffix}", spec.at_key(at)
         full = full_name(f"/{namespace}", sensor.named(one.node))
         node = Node(
             full, place, (*at, "driver", "also", suffix), fill.table(one.params), one.lifecycle
@@ -467,7 +467,7 @@ def _plain(value: Any) -> str:
     return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
 
 
-def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]:
+def _unreached(sensor: Sensor, spec: RobotSpec) -> list[Finding]:
     """Return findings about names that the driver makes itself, against the spec."""
     driver, declared = sensor.preset.driver, sensor.spec
     if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
@@ -488,7 +488,7 @@ def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]
             f"the driver of {declared.preset} makes the name {name} itself, and cannot call it"
             f" {wanted}"
         )
-        place = source.at((*at, "frames", name, "name"))
+        place = spec.at((*at, "frames", name, "name"))
         found.append(
             finding(
                 "TF604", message, place, help=f"rename the sensor {sensor.name}, or keep the name"
@@ -504,7 +504,7 @@ def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]
             " frames"
         )
         advice = "ros: {isolate: topics} keeps robots apart without a prefix"
-        found.append(finding("TF604", message, source.at_key(at), help=advice))
+        found.append(finding("TF604", message, spec.at_key(at), help=advice))
     if (
         driver.launch
         and declared.driver
@@ -512,7 +512,7 @@ def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]
         and PARAMS_FILE not in driver.args.values()
     ):
         message = f"{driver.launch} of {declared.preset} takes no file of parameters"
-        place = source.at_key((*at, "driver", "params"))
+        place = spec.at_key((*at, "driver", "params"))
         found.append(
             finding("TF604", message, place, help="driver: {run: {package: …, executable: …}}")
         )
@@ -529,7 +529,7 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Findi
     It must be one, and has its own keys.
     """
     at: Path = ("sensors", sensor.name, "driver")
-    spec, source = validated.spec, validated.source
+    spec = validated.spec
     broken = (entry for section, entry in validated.broken if section in {"processes", "sensors"})
     known = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
     found = []
@@ -547,19 +547,19 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Findi
             finding(
                 "TF813",
                 f"the driver of {sensor.name} is {name}, which is not a process",
-                source.at(at),
+                spec.at(at),
                 help=advice,
             )
         )
     driver = sensor.spec.driver
     for key in driver.model_fields_set - {"process"} if driver else ():
-        place = source.at_key((*at, key))
+        place = spec.at_key((*at, key))
         advice = f"write it under processes: {name}"
         found.append(finding("TF107", f"{key} and process exclude each other", place, help=advice))
     return found
 
 
-def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) -> list[Finding]:
+def _given_parameters(sensor: Sensor, computed: dict[str, Any], spec: RobotSpec) -> list[Finding]:
     """Return a finding for each parameter that the user gives and tfcompose computes."""
     found = []
     for key in sensor.spec.driver.params if sensor.spec.driver else ():
@@ -568,6 +568,6 @@ def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) 
                 f"tfcompose sets {switch_text({key: computed[key]})} itself, for"
                 f" {sensor.spec.preset}"
             )
-            place = source.at_key(("sensors", sensor.name, "driver", "params", key))
+            place = spec.at_key(("sensors", sensor.name, "driver", "params", key))
             found.append(finding("TF604", message, place, help="remove it; options and tf set it"))
     return found

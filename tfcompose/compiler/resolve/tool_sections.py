@@ -21,49 +21,43 @@ if TYPE_CHECKING:
     from tfcompose.foundation.tool import Key
     from tfcompose.model.robot import Process, Robot
     from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Source
 
 
 @dataclass(frozen=True, slots=True)
 class ToolSection:
     """A tool's section of a robot file, as the tool's hooks get it.
 
-    ``value`` is what it says, validated by the key's model; ``spec`` and ``source`` are those of
-    the whole file. ``read`` returns the text of a file or raises RejectedError; None where no file
+    ``value`` is what it says, validated by the key's model; ``spec`` is the whole file with its
+    spans. ``read`` returns the text of a file or raises RejectedError; None where no file
     can be read.
     """
 
     key: Key
     value: Any
     spec: RobotSpec
-    source: Source
     read: Callable[[str], str] | None
 
     def at(self, *path: str | int) -> Span:
         """Return the place of a value in the section, or of the nearest around it."""
-        return self.source.at((self.key.name, *path))
+        return self.spec.at((self.key.name, *path))
 
     def at_key(self, *path: str | int) -> Span:
         """Return the place of a key in the section, or of the nearest around it."""
-        return self.source.at_key((self.key.name, *path))
+        return self.spec.at_key((self.key.name, *path))
 
 
-def sections_of(
-    spec: RobotSpec, source: Source, read: Callable[[str], str] | None
-) -> list[ToolSection]:
+def sections_of(spec: RobotSpec, read: Callable[[str], str] | None) -> list[ToolSection]:
     """Return the sections of tools that a robot file has, without those that were refused."""
-    values = {key: getattr(spec, key.name, None) for key in keys_in(source.data)}
+    values = {key: getattr(spec, key.name, None) for key in keys_in(spec.model_fields_set)}
     return [
-        ToolSection(key, value, spec, source, read)
-        for key, value in values.items()
-        if value is not None
+        ToolSection(key, value, spec, read) for key, value in values.items() if value is not None
     ]
 
 
 def as_sections(sections: Iterable[ToolSection]) -> dict[str, Section]:
     """Return the sections as rules find them in ``Robot.sections``."""
     return {
-        section.key.name: Section(section.key.name, section.value, section.source.at)
+        section.key.name: Section(section.key.name, section.value, section.spec.at)
         for section in sections
     }
 
@@ -80,7 +74,7 @@ def processes_of(sections: Iterable[ToolSection], found: list[Finding]) -> list[
             if says_how(declared):
                 continue
             if declared is not None:
-                at = section.source.at_key(("processes", process.name))
+                at = section.spec.at_key(("processes", process.name))
                 process = replace(process, at=at)  # noqa: PLW2901 (the place of its own entry)
             processes.append(added(process, declared, section.spec))
     return processes

@@ -22,7 +22,6 @@ from tfcompose.spec.language.validate import (
     levels_of,
     validate,
     validate_file,
-    validate_node_preset,
     validate_preset,
 )
 from tfcompose.spec.language.variables import alternatives_of
@@ -44,7 +43,6 @@ __all__ = [
     "set_value",
     "validate",
     "validate_file",
-    "validate_node_preset",
     "validate_preset",
     "with_includes",
 ]

@@ -22,7 +22,7 @@ from tfcompose.spec.language.recognition import load_named
 from tfcompose.spec.language.spec import Spec, mappings_at
 from tfcompose.spec.language.tool_keys import robot_model
 from tfcompose.spec.language.variables import NothingNewError, Variables
-from tfcompose.spec.load import DEEPEST, Path, Place, Source, load
+from tfcompose.spec.load import DEEPEST, Path, Place, Source, Spans, load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -53,9 +53,9 @@ def composed(
     """
     for overlay in overlays:
         if "profiles" in overlay.data:
-            source = lay_over(source, _only(overlay, "profiles"))
-    known = source.data.get("profiles")
-    known = known if isinstance(known, dict) else {}
+            only = {"profiles": overlay.data["profiles"]}
+            source = lay_over(source, replace(overlay, data=only))
+    known = source.mapping("profiles")
     wrong = _wrong_profiles(source)
     missing = [name for name in dict.fromkeys(profiles) if name not in known]
     unusable = [name for name in profiles if not isinstance(known.get(name), dict)]
@@ -276,17 +276,13 @@ def _shown(value: Any) -> str:
     return "that list" if isinstance(value, list) else str(value)
 
 
-def _only(source: Source, key: str) -> Source:
-    return replace(source, data={key: source.data[key]})
-
-
 #: What all processes of a plan share; a part cannot have its own.
 _SHARED_SETTINGS = ("clock", "domain_id", "discovery", "rmw", "distro", "router")
 
 
 def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the other)
     part: Source,
-    holder: Source,
+    holder: Spans,
     path: Path,
     ros: RosSpec,
     settings: dict[str, Any],
@@ -299,11 +295,11 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
     given.
     """
     key = holder.at_key(path)
-    own: Any = part.data.get("ros")
+    own = part.mapping("ros")
     found = []
     for name in _SHARED_SETTINGS:
         wanted = getattr(ros, name)
-        if isinstance(own, dict) and name in own and own[name] != wanted:
+        if name in own and own[name] != wanted:
             message = (
                 f"{name} of the part {path[-1]} is {own[name]}, and of the robot that holds it"
                 f" {wanted}"
@@ -311,7 +307,7 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
             notes = [Note("set here", part.at(("ros", name)))]
             advice = f"ros: {{{name}: {own[name]}}} here, or leave it out there"
             found.append(finding("TF312", message, key, notes=notes, help=advice))
-    frames = _frame_names(part.data)
+    frames = _frame_names(part)
     settings = {
         **settings,
         "shared_frames": [name for name in ros.shared_frames if name in frames],
@@ -325,18 +321,16 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
     if variables:
         data["vars"] = dict(variables)
         inside["vars"] = holder.places.nearest((*path, "vars"))
-    over = Source(
-        holder.file, data, Place(key, inside, dict.fromkeys(data, here)), has_nulls=False
-    )
+    places = Place(key, inside, dict.fromkeys(data, here))
+    over = Source(holder.file, places, data, has_nulls=False)
     return lay_over(part, over, is_overlay=False), found
 
 
-def _frame_names(data: dict[str, Any]) -> set[str]:
-    """Return every name that the data use for a frame."""
+def _frame_names(source: Source) -> set[str]:
+    """Return every name that the file uses for a frame."""
     names: set[str] = set()
     for section in ("frames", "links", "joints", "sensors"):
-        entries = data.get(section)
-        for name, entry in entries.items() if isinstance(entries, dict) else ():
+        for name, entry in source.mapping(section).items():
             names.add(name)
             if isinstance(entry, dict):
                 names.update(
@@ -353,9 +347,8 @@ def extended_by(preset: Source) -> str | None:
 
 def profiles_in(source: Source) -> dict[str, dict[str, Any]]:
     """Return the file's profiles by name, without those that cannot be laid over anything."""
-    profiles = source.data.get("profiles")
-    known = profiles if isinstance(profiles, dict) else {}
-    return {name: value for name, value in known.items() if isinstance(value, dict)}
+    profiles = source.mapping("profiles")
+    return {name: value for name, value in profiles.items() if isinstance(value, dict)}
 
 
 def without(source: Source, key: str) -> Source:
@@ -515,4 +508,4 @@ def set_value(setting: str) -> Source:
     place = full.with_inside(below.inside, below.keys)
     for step in reversed(path):
         data, place = {step: data}, full.with_inside({step: place}, {str(step): full})
-    return Source(span.file, data, place, read.found)
+    return Source(span.file, place, data, found=read.found)

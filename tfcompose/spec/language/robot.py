@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic import BeforeValidator, Discriminator, Field, PrivateAttr, Strict, Tag
 from pydantic_core import PydanticCustomError
 
+from tfcompose.foundation.findings import Span
 from tfcompose.foundation.units import (
     NUMBER,
     JointPosition,
@@ -57,7 +58,7 @@ from tfcompose.spec.language.values import (
     Texts,
     Xyz,
 )
-from tfcompose.spec.load import Path
+from tfcompose.spec.load import Path, Spans
 
 
 class FrameSpec(MountKeys):
@@ -482,6 +483,8 @@ class RosSpec(RosSettings):
 class RobotSpec(Spec):
     """One robot."""
 
+    _spans: Spans = PrivateAttr()
+
     tfcompose: Literal[1] = key(..., "the version of this language", 1)
     robot: Annotated[
         Text, Matches(r"[a-z][a-z0-9_]*", "a robot's name: lower case letters, digits and _")
@@ -592,3 +595,20 @@ class RobotSpec(Spec):
         "how severe a finding is, by its code, and its limit",
         {"TF405": "off", "TF641": {"limit": "30 %"}},
     )
+
+    @property
+    def spans(self) -> Spans:
+        """Where the keys and values of the file are."""
+        return self._spans
+
+    def carry(self, spans: Spans) -> None:
+        """Take the spans of what the spec was validated from."""
+        self._spans = spans
+
+    def at(self, path: Path) -> Span:
+        """Return the value's place, or that of the nearest mapping or list around it."""
+        return self._spans.at(path)
+
+    def at_key(self, path: Path) -> Span:
+        """Return the place of the key, or of the nearest key around it."""
+        return self._spans.at_key(path)

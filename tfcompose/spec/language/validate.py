@@ -10,7 +10,6 @@ from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Finding, RejectedError, without_duplicates
 from tfcompose.spec.language.args import Given
 from tfcompose.spec.language.conditions import unfolded
-from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.overlay import is_for_later
 from tfcompose.spec.language.preset import PresetSpec, wrong_names
 from tfcompose.spec.language.reading import Refusal, read
@@ -21,7 +20,7 @@ from tfcompose.spec.language.values import plain
 from tfcompose.spec.language.variables import Variables, unused
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
     from tfcompose.model.plan import ParameterValue
     from tfcompose.spec.language.robot import RobotSpec
@@ -66,14 +65,14 @@ class Validated:
         object.__setattr__(
             self,
             "broken",
-            frozenset(entries | set(_children(entries, self.source.data.get("joints")))),
+            frozenset(entries | set(_children(entries, self.source.mapping("joints")))),
         )
 
 
-def _children(broken: set[tuple[str, str]], joints: Any) -> Iterator[tuple[str, str]]:
+def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield the links, as entries, that have no parent only because their joints were refused."""
     for section, name in broken:
-        joint = joints.get(name) if section == "joints" and isinstance(joints, dict) else None
+        joint = joints.get(name) if section == "joints" else None
         child = joint.get("child") if isinstance(joint, dict) else None
         if isinstance(child, str):
             yield ("links", child)
@@ -104,6 +103,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     )
     if spec is None:
         raise RejectedError(found)
+    spec.carry(source)
     refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
     return Validated(
@@ -125,35 +125,25 @@ def validate_preset(source: Source) -> PresetSpec:
     Raises:
         RejectedError: with every finding, if anything is wrong with it.
     """
-    nulls = _nulls(source)
-    preset, refusals = read(PresetSpec, source.data, [one.path for one in nulls])
-    refusals = [*nulls, *refusals]
-    if preset is not None and not refusals:
-        refusals = list(wrong_names(preset))
-    found = (*source.found, *_findings(refusals, source))
-    if found or preset is None:
-        raise RejectedError(found)
-    return preset
+    return validate_file(PresetSpec, source, wrong_names)
 
 
-def validate_node_preset(source: Source) -> NodePresetSpec:
-    """Return the typed preset of a node.
-
-    Raises:
-        RejectedError: with every finding, if anything is wrong with it.
-    """
-    return validate_file(NodePresetSpec, source)
-
-
-def validate_file(kind: type[M], source: Source) -> M:
+def validate_file(
+    kind: type[M], source: Source, check: Callable[[M], Iterable[Refusal]] = lambda _: ()
+) -> M:
     """Return the typed file of a language that needs nothing but its model.
 
+    ``check`` yields what is wrong with a file whose keys and values are right.
+
     Raises:
         RejectedError: with every finding, if anything is wrong with it.
     """
     nulls = _nulls(source)
-    spec, refusals = read(kind, source.data, [one.path for one in nulls])
-    found = (*source.found, *_findings([*nulls, *refusals], source))
+    spec, refused = read(kind, source.data, [one.path for one in nulls])
+    refusals = [*nulls, *refused]
+    if spec is not None and not refusals:
+        refusals = list(check(spec))
+    found = (*source.found, *_findings(refusals, source))
     if found or spec is None:
         raise RejectedError(found)
     return spec

@@ -55,7 +55,6 @@ def alternatives_of(
     Both are by name, as the command line gives them. ``aside`` is the file with its profiles,
     which may use them too.
     """
-    declared = source.data.get("args")
     idle = {
         name
         for section, name in unused(source.data, aside.data.get("profiles"))
@@ -63,7 +62,7 @@ def alternatives_of(
     }
     variables = Variables(source, given)
     alternatives: dict[str, tuple[str, ...]] = {}
-    for name, raw in declared.items() if isinstance(declared, dict) else ():
+    for name, raw in source.mapping("args").items():
         if raw is None or name in idle or name in given.args:
             continue
         try:
@@ -163,9 +162,8 @@ class Variables:
     """
 
     def __init__(self, source: Source, given: Given) -> None:
-        variables = source.data.get("vars")
         self.source = source
-        self.given: dict[str, Any] = variables if isinstance(variables, dict) else {}
+        self.given = source.mapping("vars")
         self.outside = given
         self.refusals: list[Refusal] = []
         self.found: list[Finding] = []
@@ -200,8 +198,7 @@ class Variables:
 
         The default of one may name those before it, and ``env``.
         """
-        declared = self.source.data.get("args")
-        declared = declared if isinstance(declared, dict) else {}
+        declared = self.source.mapping("args")
         for name, raw in declared.items():
             self.args[name] = self._arg(name, raw) if raw is not None else None
         for name, given in self.outside.args.items():
@@ -367,8 +364,7 @@ class Variables:
             if value is None:
                 raise NothingNewError(name)
             return value
-        declared = self.source.data.get("args")
-        if isinstance(declared, dict) and name in declared:
+        if name in self.source.mapping("args"):
             raise ExpressionError(
                 f"the argument {name} is declared further down", f"declare {name} first"
             )

@@ -8,6 +8,7 @@ from tfcompose.spec.load.nodes import DEEPEST, Path, Place
 from tfcompose.spec.load.source import (
     MOST_VALUES,
     Source,
+    Spans,
     allows_in_xml,
     load,
     path_named,
@@ -20,6 +21,7 @@ __all__ = [
     "Path",
     "Place",
     "Source",
+    "Spans",
     "allows_in_xml",
     "load",
     "path_named",

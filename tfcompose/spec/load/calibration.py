@@ -71,7 +71,7 @@ def _documents(text: str, file: str) -> Iterator[Source]:
         if data is not None and (
             not isinstance(data, str) or data.strip()
         ):  # ros2 topic echo ends with ---
-            yield Source(file, data, place, found)
+            yield Source(file, place, data, found=found)
             found = ()
 
 
@@ -116,7 +116,7 @@ def _rows(lines: list[str], file: str) -> Source:
         data.append([word for word, _, _ in row])
     first = places[0].span
     return Source(
-        file, data, Place(Span(file, first.line, first.column, len(lines) + 1, 1), places)
+        file, Place(Span(file, first.line, first.column, len(lines) + 1, 1), places), data
     )
 
 
@@ -137,7 +137,7 @@ def _launch(text: str, file: str) -> Source:
         }
         places[len(data)] = Place(lines.span(words[0][1], words[-1][2]), inside)
         data.append([word for word, _, _ in words])
-    return Source(file, data, Place(Span(file), places))
+    return Source(file, Place(Span(file), places), data)
 
 
 def _in_xml(text: str) -> Iterator[list[tuple[str, int, int]]]:

@@ -19,32 +19,28 @@ from tfcompose.spec.load.nodes import MOST_VALUES, Path, Place, Reader
 from tfcompose.spec.load.syntax import no_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-
-__all__ = ["MOST_VALUES", "Path", "Source", "load", "path_named", "refuse_unreadable"]
+    __all__ = ["MOST_VALUES", "Path", "Source", "Spans", "load", "path_named", "refuse_unreadable"]
 
 MOST_CHARACTERS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
-    """A file's plain data, where each key and value is, and what was found on the way.
+class Spans:
+    """A file as every stage knows it: where each key and value is, and what was found on the way.
 
-    Aliases of one anchor are one object in ``data``, which nothing changes. ``replaced`` has the
-    places of the values that others were laid over, by path, the last one first. ``has_nulls``
-    says that values may be null, ``is_variant`` that profiles or overlays are merged over the
-    file.
+    ``replaced`` has the places of the values that others were laid over, by path, the last one
+    first. ``is_variant`` says that profiles or overlays are merged over the file. Spans take no
+    part in equality.
     """
 
-    file: str
-    data: dict[str, Any]
-    places: Place
-    found: tuple[Finding, ...] = field(default=(), compare=False)
-    allows: tuple[Allow, ...] = field(default=(), compare=False)
-    replaced: dict[Path, tuple[Span, ...]] = field(default_factory=dict, compare=False)
-    has_nulls: bool = field(default=True, compare=False)
-    is_variant: bool = field(default=False, compare=False)
+    file: str = field(compare=False)
+    places: Place = field(compare=False)
+    found: tuple[Finding, ...] = field(default=(), compare=False, kw_only=True)
+    allows: tuple[Allow, ...] = field(default=(), compare=False, kw_only=True)
+    replaced: dict[Path, tuple[Span, ...]] = field(
+        default_factory=dict, compare=False, kw_only=True
+    )
+    is_variant: bool = field(default=False, compare=False, kw_only=True)
 
     def at(self, path: Path) -> Span:
         """Return the value's place, or that of the nearest mapping or list around it."""
@@ -69,16 +65,28 @@ class Source:
         """Return whether there is a value at the path."""
         return self.places.get(path) is not None
 
-    def in_order(self, path: Path, keys: Iterable[str]) -> list[str]:
-        """Return keys of the mapping at the path in the order in which they stand in the file."""
-        return sorted(keys, key=lambda key: self.at_key((*path, key)))
+
+@dataclass(frozen=True, slots=True)
+class Source(Spans):
+    """A file's plain data, with its spans: what a spec is validated from.
+
+    Aliases of one anchor are one object in ``data``, which nothing changes. ``has_nulls`` says
+    that values may be null.
+    """
+
+    data: dict[str, Any]
+    has_nulls: bool = field(default=True, compare=False, kw_only=True)
+
+    def mapping(self, *path: str | int) -> dict[str, Any]:
+        """Return the mapping at a path as it is written, empty where there is none."""
+        data: Any = self.data
+        for step in path:
+            data = data.get(step) if isinstance(data, dict) else None
+        return data if isinstance(data, dict) else {}
 
     def part(self, path: Path) -> Source:
         """Return the mapping at ``path`` as a source of its own, without what was found."""
-        data: Any = self.data
-        for step in path:
-            data = data[step]
-        return Source(self.file, data, self.places.nearest(path))
+        return Source(self.file, self.places.nearest(path), self.mapping(*path))
 
 
 def load(text: str, file: str) -> Source:
@@ -115,7 +123,12 @@ def load(text: str, file: str) -> Source:
             [finding("TF002", "this is a built plan, and no robot file", Span(file), help=advice)]
         )
     return Source(
-        file, data, place, tuple(reader.found), allows_in(text, file), has_nulls=reader.has_nulls
+        file,
+        place,
+        data,
+        found=tuple(reader.found),
+        allows=allows_in(text, file),
+        has_nulls=reader.has_nulls,
     )
 
 

@@ -67,7 +67,7 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
 
     It cannot be read, or names what the robot is not.
     """
-    source, member = section.source, section.value
+    spec, member = section.spec, section.value
     at = section.at("file")
     path = path_named(member.file, at)
     if section.read is None:
@@ -82,25 +82,25 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
         return [replace(one, notes=(*one.notes, Note("named here", at))) for one in wrong]
     name = _name(section)
     if name not in fleet.robots:
-        place = section.at("robot") if member.robot else source.at(("robot",))
+        place = section.at("robot") if member.robot else spec.at(("robot",))
         known = (
             f"there is {listed(list(fleet.robots), _NAMED_AT_MOST)}; fleet: {{file: …, robot:"
             " NAME}"
         )
         advice = did_you_mean(name, fleet.robots, known)
         return [finding("TF886", f"no robot {name} in {path}", place, help=advice)]
-    return _unknown_edges(robot, name, fleet, fleet_source, source)
+    return _unknown_edges(robot, name, fleet, fleet_source, section)
 
 
 def _unknown_edges(
-    robot: Robot, name: str, fleet: FleetSpec, fleet_source: Source, source: Source
+    robot: Robot, name: str, fleet: FleetSpec, fleet_source: Source, section: ToolSection
 ) -> list[Finding]:
     """Return a finding for each edge that the fleet shares and the robot does not have.
 
     Where entries of the robot were refused, or a key stands twice, nobody knows which edges it was
     meant to have.
     """
-    if robot.broken or any(one.code == "TF003" for one in source.found):
+    if robot.broken or any(one.code == "TF003" for one in section.spec.spans.found):
         return []
     edges = {(robot.final(edge.parent), robot.final(edge.child)) for edge in robot.edges}
     named = [f"{parent} → {child}" for parent, child in edges]
@@ -114,7 +114,5 @@ def _unknown_edges(
         advice = did_you_mean(
             " → ".join(shared.ends), named, "an edge is a parent and its child on the live tree"
         )
-        found.append(
-            finding("TF887", message, source.at(("fleet", "file")), notes=notes, help=advice)
-        )
+        found.append(finding("TF887", message, section.at("file"), notes=notes, help=advice))
     return found

@@ -123,10 +123,7 @@ def mount_of(robot: Robot, source: Source, child: str) -> Mount:
         raise ImmovableError(f"only {edge.owner} knows where {child} is in {edge.parent}")
     if edge.joint is None and edge.owner.rpartition("/")[2] not in {STATIC, JOINTS}:
         raise ImmovableError(f"{edge.owner} publishes where {child} is in {edge.parent}")
-    data: Any = source.data
-    for step in edge.entry:
-        data = data.get(step) if isinstance(data, dict) else None
-    data = data if isinstance(data, dict) else {}
+    data = source.mapping(*edge.entry)
     place, base = (data.get(key) for key in ("place", "relative_to"))
     place = place if isinstance(place, str) else child
     base = base if isinstance(base, str) else edge.parent

@@ -19,8 +19,9 @@ from PIL import Image
 from tests.support.tables import for_each
 from tfcompose.compiler.draw import Arrow, Graph, Group
 from tfcompose.compiler.draw.arrange import Direction
+from tfcompose.compiler.draw.dot import dot
 from tfcompose.compiler.draw.graph import Kind, collapsed
-from tfcompose.compiler.draw.markup import dot, mermaid
+from tfcompose.compiler.draw.mermaid import mermaid
 from tfcompose.compiler.draw.pdf import pdf
 from tfcompose.compiler.draw.picture import Box, Curve, Drawing, Text, draw
 from tfcompose.compiler.draw.png import png

@@ -135,11 +135,11 @@ def _check_output(path: Path) -> None:
 def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
     """Return the graph as a file with this ending; only what it needs is loaded."""
     if ending == ".mmd":
-        from tfcompose.compiler.draw.markup import mermaid
+        from tfcompose.compiler.draw.mermaid import mermaid
 
         return mermaid(graph, is_down=direction == "down").encode()
     if ending in {".dot", ".gv"}:
-        from tfcompose.compiler.draw.markup import dot
+        from tfcompose.compiler.draw.dot import dot
 
         return dot(graph, is_down=direction == "down").encode()
     from tfcompose.compiler.draw.picture import draw

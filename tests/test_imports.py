@@ -9,8 +9,11 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
-from tests.support.house import PACKAGE, ROOT, imports_of, part_of, room_of
+from tests.support.house import PACKAGE, ROOT, imports_of, nodes_of, part_of, room_of
 from tests.support.tables import for_each
+
+#: One worker parses all files, once.
+pytestmark = pytest.mark.xdist_group("sources")
 
 #: The nine wings, and which other wings each may import.
 MAY_IMPORT: dict[str, set[str]] = {
@@ -165,7 +168,7 @@ def test_the_core_names_its_tools_in_one_place(file: Path) -> None:
     """Neither an import nor a name for one: the loader alone knows where the table is."""
     texts = {
         node.value
-        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        for node in nodes_of(file)
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     }
     named = {text for text in texts if re.fullmatch(r"tfcompose\.tools(\.[\w.:]+)?", text)}
@@ -209,10 +212,9 @@ def test_no_module_imports_itself_by_way_of_others_not_even_for_its_types() -> N
     }
     graph: dict[str, set[str]] = {}
     for module, file in modules.items():
-        tree = ast.parse(file.read_text("utf-8"))
         names = {
             name
-            for node in ast.walk(tree)
+            for node in nodes_of(file)
             if isinstance(node, ast.ImportFrom) and node.module
             for name in (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
         }
@@ -253,7 +255,7 @@ def test_nothing_is_imported_inside_a_function() -> None:
     inside = [
         f"{file.relative_to(ROOT)}:{node.lineno}"
         for file in FILES
-        for function in ast.walk(ast.parse(file.read_text("utf-8")))
+        for function in nodes_of(file)
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
         for node in ast.walk(function)
         if isinstance(node, (ast.Import, ast.ImportFrom))

@@ -1,14 +1,17 @@
 """The project's words: the field's word for each idea, and words no name may contain."""
 
 import ast
+import functools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.support.house import ROOT, nodes_of
+
+#: One worker parses all files, once.
+pytestmark = pytest.mark.xdist_group("sources")
 
 #: The word for each idea, and what it means here. One word, one meaning.
 GLOSSARY = {
@@ -192,16 +195,19 @@ def words_in(name: str) -> list[str]:
     return [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)]
 
 
-def forbidden_in(name: str) -> set[str]:
+@functools.cache
+def forbidden_in(name: str) -> frozenset[str]:
     """Return the forbidden words in a name, in their first form."""
     words = words_in(name)
     found = {FORMS.get(word, word) for word in words} & FORBIDDEN.keys()
-    return found | {phrase for phrase in FORBIDDEN if "_" in phrase and phrase in "_".join(words)}
+    return frozenset(found) | {
+        phrase for phrase in FORBIDDEN if "_" in phrase and phrase in "_".join(words)
+    }
 
 
-def names_in(tree: ast.AST) -> Iterator[tuple[str, int]]:
-    """Yield every name that the module defines or uses, with its line."""
-    for node in ast.walk(tree):
+def names_in(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, int]]:
+    """Yield every name that a module defines or uses, with its line."""
+    for node in nodes:
         match node:
             case (
                 ast.FunctionDef(name=name)
@@ -227,7 +233,7 @@ def faults(folder: str) -> Iterator[str]:
     for file in sorted((ROOT / folder).rglob("*.py")):
         path = file.relative_to(ROOT).with_suffix("").as_posix()
         exempt = {name for one in EXEMPT if re.fullmatch(one.files, path) for name in one.names}
-        names = [(path.rpartition("/")[2], 1), *names_in(ast.parse(file.read_text("utf-8")))]
+        names = [(path.rpartition("/")[2], 1), *names_in(nodes_of(file))]
         for name, line in names:
             for word in sorted(forbidden_in(name)) if name not in exempt else ():
                 yield f"{path}.py:{line}: {name} ({word}: {FORBIDDEN[word]})"
@@ -244,7 +250,7 @@ def test_every_exemption_is_needed() -> None:
     ]
     for one in EXEMPT:
         files = [ROOT / f"{path}.py" for path in modules if re.fullmatch(one.files, path)]
-        used = {name for file in files for name, _ in names_in(ast.parse(file.read_text("utf-8")))}
+        used = {name for file in files for name, _ in names_in(nodes_of(file))}
         assert one.names <= used, one
         assert all(forbidden_in(name) for name in one.names), one
 

@@ -1,13 +1,14 @@
 """The table of a process's keys: neither a key nor another system's word is in many files."""
 
 import ast
+import functools
 import re
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
-from tests.support.house import PACKAGE
+from tests.support.house import PACKAGE, nodes_of
 from tfcompose.model.plan import Component, Plan, PlanProcess, RosSettings
 from tfcompose.model.process_keys import (
     EXTRA_ARGUMENTS,
@@ -18,6 +19,9 @@ from tfcompose.model.process_keys import (
 )
 from tfcompose.spec.language.process import ContainerSpec, ProcessSpec
 from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
+
+#: One worker parses all files, once.
+pytestmark = pytest.mark.xdist_group("sources")
 
 ROWS = (*PROCESS_KEYS, EXTRA_ARGUMENTS)
 TABLE = PACKAGE / "model" / "process_keys.py"
@@ -33,20 +37,29 @@ EVERYDAY = {"env", "cwd", "output", "prefix", "restart", "required", "stop"}
 USED_WIDELY = {"env", "required", "restart"}
 
 
+@functools.cache
+def words_of(file: Path) -> frozenset[str]:
+    return frozenset(re.findall(r"\w+", FILES[file]))
+
+
 def files_with(word: str) -> set[Path]:
+    if word.isidentifier():
+        return {file for file in FILES if word in words_of(file)}
     return {file for file, text in FILES.items() if re.search(rf"\b{word}\b", text)}
 
 
+@functools.cache
+def read_of_a_process(file: Path) -> frozenset[str]:
+    """Return the attributes that a file reads of what is called a process."""
+    return frozenset(
+        node.attr
+        for node in nodes_of(file)
+        if isinstance(node, ast.Attribute) and re.search(r"\bprocess$", ast.unparse(node.value))
+    )
+
+
 def files_that_read(name: str) -> set[Path]:
-    """Return the files that read an attribute of this name of what is called a process."""
-    return {
-        file
-        for file, text in FILES.items()
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Attribute)
-        and node.attr == name
-        and re.search(r"\bprocess$", ast.unparse(node.value))
-    }
+    return {file for file in FILES if name in read_of_a_process(file)}
 
 
 @pytest.mark.parametrize(

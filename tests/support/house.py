@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import functools
 import sys
 from pathlib import Path
 
@@ -16,6 +17,18 @@ PACKAGE = ROOT / "tfcompose"
 GUIDE = ROOT / "CONTRIBUTING.md"
 #: The drawing stands between these lines of the guide.
 BEGIN, END = "```mermaid\n", "```\n"
+
+
+@functools.cache
+def tree_of(file: Path) -> ast.Module:
+    """Return the syntax tree of a file of the repository, which nobody changes meanwhile."""
+    return ast.parse(file.read_text("utf-8"))
+
+
+@functools.cache
+def nodes_of(file: Path) -> tuple[ast.AST, ...]:
+    """Return all nodes of the syntax tree of a file."""
+    return tuple(ast.walk(tree_of(file)))
 
 
 def part_of(file: Path) -> str:
@@ -32,20 +45,22 @@ def room_of(file: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imports_of(file: Path, *, for_types: bool = True) -> set[str]:
+@functools.cache
+def imports_of(file: Path, *, for_types: bool = True) -> frozenset[str]:
     """Return the modules that a file imports, anywhere in it.
 
     Without ``for_types`` only those loaded at run time.
     """
     names: set[str] = set()
-    tree = ast.parse(file.read_text("utf-8"))
-    if not for_types:
-        tree.body = [
-            node
-            for node in tree.body
-            if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
-        ]
-    for node in ast.walk(tree):
+    for_checkers = {
+        inner
+        for node in tree_of(file).body
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for inner in ast.walk(node)
+    }
+    for node in nodes_of(file):
+        if node in for_checkers and not for_types:
+            continue
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -58,7 +73,7 @@ def imports_of(file: Path, *, for_types: bool = True) -> set[str]:
                 }
         elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
             names |= {str(word.value) for word in node.args[:1] if isinstance(word, ast.Constant)}
-    return names
+    return frozenset(names)
 
 
 def imports() -> dict[str, set[str]]:

@@ -17,7 +17,7 @@ from tests.support import processes
 from tests.support.domains import Domain, reserved_domain
 from tests.support.processes import Started
 from tests.support.skips import ACCEPTED, unexpected
-from tests.support.waiting import TIMEOUT_S
+from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.program import HERE
 from tfcompose.model.plan import Clock, Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
@@ -100,10 +100,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def _processes() -> Iterator[None]:
     """Heed every signal, and end the processes that a test started.
 
-    Those of a module or the session go on.
+    Those of a module or the session go on. What else runs below this process at the end was left
+    behind.
     """
+    before = processes.children()
     with processes.default_signal_actions(), processes.ended_at_exit():
         yield
+    until(lambda: not processes.children() - before)
+    left = processes.children() - before
+    assert not left, [processes.command_line(pid) for pid in left]
 
 
 @pytest.fixture(scope="session", autouse=True)

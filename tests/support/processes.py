@@ -155,3 +155,21 @@ def default_signal_actions() -> Iterator[None]:
     finally:
         for number in ignored:
             signal.signal(number, before[number])
+
+
+def children() -> set[int]:
+    """Return the process ids of this process's children that have not ended."""
+    pids = {
+        int(pid)
+        for task in Path("/proc/self/task").iterdir()
+        for pid in (task / "children").read_text("ascii").split()
+    }
+    return {pid for pid in pids if command_line(pid)}
+
+
+def command_line(pid: int) -> str:
+    """Return the command of a process, empty where it has ended."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text("utf-8", "replace").replace("\0", " ")
+    except (FileNotFoundError, ProcessLookupError):
+        return ""

@@ -138,15 +138,15 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_602,
+    "foundation": 1_714,
     "model": 2_128,
-    "spec": 4_632,
-    "compiler": 9_292,
+    "spec": 4_721,
+    "compiler": 9_275,
     "tf": 5_264,
     "guard": 4_041,
     "launcher": 3_810,
-    "cli": 5_365,
-    "tools": 11_430,
+    "cli": 5_353,
+    "tools": 11_222,
 }
 
 

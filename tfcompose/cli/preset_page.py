@@ -5,7 +5,6 @@ As plain data, and as a page for people.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import textwrap
@@ -16,6 +15,7 @@ from tfcompose.compiler.resolve.poses import rotation_of
 from tfcompose.compiler.resolve.presets import filled, node_preset, node_preset_names
 from tfcompose.foundation.geometry import IDENTITY_XYZW
 from tfcompose.foundation.numbers import clean_quat, clean_rpy, number
+from tfcompose.foundation.yaml_text import flow, parameter
 from tfcompose.spec.language.preset import Chosen, FurtherProcess, PresetOptics
 
 if TYPE_CHECKING:
@@ -248,28 +248,19 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join(f"  {line}".rstrip() for line in lines)
 
 
-def _value(value: Any) -> str:
-    """Return a value as YAML on one line."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_value(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return number(float(value))
-    return value if isinstance(value, str) and value else json.dumps(value)
-
-
 def _pairs(values: dict[str, Any]) -> str:
-    return ", ".join(f"{key}: {_value(value)}" for key, value in values.items())
+    return ", ".join(f"{key}: {flow(value)}" for key, value in values.items())
 
 
 def _option_text(option: dict[str, Any]) -> str:
     kind = {"set": "some of ", "choice": "one of ", "bool": "true or false", "text": "a string"}[
         option["type"]
     ]
-    default = f", default {_value(option['default'])}" if "default" in option else ""
+    default = option.get("default")
+    if default is not None:
+        default = f", default {default if isinstance(default, str) else flow(default)}"
     about = f": {option['about']}" if "about" in option else ""
-    return f"{kind}{', '.join(option.get('values', []))}{default}{about}"
+    return f"{kind}{', '.join(option.get('values', []))}{default or ''}{about}"
 
 
 def _tree(preset: dict[str, Any], columns: int | None) -> str:
@@ -311,7 +302,7 @@ def _facts_of(frame: dict[str, Any]) -> tuple[str, str, str, str]:
 
 def _body_text(body: dict[str, Any]) -> str:
     mass = f", {number(body['mass'])} kg" if "mass" in body else ", no mass is known"
-    return f"{_pairs(body['shape'])} at {_value(body['xyz'])} in {body['frame']}{mass}"
+    return f"{_pairs(body['shape'])} at {flow(body['xyz'])} in {body['frame']}{mass}"
 
 
 def _started(process: dict[str, Any]) -> str:
@@ -528,8 +519,4 @@ def _role_text(frame: dict[str, Any]) -> str:
 
 def _parameters(values: dict[str, Any]) -> str:
     """Return parameters as ROS takes them: 0.0 is another type than 0."""
-    return ", ".join(f"{key}: {_parameter_text(value)}" for key, value in values.items())
-
-
-def _parameter_text(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    return _pairs({key: parameter(value) for key, value in values.items()})

@@ -6,12 +6,12 @@ Every key with its type, unit, default, meaning and example.
 from __future__ import annotations
 
 import inspect
-import json
 import types
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from tfcompose.foundation.tool import installed
 from tfcompose.foundation.units import Measure
+from tfcompose.foundation.yaml_text import flow
 from tfcompose.spec.language.json_schema import model_of
 from tfcompose.spec.language.spec import (
     described,
@@ -171,7 +171,7 @@ def _row(name: str, field: FieldInfo) -> str:
 def _examples(field: FieldInfo) -> str:
     """Return examples where the type itself does not list what there is."""
     if field.examples:
-        return " or ".join(f"`{_yaml(one)}`" for one in examples_of(field))
+        return " or ".join(f"`{flow(one)}`" for one in examples_of(field))
     measure = measure_of(field.rebuild_annotation())
     return f"`{measure.example}`" if measure else ""
 
@@ -182,23 +182,7 @@ def _default(field: FieldInfo) -> str:
     default = field.default
     if default is None or default in ((), {}, "") or is_mapping(type(default)):
         return ""
-    return f"`{_yaml(default)}`"
-
-
-def _yaml(value: Any) -> str:
-    """Return a value on one line as people write it in YAML."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_yaml(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(_yaml, value)) + "]"
-    if isinstance(value, str):
-        is_plain = (
-            value.replace(" ", "a").replace("_", "a").replace("/", "a").replace(".", "a").isalnum()
-        )
-        return value if is_plain else json.dumps(value, ensure_ascii=False)
-    if isinstance(value, float) and value.is_integer():
-        return str(int(value))
-    return json.dumps(value)
+    return f"`{flow(default)}`"
 
 
 def _type(annotation: Any) -> str:
@@ -210,7 +194,7 @@ def _type(annotation: Any) -> str:
     if origin in {Union, types.UnionType}:
         return " or ".join(dict.fromkeys(_type(one) for one in inner if one is not type(None)))
     if origin is Literal:
-        return " \\| ".join(f"`{_yaml(word)}`" for word in inner).replace("\\|", "|")
+        return " | ".join(f"`{word}`" for word in inner)
     if origin is dict:
         return f"{_plural(_type(inner[1]))} by name"
     if origin is tuple:

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.foundation.findings import Finding, Span, finding
 from tfcompose.foundation.geometry import norm, normalised
 from tfcompose.foundation.reach import Reach
+from tfcompose.foundation.yaml_text import comment, entry, flow, section
 from tfcompose.model.robot import BUILT_IN
 from tfcompose.tools.importers.values import angle, rotation
-from tfcompose.tools.importers.yaml_text import comment, entry, flow, section, without_expressions
+from tfcompose.tools.importers.yaml_text import without_expressions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

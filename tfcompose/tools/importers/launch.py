@@ -22,6 +22,7 @@ from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import Reach
 from tfcompose.foundation.shape import fits
+from tfcompose.foundation.yaml_text import Bare
 from tfcompose.model.process_keys import (
     EXTRA_ARGUMENTS,
     PROCESS_KEYS,
@@ -47,7 +48,7 @@ from tfcompose.tools.importers.programs import (
 )
 from tfcompose.tools.importers.static_transforms import PLUGIN as STATIC_PLUGIN
 from tfcompose.tools.importers.static_transforms import PROGRAM, static_words
-from tfcompose.tools.importers.yaml_text import Bare, Expression, arguments_in, with_values
+from tfcompose.tools.importers.yaml_text import Expression, arguments_in, with_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

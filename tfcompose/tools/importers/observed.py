@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE
 from tfcompose.foundation.findings import Span
 from tfcompose.foundation.numbers import number
+from tfcompose.foundation.yaml_text import flow
 from tfcompose.model.robot import Edge, Robot
 from tfcompose.tools.importers.draft import pose_keys
 from tfcompose.tools.importers.programs import STATE_PUBLISHER
 from tfcompose.tools.importers.robot_file import sensor_keys
 from tfcompose.tools.importers.sensors import recognised
-from tfcompose.tools.importers.yaml_text import Bare, flow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -81,7 +81,7 @@ class Observed:
         else:
             keys |= {"owner": owner or self._unknown()}
             rate = round_rate(edge.timing.rate)
-            keys |= {"rate": Bare(f"{number(rate)} Hz")} if rate else {}
+            keys |= {"rate": f"{number(rate)} Hz"} if rate else {}
         frames[edge.child] = keys
 
     def _is_own(self, edge: EdgeState) -> bool:

@@ -16,20 +16,14 @@ import yaml
 from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import OutsideError, Reach
+from tfcompose.foundation.yaml_text import Bare, parameter
 from tfcompose.tools.importers.static_transforms import (
     PROGRAM,
     RefusedError,
     reader_of,
     static_transform,
 )
-from tfcompose.tools.importers.yaml_text import (
-    Bare,
-    Expression,
-    argument,
-    arguments_in,
-    parameter,
-    with_values,
-)
+from tfcompose.tools.importers.yaml_text import Expression, argument, arguments_in, with_values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -351,7 +345,7 @@ def _add_joint_publisher(draft: Draft, program: Program) -> str:
 
 
 def _hertz(value: float) -> Any:
-    return Bare(f"{number(value)} Hz")
+    return f"{number(value)} Hz"
 
 
 def _add_process(draft: Draft, program: Program, target: Target) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.urdf.blocks import with_hardware
+from tfcompose.foundation.yaml_text import comment, dedented, entry, section
 from tfcompose.tools.importers.draft import robot_name
 from tfcompose.tools.importers.omitted import (
     angles,
@@ -21,13 +22,7 @@ from tfcompose.tools.importers.omitted import (
 )
 from tfcompose.tools.importers.sensors import recognised
 from tfcompose.tools.importers.values import Values, rotation
-from tfcompose.tools.importers.yaml_text import (
-    comment,
-    dedented,
-    entry,
-    section,
-    without_expressions,
-)
+from tfcompose.tools.importers.yaml_text import without_expressions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

@@ -15,7 +15,6 @@ from tfcompose.compiler.urdf.schema import MOMENTS
 from tfcompose.foundation.geometry import Pose, angle_between, quat_from_rpy
 from tfcompose.foundation.numbers import clean_rpy, number
 from tfcompose.model.robot import BOUNDED, materials
-from tfcompose.tools.importers.yaml_text import Bare
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -125,15 +124,15 @@ class Values:
         )
 
 
-def angle(value: float) -> Bare | float:
+def angle(value: float) -> str | float:
     """Return the angle (rad) as the robot file has it: ``-90 deg``, or radians."""
     degrees = round(math.degrees(value), _DECIMALS) + 0.0
     if abs(math.radians(degrees) - value) > _MEANT_RAD:
         return value
-    return Bare(f"{number(degrees)} deg") if degrees else 0.0
+    return f"{number(degrees)} deg" if degrees else 0.0
 
 
-def rotation(quat_xyzw: Quaternion, source_rpy: Vector | None = None) -> list[Bare | float] | None:
+def rotation(quat_xyzw: Quaternion, source_rpy: Vector | None = None) -> list[str | float] | None:
     """Return roll, pitch and yaw as the robot file has them, or None for no rotation."""
     if quat_xyzw == Pose().quat_xyzw:
         return None
@@ -145,8 +144,8 @@ def rotation(quat_xyzw: Quaternion, source_rpy: Vector | None = None) -> list[Ba
     return angles if any(angles) else None
 
 
-def _radians(value: Bare | float) -> float:
-    return math.radians(float(value.removesuffix(" deg"))) if isinstance(value, Bare) else value
+def _radians(value: str | float) -> float:
+    return math.radians(float(value.removesuffix(" deg"))) if isinstance(value, str) else value
 
 
 def _clashing(robot: Robot) -> frozenset[str]:

@@ -26,9 +26,9 @@ from tfcompose.foundation.units import UnitError, quantity
 from tfcompose.model.robot import JOINTS, STATIC, is_optical
 from tfcompose.spec.language import DIRECTIONS
 from tfcompose.spec.load import load
+from tfcompose.spec.load.editing import Keys, text_at, with_value
 from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.rotations import FORMS
-from tfcompose.tools.view.yaml_text import Keys, text_at, with_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

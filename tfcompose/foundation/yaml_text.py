@@ -1,0 +1,183 @@
+"""YAML as people write robot files.
+
+An entry on a line where it fits, numbers, names and words bare, all else in quotes.
+"""
+
+from __future__ import annotations
+
+import re
+from textwrap import dedent, indent
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.numbers import number
+from tfcompose.foundation.text import masked
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+WIDTH = 120
+
+#: So many digits people write at most; what computing leaves behind is below this part of a
+#: number.
+_DIGITS, _LEFT_BEHIND = 12, 4e-16
+
+#: What needs no quotes: a path, an address, words, a quantity with its unit.
+_PLAIN = re.compile(
+    r"(?:[a-z]+://|\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./+-]*(?: [A-Za-z0-9_./+-]+)*"
+    r"|-?[0-9]+(?:\.[0-9]+)? [A-Za-z%][A-Za-z/]*"
+)
+#: What readers of other versions of YAML take for something else than a text.
+_RESERVED = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf"})
+_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+
+
+class Bare(str):
+    """A text that needs no quotes for another reason than its characters: a typed number."""
+
+    __slots__ = ()
+
+
+class Literal(str):
+    """A text of several lines, which keeps them."""
+
+    __slots__ = ()
+
+
+def entry(key: str, value: Any, depth: int = 0) -> list[str]:
+    """Return the lines of a key and its value: one line where it fits, else an indented block."""
+    before = "  " * depth
+    head = f"{before}{text(key)}:"
+    if isinstance(value, Literal):
+        lines = _literal(value)
+        return (
+            [f"{head} {text(value)}"]
+            if lines is None
+            else [f"{head} |", *(indent(one, before + "  ") for one in lines)]
+        )
+    line = f"{head} {flow(value)}"
+    if len(line) <= WIDTH or not isinstance(value, (dict, list)) or not _splits(value):
+        return [line]
+    if isinstance(value, list):
+        return [head, *(one for item in value for one in _item(item, depth + 1))]
+    return [head, *(one for inner, item in value.items() for one in entry(inner, item, depth + 1))]
+
+
+def _splits(value: Any) -> bool:
+    """Whether the value can be split into lines: a list of numbers and ``{}`` cannot."""
+    return (
+        bool(value)
+        if isinstance(value, dict)
+        else any(isinstance(item, (dict, str)) for item in value)
+    )
+
+
+def _item(value: Any, depth: int) -> list[str]:
+    before = "  " * depth
+    line = f"{before}- {flow(value)}"
+    if len(line) <= WIDTH or not isinstance(value, dict):
+        return [line]
+    lines = [one for key, item in value.items() for one in entry(key, item, depth + 1)]
+    return [f"{before}- {lines[0].lstrip()}", *lines[1:]]
+
+
+def flow(value: Any) -> str:
+    """Return the value on one line."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{text(key)}: {flow(item)}' for key, item in value.items())}}}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(flow, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return number(_as_people_write(float(value)))
+    return text(value)
+
+
+def parameter(value: Any) -> Any:
+    """Return a node's parameter such that it is written with its type.
+
+    20.0 is a double, and 20 an integer.
+    """
+    if isinstance(value, list):
+        return [parameter(item) for item in value]
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    if isinstance(value, int):
+        return Bare(value)
+    mantissa, exponent, power = repr(value).partition("e")
+    return Bare(f"{mantissa}{'' if '.' in mantissa else '.0'}{exponent}{power}")
+
+
+def _as_people_write(value: float) -> float:
+    """Return the number without what computing left in its last digits.
+
+    0.010267499999999999 was 0.0102675.
+    """
+    near = float(f"{value:.{_DIGITS}g}")
+    return near if abs(near - value) <= _LEFT_BEHIND * abs(value) else value
+
+
+def text(value: str) -> str:
+    """Return a text, in quotes where YAML would take it for something else."""
+    if isinstance(value, Bare):
+        return str(value)
+    if _PLAIN.fullmatch(value) and value.lower() not in _RESERVED:
+        return value
+    return '"' + "".join(_ESCAPES.get(char) or _printed(char) for char in value) + '"'
+
+
+def _printed(char: str) -> str:
+    return char if char.isprintable() else f"\\U{ord(char):08x}"
+
+
+def _literal(value: str) -> list[str] | None:
+    """Return the lines of a literal block, or None for a text that cannot be one."""
+    lines = value.splitlines()
+    ends = any(line != line.rstrip() for line in lines)
+    if (
+        not lines
+        or ends
+        or lines[0][:1].isspace()
+        or not all(line.replace("\t", " ").isprintable() for line in lines)
+    ):
+        return None
+    return lines
+
+
+def dedented(block: str) -> Literal:
+    """Return an element's source text without its indentation."""
+    first, _, rest = block.strip().partition("\n")
+    below = dedent(rest.expandtabs(2)) if rest else ""
+    return Literal("\n".join(line.rstrip() for line in [first, *below.splitlines()]))
+
+
+def comment(texts: Iterable[str], depth: int = 0) -> list[str]:
+    """Return texts as lines of comment, folded where they are long."""
+    before = "  " * depth + "# "
+    lines = []
+    for text in texts:
+        printed = masked(" ".join(text.split()), "?")
+        lines += [before + line for line in _folded(printed, WIDTH - len(before))]
+    return lines
+
+
+def _folded(line: str, width: int) -> list[str]:
+    lines = [""]
+    for word in line.split(" "):
+        if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
+            lines.append("  " + word)
+        else:
+            lines[-1] = f"{lines[-1]} {word}".strip() if len(lines) == 1 else f"{lines[-1]} {word}"
+    return lines
+
+
+def section(
+    name: str, entries: Mapping[str, Any], notes: Mapping[str, Iterable[str]]
+) -> list[str]:
+    """Return a section with its entries and the comments above them; nothing for an empty one."""
+    if not entries:
+        return []
+    lines = ["", f"{name}:"]
+    for key, value in entries.items():
+        lines += [*comment(notes.get(key, ()), 1), *entry(key, value, 1)]
+    return lines

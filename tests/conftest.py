@@ -96,6 +96,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         node.LEAVE_S = 2 * TIMEOUT_S
 
 
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Fail where pytest-xdist does not group: each worker would start what a group shares."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        for item in session.items:
+            assert item.get_closest_marker("xdist_group") is None or "@" in item.nodeid, (
+                item.nodeid
+            )
+
+
 @pytest.fixture(autouse=True)
 def _processes() -> Iterator[None]:
     """Heed every signal, and end the processes that a test started.

@@ -148,46 +148,19 @@ def rogue(domain: object) -> Iterator[Callable[[], subprocess.Popen[str]]]:
         popen.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_ends_everything_with_0_and_leaves_no_process(
-    up: Callable[..., Up], number: int
-) -> None:
+def test_a_signal_ends_everything_with_0_and_leaves_no_process(up: Callable[..., Up]) -> None:
     robot = up(ROVER)
     robot.says("tree complete: 2 edges live after ")
     below = robot.below()
     assert {"guard", "static", "drive"} <= {process.cmdline()[-1] for process in below}
-    robot.popen.send_signal(number)
+    robot.popen.send_signal(signal.SIGTERM)
     assert robot.ends() == 0
     assert [process for process in below if not gone(process)] == []
     assert robot.text.splitlines()[-1].endswith("| ended")
     assert "SIGTERM" not in robot.text.split("stopping: ", 1)[1].split("\n", 1)[1]
 
 
-def test_a_signal_before_the_tree_is_complete_ends_everything_with_0_too(
-    up: Callable[..., Up],
-) -> None:
-    robot = up(ROVER)
-    robot.says("started guard")
-    below = robot.below()
-    robot.popen.send_signal(signal.SIGINT)
-    assert robot.ends() == 0
-    assert [process for process in below if not gone(process)] == []
-
-
-@pytest.mark.parametrize("seconds", [0.0, 0.05, 0.1])
-def test_a_signal_while_processes_of_its_own_start_leaves_no_traceback(
-    up: Callable[..., Up], seconds: float
-) -> None:
-    robot = up(ROVER, "--guard", "off")
-    robot.says("started drive")
-    time.sleep(seconds)
-    robot.popen.send_signal(signal.SIGINT)
-    assert robot.ends() == 0
-    assert "Traceback" not in robot.text
-    assert "KeyboardInterrupt" not in robot.text
-
-
-@pytest.mark.parametrize("seconds", [0.0, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.7, 2.4])
+@pytest.mark.parametrize("seconds", [0.0, 0.2, 0.5, 1.2])
 def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
     up: Callable[..., Up], seconds: float
 ) -> None:
@@ -200,15 +173,6 @@ def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
     assert robot.ends() in ((0,) if has_started else (0, 130))
     assert until(lambda: all(map(gone, below)))
     assert "Traceback" not in robot.text
-
-
-def test_sigkill_of_the_launcher_ends_everything(up: Callable[..., Up]) -> None:
-    robot = up(ROVER)
-    robot.says("tree complete")
-    below = robot.below()
-    assert len(below) >= 4
-    robot.popen.kill()
-    assert until(lambda: all(map(gone, below)))
 
 
 def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_once(
@@ -225,19 +189,6 @@ def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_o
     assert "stopping: TF801 foreign_publisher\n" in robot.text
 
 
-def test_a_publisher_that_is_killed_ends_everything_with_1_and_is_named(
-    up: Callable[..., Up],
-) -> None:
-    name = "static"
-    robot = up(ROVER)
-    robot.says("tree complete")
-    below = robot.below()
-    robot.child(name).kill()
-    assert robot.ends() == 1
-    assert re.search(rf"error\[TF808\] {name}\b.* SIGKILL", robot.text)
-    assert [process for process in below if not gone(process)] == []
-
-
 def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     up: Callable[..., Up], rogue: Callable[[], object]
 ) -> None:
@@ -246,21 +197,6 @@ def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     assert robot.ends() == 1
     assert re.search(r"error\[TF807\] odom → base_link\b.* /strange/rogue\b", robot.text)
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
-
-
-def test_an_edge_that_proves_to_be_published_while_processes_start_is_refused_as_silently(
-    up: Callable[..., Up], rogue: Callable[[], object]
-) -> None:
-    rogue()
-    for _ in range(
-        5
-    ):  # on a busy machine it may be heard too late to be taken for one that was there first
-        robot = up(ROVER, "--settle", "0.1", "--for", "12")
-        assert robot.ends() == 1
-        if "TF807" in robot.text:
-            break
-    assert re.search(r"error\[TF807\] odom → base_link\b.* /strange/rogue\b", robot.text)
-    assert "Traceback" not in robot.text
 
 
 def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]) -> None:
@@ -296,23 +232,10 @@ def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreport
     assert know() or all("error[TF854]" in one.text for one in ended()), [one.text for one in both]
 
 
-def test_of_two_robots_with_the_same_edges_both_report_it_or_one_ends(
-    up: Callable[..., Up], tmp_path: Path
-) -> None:
-    (tmp_path / "other.yaml").write_text(ROVER.replace("robot: rover", "robot: other"))
-    both = [up(ROVER, "--settle", "0"), up(None, "other.yaml", "--settle", "0")]
-
-    def end_well() -> bool:
-        refused = any("error[TF854]" in one.text and one.popen.poll() == 1 for one in both)
-        return refused or all("error[TF854]" in one.text for one in both)
-
-    assert until(end_well), [one.text for one in both]
-
-
 def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at_the_end(
     up: Callable[..., Up],
 ) -> None:
-    robot = up(EXTERNAL, "--for", "12")
+    robot = up(EXTERNAL, "--for", "6")
     robot.says("waiting for drive (/diff_drive): odom → base_link")
     robot.says("live  static (/tfcompose_static): base_link → lidar  ")
     assert "expecting drive (/diff_drive)" in robot.text
@@ -351,21 +274,6 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     ]
 
 
-def test_an_owner_whose_node_has_another_name_gets_the_line_to_write_and_is_live_with_it(
-    up: Callable[..., Up], tmp_path: Path
-) -> None:
-    (tmp_path / "driver.py").write_text(ROGUE, encoding="utf-8")
-    stand_in = "simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}"
-    ran = f"run: [{sys.executable}, {tmp_path}/driver.py], stop: {{signal: SIGTERM}}"
-    text = ROVER.replace(stand_in, ran)
-    robot = up(text)
-    robot.says("TF801")
-    robot.ends("node: /strange/rogue")
-    robot = up(text.replace("run:", "node: /strange/rogue, run:"))
-    assert robot.ends("tree complete") == 0
-    assert "TF801" not in robot.text
-
-
 def test_without_a_guard_edges_are_still_reported_to_be_live_and_nobody_is_judged(
     up: Callable[..., Up], rogue: Callable[[], object]
 ) -> None:
@@ -380,20 +288,19 @@ def test_observing_before_the_start_takes_nothing_from_the_time_that_was_request
     up: Callable[..., Up],
 ) -> None:
     begun = time.monotonic()
-    robot = up(ROVER, "--settle", "4", "--for", "9")
+    robot = up(ROVER, "--settle", "3", "--for", "4")
     late = {"TF804", "TF805"}  # a busy machine is, in truth
     code, found = robot.ends(), set(re.findall(r"\[(TF\d+)\]", robot.text))
     assert code == bool(found & late), robot.text
     assert not found - late, robot.text
-    assert time.monotonic() - begun >= 13
+    assert time.monotonic() - begun >= 7
     assert "tree complete" in robot.text
 
 
-def test_settle_without_a_guard_is_wrong_use_and_settle_0_is_not(up: Callable[..., Up]) -> None:
+def test_settle_without_a_guard_is_wrong_use(up: Callable[..., Up]) -> None:
     robot = up(ROVER, "--guard", "off", "--settle", "1")
     assert robot.ends() == 2
     assert "--settle" in robot.text
-    assert up(ROVER, "--settle", "0").ends(after="tree complete") == 0
 
 
 def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(

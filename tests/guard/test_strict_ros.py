@@ -232,6 +232,7 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
     assert "tool → hand from" not in robot.text
 
 
+@pytest.mark.parametrize("robot", ["partition"], indirect=True)
 def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_again(
     robot: Fenced,
 ) -> None:

@@ -1,6 +1,5 @@
 """``tfcompose doctor`` on the real thing: real nodes do what is wrong, and it says so."""
 
-import json
 import os
 import re
 import shutil
@@ -9,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +24,7 @@ from tests.support.doctor import at_last, doctor, doctor_finds, finds_nothing, m
 from tests.support.fake_nodes import FakeNodes, message
 from tests.support.processes import Started
 from tests.support.waiting import until
-from tfcompose.tf.ros.node import LATCHED, TFPublisher, open_node, qos
+from tfcompose.tf.ros.node import LATCHED, TFPublisher, qos
 from tfcompose.tf.ros.typesupport import tf_message_type
 
 pytestmark = pytest.mark.ros
@@ -283,78 +281,12 @@ def odometry(now: int) -> Odometry:
     return made
 
 
-def missed(name: str, *, static: bool, seconds: float) -> str:
-    """Let a node come, be heard and named, and leave while the doctor looks.
-
-    Return what it says of that.
-    """
-    data = [
-        message(0 if static else time.time_ns(), (f"base_link {name}",))
-        for _ in range(1 if static else 40)
-    ]
-    command = [
-        sys.executable,
-        "-m",
-        "tfcompose",
-        "doctor",
-        "--for",
-        str(2 * seconds),
-        "--format",
-        "json",
-    ]
-    with ExitStack() as leave:
-        publisher = TFPublisher(leave.enter_context(open_node(name, "")), static=static)
-        with processes.start(command, stdout=subprocess.PIPE) as process:
-            assert until(publisher.publisher.get_subscription_count)
-            for each in data:
-                publisher.publish(each)
-                time.sleep(1.0 / len(data))
-            leave.close()
-            output, _ = process.communicate(timeout=90)
-    return messages_of(json.loads(output), "TF804")
-
-
-def test_one_that_leaves_is_missed(nodes: FakeNodes) -> None:
-    sound(nodes)
-
-    def is_missed(seconds: float) -> None:
-        text = missed("arm", static=False, seconds=seconds)
-        assert "/arm" in text
-        assert "base_link → arm" in text
-
-    at_last(is_missed)
-
-
-def test_fixed_frames_whose_publisher_leaves_are_missed(nodes: FakeNodes) -> None:
-    sound(nodes)
-
-    def is_missed(seconds: float) -> None:
-        text = missed("camera", static=True, seconds=seconds)
-        assert "/camera" in text
-        assert "base_link → camera" in text
-
-    at_last(is_missed)
-
-
 @pytest.mark.usefixtures("nodes")
 def test_where_nothing_runs_it_reports_with_which_settings_it_observed(domain: Any) -> None:
     code, found = doctor(seconds=1.0)
     text = messages_of(found, "TF845")
     assert code == 1
     assert f"ROS_DOMAIN_ID={domain.id}, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in text
-
-
-def test_a_robot_below_a_namespace_is_pointed_at_and_then_observed(nodes: FakeNodes) -> None:
-    node = nodes.node("drive", "robot1")
-    nodes.moving(node, "odom base_link", topic="/robot1/tf")
-    nodes.fixed(node, "base_link laser", topic="/robot1/tf_static")
-    words = "tfcompose doctor --namespace /robot1"
-
-    def is_pointed_at(seconds: float) -> None:
-        assert words in messages_of(doctor(seconds=seconds)[1], "TF845")
-
-    at_last(is_pointed_at)
-    assert finds_nothing("--namespace", "robot1")
 
 
 FAR = """
@@ -392,16 +324,6 @@ def test_a_robot_in_another_domain_is_observed_by_its_process(domain: Any) -> No
     at_last(
         is_observed
     )  # what others run here at the same time may have been started later, and is named first
-
-
-def test_discovery_that_is_switched_off_is_named(
-    nodes: FakeNodes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    sound(nodes)
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
-    _, found = doctor(seconds=1.0)
-    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF" in messages_of(found, "TF909")
-    assert "TF845" in {one["code"] for one in found}
 
 
 SHIM = """
@@ -492,9 +414,7 @@ def test_ctrl_c_ends_the_observation_and_prints_what_was_found(
     at_last(is_named)
 
 
-@pytest.mark.parametrize(
-    "words", [["monitor"], ["echo", "b", "c"], ["verify"], ["tree", "--live"], ["graph", "--live"]]
-)
+@pytest.mark.parametrize("words", [["monitor"], ["verify"], ["graph", "--live"]])
 def test_ctrl_c_before_anything_came_is_no_finding(
     start: Callable[..., Started], tmp_path: Path, words: list[str]
 ) -> None:
@@ -520,22 +440,6 @@ def test_ctrl_c_before_anything_came_is_no_finding(
 def has_ports(process: subprocess.Popen[str]) -> bool:
     """Return whether the process has joined ROS: it has UDP ports, whoever has found it yet."""
     return bool(psutil.Process(process.pid).net_connections("udp"))
-
-
-def test_a_node_that_asks_a_discovery_server_is_named(domain: Any) -> None:
-    """It announces itself to its server only, and hears of nobody else."""
-    environment = {**domain.environment, "ROS_DISCOVERY_SERVER": "127.0.0.1:11811"}
-    with processes.start(
-        [sys.executable, "-c", FAR], stdout=subprocess.PIPE, env=environment
-    ) as process:
-        try:
-            assert process.stdout
-            assert process.stdout.readline() == "up\n"
-            _, found = doctor(seconds=2.0)
-        finally:
-            process.kill()
-    assert "TF845" in {one["code"] for one in found}
-    assert "ROS_DISCOVERY_SERVER=127.0.0.1:11811" in messages_of(found, "TF908")
 
 
 def test_other_robots_in_the_same_domain_are_reported(nodes: FakeNodes) -> None:
@@ -586,28 +490,22 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "code", "exit_code"),
+    ("command", "setting", "code", "exit_code"),
     [
-        ("RMW_IMPLEMENTATION", "rmw_none_cpp", "TF901", 2),
-        ("ROS_DOMAIN_ID", "300", "TF909", 1),
-        ("ROS_DOMAIN_ID", "lab", "TF909", 1),
+        ("doctor", "RMW_IMPLEMENTATION=rmw_none_cpp", "TF901", 2),
+        ("monitor --for 1", "ROS_DOMAIN_ID=300", "TF909", 1),
+        ("echo a b --once", "RMW_IMPLEMENTATION=rmw_none_cpp", "TF901", 2),
+        ("tree --live", "ROS_DOMAIN_ID=lab", "TF909", 1),
     ],
 )
 @pytest.mark.usefixtures("domain")
 def test_settings_with_which_ros_does_not_start_are_reported_by_every_live_command(
-    monkeypatch: pytest.MonkeyPatch, name: str, value: str, code: str, exit_code: int
+    monkeypatch: pytest.MonkeyPatch, command: str, setting: str, code: str, exit_code: int
 ) -> None:
     """ROS itself ends the process, with exit code 102, or with Fast DDS's own words."""
-    monkeypatch.setenv(name, value)
-    for words in (
-        ["doctor"],
-        ["monitor", "--for", "1"],
-        ["echo", "a", "b", "--once"],
-        ["tree", "--live"],
-    ):
-        command = [sys.executable, "-m", "tfcompose", *words]
-        done = processes.run(command)
-        output = done.stdout + done.stderr
-        assert done.returncode == exit_code
-        assert output.startswith(f"error[{code}] {name}={value}")
-        assert len(output.splitlines()) == 2
+    monkeypatch.setenv(*setting.split("="))
+    done = processes.run([sys.executable, "-m", "tfcompose", *command.split()])
+    output = done.stdout + done.stderr
+    assert done.returncode == exit_code
+    assert output.startswith(f"error[{code}] {setting}")
+    assert len(output.splitlines()) == 2

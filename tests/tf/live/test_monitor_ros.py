@@ -46,44 +46,6 @@ def test_each_publisher_of_an_edge_is_named_with_its_rate_and_delay() -> None:
         at_last(are_named)
 
 
-def test_the_table_says_that_a_publisher_is_not_the_only_one() -> None:
-    def is_named(seconds: float) -> None:
-        lines = monitor("--for", str(seconds)).stdout.splitlines()
-        assert lines[0].startswith("2 edges, 2 publishers, ")
-        assert [line.split()[3] for line in lines[2:]] == ["/ekf", "/drive"]
-        assert all(line.endswith("not the only one") for line in lines[2:])
-
-    with (
-        sending("drive", "odom", "base_link", rate=50),
-        sending("ekf", "map", "base_link", rate=50),
-    ):
-        at_last(is_named)
-
-
-def test_bytes_that_are_no_tf_are_counted_and_the_rest_is_still_reported() -> None:
-    def are_counted(seconds: float) -> None:
-        done = monitor("--for", str(seconds), "--format", "json")
-        assert json.loads(done.stdout)["malformed"] > 10
-        assert rows(done)[0]["rate"] == pytest.approx(drive(), rel=0.15)
-
-    with sending(
-        "drive", "odom", "base_link", rate=50, bad=b"\x00\x01\x00\x00\xff\xff\xff\xff"
-    ) as drive:
-        at_last(are_counted)
-
-
-def test_below_a_namespace_only_its_topics_are_heard() -> None:
-    def are_heard(seconds: float) -> None:
-        done = monitor("--for", str(seconds), "--namespace", "/robot1/", "--format", "json")
-        assert [each["child"] for each in rows(done)] == ["base_link"]
-
-    with (
-        sending("a", "odom", "base_link", rate=20, topic="/robot1/tf"),
-        sending("b", "x", "y", rate=20),
-    ):
-        at_last(are_heard)
-
-
 #: Starts a node as a machine does that is busy with something else.
 SLOW = """
 import sys, time
@@ -99,22 +61,18 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-@pytest.mark.parametrize("command", ["monitor", "doctor"])
-def test_what_a_slow_start_takes_is_not_taken_from_the_time_of_observation(command: str) -> None:
-    words = [sys.executable, "-c", SLOW, command, "--for", "3"]
+def test_what_a_slow_start_takes_is_not_taken_from_the_time_of_observation() -> None:
+    words = [sys.executable, "-c", SLOW, "doctor", "--for", "3"]
 
     def is_heard() -> bool:
         done = processes.run(words)
-        return "/drive" in done.stdout or " 1 edge " in done.stdout
+        return " 1 edge " in done.stdout
 
     with sending("drive", "odom", "base_link", rate=50):
         assert any(is_heard() for _ in OBSERVE_S)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_piped_it_prints_a_table_each_second_and_ends_with_exit_code_0_on_a_signal(
-    number: int,
-) -> None:
+def test_piped_it_prints_a_table_each_second_and_ends_with_exit_code_0_on_a_signal() -> None:
     command = [sys.executable, "-m", "tfcompose", "monitor", "--every", "0.2"]
     with (
         sending("drive", "odom", "base_link", rate=50),
@@ -124,16 +82,10 @@ def test_piped_it_prints_a_table_each_second_and_ends_with_exit_code_0_on_a_sign
         for line in process.stdout:
             if line.startswith("odom → base_link") and "/drive" in line:
                 break
-        process.send_signal(number)
+        process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 0
     assert errors == ""
-
-
-def test_where_nothing_comes_it_says_so_with_exit_code_1() -> None:
-    done = monitor("--for", "0.5", code=1)
-    assert done.stdout == ""
-    assert "error[TF811] " in done.stderr
 
 
 def test_between_two_frames_each_edge_has_its_publisher_and_a_net_delay() -> None:
@@ -149,20 +101,10 @@ def test_between_two_frames_each_edge_has_its_publisher_and_a_net_delay() -> Non
         assert done["most_behind"] == ["map", "odom"]
         assert 0.25 + 0.5 / 20 * 0.9 <= done["net_delay_s"] <= done["most_net_delay_s"]
 
-    def is_printed(seconds: float) -> None:
-        text = monitor("map", "base_link", "--for", str(seconds)).stdout.splitlines()
-        assert [line.split()[2] for line in text[2:]] == ["odom", "base_link"]
-        assert "by map → odom" in text[0]
-
-    def is_unknown(seconds: float) -> None:
-        assert "base_link?" in monitor("map", "base_lnk", "--for", str(seconds), code=1).stdout
-
     with (
         sending("drive", "odom", "base_link", rate=50),
         sending("ekf", "map", "odom", rate=20, late_s=0.25),
         sending("other", "x", "y", rate=50),
     ):
         at_last(is_named)
-        at_last(is_printed)
-        at_last(is_unknown)
     assert "A and B" in monitor("map", code=2).stderr

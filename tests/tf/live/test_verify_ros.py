@@ -15,7 +15,6 @@ from tests.support.fake_nodes import sending
 from tests.support.processes import Started
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.plan import PlanEdge, PlanProcess, Simulation
-from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.spec.load import load
 
 pytestmark = pytest.mark.ros
@@ -44,13 +43,6 @@ def tfcompose(*words: str, code: int = 0) -> str:
     return done.stdout
 
 
-def test_a_robot_as_planned_is_as_expected(running: Path) -> None:
-    def is_as_expected(seconds: float) -> None:
-        assert "2 of 2" in tfcompose("verify", str(running), "--live", "--for", str(seconds))
-
-    at_last(is_as_expected)
-
-
 def test_what_is_imported_of_a_running_robot_is_as_expected_on_it(running: Path) -> None:
     """Import names the nodes, and the rate; what it writes passes verify on the same robot."""
     out = running.with_name("imported.yaml")
@@ -68,39 +60,6 @@ def test_what_is_imported_of_a_running_robot_is_as_expected_on_it(running: Path)
         assert "2 of 2" in tfcompose("verify", str(out), "--live", "--for", str(seconds))
 
     at_last(is_imported)
-
-
-def test_a_second_publisher_and_a_strange_frame_are_reported(running: Path) -> None:
-    def are_reported(seconds: float) -> None:
-        output = tfcompose(
-            "verify", str(running), "--for", str(seconds), "--format", "json", code=1
-        )
-        found = {one["code"]: one["message"] for one in json.loads(output)}
-        assert set(found) == {"TF801", "TF803"}
-        assert all(
-            name in found["TF801"]
-            for name in ("odom → base_link", "/rogue", "drive (/rover/drive)")
-        )
-        assert all(name in found["TF803"] for name in ("laser → tag_1", "/tags"))
-
-    with (
-        sending("rogue", "odom", "base_link", rate=20),
-        sending("tags", "laser", "tag_1", rate=20),
-    ):
-        at_last(are_reported)
-
-
-def test_a_plan_that_changed_after_the_start_is_reported(running: Path) -> None:
-    plan = read_plan(running.read_text(), str(running))
-    moved = replace(plan.edges[1], pose=Pose((0.0, 0.012, 0.3)))
-    running.write_text(write_plan(replace(plan, edges=(plan.edges[0], moved))))
-
-    def is_reported(seconds: float) -> None:
-        output = tfcompose("verify", str(running), "--for", str(seconds), code=1)
-        (line,) = [line for line in output.splitlines() if "error[TF846]" in line]
-        assert all(name in line for name in ("laser", "base_link", "/rover/static", "12 mm"))
-
-    at_last(is_reported)
 
 
 def test_the_live_tree_names_nodes_and_what_is_unexpected(running: Path) -> None:
@@ -138,11 +97,3 @@ def test_of_a_robot_without_edges_nothing_is_missing_where_nothing_is_sent(tmp_p
     robot = tmp_path / "robot.yaml"
     robot.write_text("tfcompose: 1\nrobot: post\nframes: {base_link: {}}\n")
     assert "0 of 0" in tfcompose("verify", str(robot), "--for", "0.1")
-
-
-@pytest.mark.usefixtures("domain")
-def test_where_nothing_runs_verify_says_so_with_exit_code_1(
-    write: Callable[..., Path], edge: Callable[..., PlanEdge]
-) -> None:
-    plan = write([edge("base_link laser")], PlanProcess("static", "static"))
-    tfcompose("verify", str(plan), "--for", "0.5", code=1)

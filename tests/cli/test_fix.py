@@ -316,7 +316,7 @@ def slipped(draw: st.DrawFn) -> str:
 
 
 @given(slipped() | st.sampled_from([HEAD + before for before, _ in EXAMPLES.values()]))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_the_second_time_there_is_nothing_to_fix_and_the_first_time_brings_nothing_new(
     text: str,
 ) -> None:

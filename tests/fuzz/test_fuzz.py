@@ -109,7 +109,7 @@ def mutated(draw: st.DrawFn) -> str:
 
 
 @given(mutated(), st.sampled_from([(), ("demo",)]))
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_any_change_of_the_example_robots_gives_findings_or_a_robot(
     text: str, profiles: tuple[str, ...]
 ) -> None:
@@ -154,7 +154,7 @@ def test_a_plan_that_was_built_is_read(text: str) -> None:
 
 
 @given(replaced(PLANS))
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_any_change_of_a_plan_is_read_or_refused(data: Any) -> None:
     try:
         read_plan(json.dumps(data), "plan.json")
@@ -205,7 +205,7 @@ SECTIONS = [
         st.dictionaries(st.text(max_size=3), values, max_size=3) | values,
     )
 )
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_any_data_in_the_sections_gives_findings_or_a_robot(data: dict[str, Any]) -> None:
     settle(
         json.dumps({"tfcompose": 1, "robot": "r", **data}, ensure_ascii=False).replace(

@@ -108,10 +108,10 @@ print("done")
 """  # noqa: E501 (a text as its reader has it)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_robot_of_many_files_survives_damage_to_any_of_them(seed: int, tmp_path: Path) -> None:
     script = tmp_path / "work.py"
     script.write_text(WORK, encoding="utf-8")
-    command = [sys.executable, str(script), str(seed), "150"]
+    command = [sys.executable, str(script), str(seed), "80"]
     done = processes.run(command, cwd=ROOT, timeout_s=300)
     assert done.stdout.endswith("done\n"), done.stdout[-3000:] + done.stderr[-3000:]

@@ -175,7 +175,7 @@ def matrix_of(edge: dict[str, Any]) -> Any:
 
 
 @given(robots())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_the_urdf_holds_every_edge_below_base_with_its_pose_type_and_limits(
     given: tuple[Any, list[Wanted]],
 ) -> None:
@@ -202,7 +202,7 @@ def test_the_urdf_holds_every_edge_below_base_with_its_pose_type_and_limits(
 
 
 @given(robots())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_the_plan_holds_every_edge_once_with_its_pose_and_owner(
     given: tuple[Any, list[Wanted]],
 ) -> None:

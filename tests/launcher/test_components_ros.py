@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import sys
-import threading
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -226,93 +225,6 @@ def test_a_component_that_cannot_be_loaded_is_named_with_the_containers_words(
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_component_is_tried_again_until_its_constructor_succeeds(
-    tmp_path: Path, stand_in: Path
-) -> None:
-    broken = stand_in.with_name("BROKEN")
-    broken.touch()
-
-    def mend(notices: list[Notice]) -> bool:
-        if "backoff" in states(notices, "rectify"):
-            broken.unlink()
-        return not broken.exists()
-
-    restart = "container: box\n    restart: on-failure\n    restart_delay: 0.3 s\n"
-    notices = run(tmp_path, ROBOT.replace("container: box\n", restart), mend, are_ready)
-    assert states(notices, "rectify")[:4] == ["starting", "backoff", "starting", "running"]
-    assert found(notices) == []
-
-
-@pytest.mark.usefixtures("domain")
-def test_a_component_that_takes_its_time_is_loaded_once_and_another_container_does_not_wait(
-    tmp_path: Path, stand_in: Path
-) -> None:
-    other = "  other: {component: demo/demo::Empty, container: second}\n"
-    text = (
-        ROBOT.replace("demo::Empty", "demo::Slow").replace(
-            "containers: {", "containers: {second: {}, "
-        )
-        + other
-    )
-    notices = run(tmp_path, text, are_ready)
-    plugins = [one["plugin"] for one in requested(stand_in)]
-    assert sorted(plugins) == ["demo/demo::Empty", "drive/demo::Moving", "image_proc/demo::Slow"]
-    running = [
-        one.process for one in notices if isinstance(one, ProcessState) and one.state == "running"
-    ]
-    assert running.index("other") < running.index("rectify") < running.index("odometry")
-
-
-def run_and_kill(folder: Path, log: Path, name: str) -> list[Notice]:
-    """Run a robot with a slow component, and kill a process once its load was requested."""
-    given: list[list[Notice]] = []
-
-    def kill() -> None:
-        until(partial(has_requests, log, 1))
-        states = [
-            one
-            for one in given[0]
-            if isinstance(one, ProcessState) and one.process == name and one.pid
-        ]
-        os.kill(states[-1].pid or 0, SIGKILL)
-
-    def begin(notices: list[Notice]) -> bool:
-        given.append(notices)
-        return True
-
-    killer = threading.Thread(target=kill)
-    killer.start()
-    try:
-        return run(folder, ROBOT.replace("demo::Empty", "demo::Slow"), begin, are_ready)
-    finally:
-        killer.join()
-
-
-@pytest.mark.usefixtures("domain")
-def test_a_container_that_is_killed_in_the_middle_of_a_load_comes_back_with_all(
-    tmp_path: Path, stand_in: Path
-) -> None:
-    notices = run_and_kill(tmp_path, stand_in, "box")
-    plugins = ["image_proc/demo::Slow", "drive/demo::Moving"]
-    assert [one["plugin"] for one in requested(stand_in)] == [plugins[0], *plugins]
-    for name in ("rectify", "odometry"):
-        assert states(notices, name) == ["starting", "stopped", "starting", "running"]
-    assert found(notices) == []
-
-
-@pytest.mark.usefixtures("domain")
-def test_a_guard_that_is_killed_in_the_middle_of_a_load_has_nothing_loaded_twice(
-    tmp_path: Path, stand_in: Path
-) -> None:
-    notices = run_and_kill(tmp_path, stand_in, "guard")
-    assert [one["plugin"] for one in requested(stand_in)] == [
-        "image_proc/demo::Slow",
-        "drive/demo::Moving",
-    ]
-    assert [one.code for one in found(notices)] == ["TF808"], "of the guard"
-
-
-@pytest.mark.usefixtures("domain")
 def test_who_sends_the_edge_of_a_component_is_named(tmp_path: Path, stand_in: Path) -> None:
     fakes = FakeNodes()
 
@@ -327,18 +239,6 @@ def test_who_sends_the_edge_of_a_component_is_named(tmp_path: Path, stand_in: Pa
         fakes.close()
     assert requested(stand_in)
     expect(found(notices)[0], "TF801", "/thief", "odometry", "(/robot1/odometry)")
-
-
-@pytest.mark.usefixtures("domain")
-def test_a_component_that_sends_another_ones_edge_is_named_with_its_container(
-    tmp_path: Path, stand_in: Path
-) -> None:
-    thief = (
-        "  thief: {component: d/demo::Moving, container: box, params: {edge: odom base_link}}\n"
-    )
-    notices = run(tmp_path, ROBOT + thief, has_found("TF801"))
-    assert requested(stand_in)
-    expect(found(notices)[0], "TF801", "/robot1/thief", "odometry", "thief", "box")
 
 
 def start_box() -> None:
@@ -363,30 +263,6 @@ def test_components_are_unloaded_from_a_container_that_is_external(
     notices = run(tmp_path, EXTERNAL, are_ready)
     assert [one["unloaded"] for one in requested(theirs) if "unloaded" in one] == [2, 1]
     assert found(notices) == []
-
-
-def test_components_come_back_with_an_external_container_that_somebody_starts_again(
-    tmp_path: Path, theirs: Path
-) -> None:
-    def change(notices: list[Notice]) -> bool:
-        if are_ready(notices):
-            os.kill(requested(theirs)[-1]["pid"], SIGKILL)
-            start_box()
-        return are_ready(notices)
-
-    def are_back(notices: list[Notice]) -> bool:
-        return all(
-            states(notices, name)[-2:] == ["starting", "running"]
-            for name in ("rectify", "odometry")
-        ) and ("backoff" in states(notices, "rectify"))
-
-    restart = "container: box\n    restart: on-failure\n"
-    notices = run(tmp_path, EXTERNAL.replace("container: box\n", restart), change, are_back)
-    loads = [one["node"] for one in requested(theirs) if "node" in one]
-    assert sorted(loads) == ["/robot1/front/rectify"] * 2 + ["/robot1/odometry"] * 2
-    assert {one.code for one in found(notices)} <= {"TF804"}, (
-        "the edge of a container that died is silent"
-    )
 
 
 def test_a_component_whose_node_a_container_has_already_is_refused(

@@ -3,8 +3,7 @@
 ``python -m tests.support.stand_in_container``.
 
 It loads the plugins below, each a node of its own, one after the other as stock containers do.
-Every request goes to the file that CONTAINER_LOG names, as a line of JSON. While the file BROKEN
-beside it exists, no load succeeds; a plugin ``demo::Slow`` takes a while.
+Every request goes to the file that CONTAINER_LOG names, as a line of JSON.
 """
 
 import json
@@ -25,8 +24,7 @@ from tests.support.fake_nodes import message
 from tfcompose.tf.ros.node import TFPublisher
 
 LOG = Path(os.environ["CONTAINER_LOG"])
-PLUGINS = ("demo::Empty", "demo::Static", "demo::Moving", "demo::Slow")
-SLOW_S = 3.0
+PLUGINS = ("demo::Empty", "demo::Static", "demo::Moving")
 KEPT: list[Any] = []
 from_message: Any = Parameter.from_parameter_msg
 
@@ -54,10 +52,7 @@ class Container:
             log.write(json.dumps({"pid": os.getpid(), **fields}) + "\n")
         if request.plugin_name not in PLUGINS:
             response.error_message = "Failed to find class with the requested plugin name."
-        elif LOG.with_name("BROKEN").exists():
-            response.error_message = "Component constructor threw an exception: no device"
         else:
-            time.sleep(SLOW_S * (request.plugin_name == "demo::Slow"))
             node = component(request)
             self.last += 1
             self.loaded[self.last] = node

@@ -592,13 +592,13 @@ FORMATS: Any = st.sampled_from(
 
 
 @given(st.text() | st.binary().map(lambda data: data.decode("latin-1")), FORMATS)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_any_text_as_a_calibration_file_gives_findings_and_a_robot(text: str, form: str) -> None:
     settle(text, form)
 
 
 @given(mutated(), FORMATS)
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_any_change_of_a_calibration_file_gives_findings_and_a_robot(text: str, form: str) -> None:
     settle(text, form)
 

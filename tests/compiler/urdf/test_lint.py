@@ -432,7 +432,7 @@ def mutated(draw: st.DrawFn) -> str:
 
 
 @given(mutated() | st.text())
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_any_text_gives_findings_or_a_robot(
     tmp_path_factory: pytest.TempPathFactory, text: str
 ) -> None:

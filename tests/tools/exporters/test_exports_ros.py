@@ -248,9 +248,6 @@ def verified(folder: Path, wrong: str = "") -> str:
     ("kind", "mode", "more"),
     [
         ("systemd", "watch", ""),
-        ("systemd", "strict", ""),
-        ("systemd", "watch", ISOLATED),
-        ("compose", "watch", ""),
         ("compose", "strict", ISOLATED),
     ],
 )

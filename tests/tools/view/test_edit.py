@@ -200,7 +200,7 @@ def child_of(robot: Robot, child: str) -> str:
 
 
 @given(robots(), poses, st.sampled_from([(True, False), (False, True), (True, True)]))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_a_moved_mount_has_the_requested_pose_and_every_other_byte_stays(
     case: tuple[str, str], new: Pose, changes: tuple[bool, bool]
 ) -> None:

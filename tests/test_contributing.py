@@ -4,14 +4,30 @@ from __future__ import annotations
 
 import ast
 import re
+import struct
 
 import yaml
 
 from tests.support.house import GUIDE, ROOT, mermaid, with_drawing
 from tests.support.skips import ACCEPTED
+from tfcompose.cli.compiling import library
+from tfcompose.compiler.emit.plan import plan_of
+from tfcompose.compiler.resolve import resolve
 from tfcompose.foundation.catalogue import read_code
+from tfcompose.model.plan.file import read_plan, write_plan
+from tfcompose.spec.language import validate
+from tfcompose.spec.load import load
+from tfcompose.tf.ros.tf_codec import Transform, encode
 
 TEXT = GUIDE.read_text("utf-8")
+#: As many as the way of a mount's xyz may have.
+MOST_HANDS = 6
+MOUNT = """tfcompose: 1
+robot: r
+frames: {base_link: {}}
+sensors:
+  c: {preset: generic/lidar2d, parent: base_link, xyz: [0.2, 0, 30 cm], driver: none}
+"""
 #: What the examples would add.
 NEW = {
     "tfcompose/data/codes/TF506.md",
@@ -35,6 +51,32 @@ def test_each_function_on_the_way_of_a_file_is_there() -> None:
         assert function in {
             node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))
         }, name
+
+
+def test_a_mounts_xyz_passes_at_most_six_hands_each_to_the_next() -> None:
+    section = TEXT.partition("## The way of a mount's xyz\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (.*?) \| (`.*?`) \|$", section, re.MULTILINE)
+    assert 4 < len(rows) <= MOST_HANDS
+    modules = [re.findall(r"`tfcompose\.(\w+)\.", hands)[0] for _, hands in rows]
+    assert modules == ["spec", "spec", "compiler", "compiler", "model", "launcher"]
+
+
+def test_a_mounts_xyz_has_the_forms_of_the_way() -> None:
+    xyz = (0.2, 0.0, 0.3)
+    source = load(MOUNT, "r.yaml")
+    assert source.mapping("sensors", "c")["xyz"] == [0.2, 0, "30 cm"]
+    assert source.at(("sensors", "c", "xyz", 2)).line == MOUNT.count("\n")
+    validated = validate(source)
+    assert validated.spec.sensors["c"].xyz == xyz
+    draft, _ = resolve(validated, library())
+    (edge,) = [edge for edge in draft.robot.edges if edge.given]
+    assert edge.pose.xyz == xyz
+    plan = read_plan(write_plan(plan_of(draft.robot)), "plan.json")
+    (planned,) = [planned for planned in plan.edges if planned.child == edge.child]
+    assert planned.pose.xyz == xyz
+    pose = planned.pose
+    sent = encode([Transform(0, planned.parent, planned.child, pose.xyz, pose.quat_xyzw)])
+    assert struct.pack("<3d", *xyz) in sent
 
 
 def test_each_file_that_it_names_is_there() -> None:

@@ -91,17 +91,17 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
         )
     except RejectedError as error:
         return Compiled(None, error.findings)
-    resolved = resolve(validated, library, read, disk)
-    source, parts = validated.source, resolved.collected
-    found = without_duplicates([*validated.found, *resolved.found, *_checked(resolved.robot)])
+    draft, unresolved = resolve(validated, library, read, disk)
+    source, parts, robot = validated.source, draft.collected, draft.robot
+    found = without_duplicates([*validated.found, *unresolved, *_checked(robot)])
     rules = {
         word: (level, source.at_key(("rules", word)))
-        for word, level in levels_of(validated, resolved.robot.limits)
+        for word, level in levels_of(validated, robot.limits)
     }
     sources = (source, *parts.sources)
     kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
-    ordered = sorted(kept, key=lambda one: one.sort_key)
-    return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), sources)
+    ordered = tuple(sorted(kept, key=lambda one: one.sort_key))
+    return Compiled(robot, ordered, source.allows, frozenset(used), sources)
 
 
 def _checked(robot: Robot) -> list[Finding]:

@@ -7,7 +7,6 @@ What cannot be resolved is a finding, and the robot goes on without it.
 
 from tfcompose.compiler.resolve.presets import Library
 from tfcompose.compiler.resolve.resolve import resolve
-from tfcompose.compiler.resolve.resolved import Collected, Resolved
 from tfcompose.compiler.urdf.packages import Disk
 
-__all__ = ["Collected", "Disk", "Library", "Resolved", "resolve"]
+__all__ = ["Disk", "Library", "resolve"]

@@ -18,7 +18,7 @@ from tfcompose.model.robot.hardware import Block, Component, Hardware, Interface
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from tfcompose.model.robot import Robot
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.spec.language.robot import ComponentSpec, HardwareSpec, RobotSpec
     from tfcompose.spec.load import Path
 
@@ -40,20 +40,31 @@ class _Known(Collection[str]):
         return len(self.names)
 
 
-def with_blocks(robot: Robot, spec: RobotSpec) -> tuple[Robot, list[Finding]]:
-    """Return the robot with its hardware and raw blocks."""
+def take_blocks(draft: Draft) -> Iterator[Finding]:
+    """Take the hardware and the raw blocks of the file, before those of parts."""
+    robot, spec = draft.robot, draft.spec
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
     hardware = tuple(
         _hardware(name, declared, spec) for name, declared in spec.ros2_control.items()
     )
+    yield from unknown_joints(hardware, _Known(moving, robot.excuses))
     children = {edge.child for edge in robot.edges}
     frames = [frame for frame in robot.frames if frame in robot.links or frame in children]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
-    blocks, found = _blocks_of(spec, _Known(frames, robot.excuses), _Known(joints, robot.excuses))
-    found += unknown_joints(hardware, _Known(moving, robot.excuses))
-    return (
-        replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)),
-        found,
+    known = (_Known(frames, robot.excuses), _Known(joints, robot.excuses))
+    blocks = []
+    for name, text in spec.xml.items():
+        at: Path = ("xml", name)
+        try:
+            root = read_block(text, spec.spans.file)
+            findings = [*faults_of(root, *known), *unexpanded(text, spec.spans.file)]
+            blocks.append(Block(name, spec.at(at), text))
+        except RejectedError as error:
+            findings = [*error.findings]
+        for found in findings:
+            yield replace(found, span=_in_file(found.span, text, spec, at))
+    draft.robot = replace(
+        robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)
     )
 
 
@@ -84,30 +95,6 @@ def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component
     return Component(
         kind, name, at, command=tuple(command), state=tuple(state), params=spec.params
     )
-
-
-def _blocks_of(
-    spec: RobotSpec, frames: Collection[str], joints: Collection[str]
-) -> tuple[tuple[Block, ...], list[Finding]]:
-    """Return the raw blocks, and what is wrong with them.
-
-    ``joints`` are the names of all joints of the robot.
-    """
-    found: list[Finding] = []
-    blocks = []
-    for name, text in spec.xml.items():
-        at: Path = ("xml", name)
-        try:
-            root = read_block(text, spec.spans.file)
-        except RejectedError as error:
-            found += [
-                replace(one, span=_in_file(one.span, text, spec, at)) for one in error.findings
-            ]
-            continue
-        blocks.append(Block(name, spec.at(at), text))
-        for one in (*faults_of(root, frames, joints), *unexpanded(text, spec.spans.file)):
-            found.append(replace(one, span=_in_file(one.span, text, spec, at)))
-    return tuple(blocks), found
 
 
 def _in_file(span: Span | None, text: str, spec: RobotSpec, at: Path) -> Span:

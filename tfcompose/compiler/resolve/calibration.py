@@ -9,8 +9,9 @@ at the place in the robot file, with a note into the calibration file.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from tfcompose.compiler.resolve.poses import group_of, place_of
 from tfcompose.foundation.findings import (
     Finding,
     Note,
@@ -22,38 +23,32 @@ from tfcompose.foundation.findings import (
 )
 from tfcompose.model.robot import Calibration
 from tfcompose.spec.language.calibration import CalibrationFile, read_calibration, unreadable
-from tfcompose.spec.language.pose import ROTATIONS, CalibrationLimit, CalibrationSpec, MountKeys
+from tfcompose.spec.language.pose import CalibrationLimit, CalibrationSpec, MountKeys
 from tfcompose.spec.load import path_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
-    from tfcompose.compiler.resolve.poses import Draft
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.spec.language.calibration import Entry
-    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Path
 
     Reader = Callable[[str], str]
 
-_MEASURABLE = frozenset({"frames", "links", "sensors", "parts"})
 _DEFAULT_LIMIT = CalibrationLimit()
 
 
-def calibrated(
-    drafts: Sequence[Draft],
-    frames: Collection[str],
-    spec: RobotSpec,
-    read: Reader | None,
-) -> tuple[list[Draft], list[Finding]]:
-    """Return the drafts with measured calibrations, and what is wrong with calibrations."""
-    work = _Work(_Files(read), frozenset(frames), spec)
-    for draft in drafts:
-        if draft.group:
-            work.inside.setdefault(draft.group, set()).add(draft.edge.child)
-    result = [work.own(draft) for draft in drafts]
-    for index, name in enumerate(spec.calibrations):
-        path = ("calibrations", index)
-        result = work.apply(name, spec.at(path), result)
-    return result, [*work.files.found, *work.found]
+def measure(draft: Draft) -> Iterator[Finding]:
+    """Give mounts the poses of calibrations, which ``solve_poses`` makes those of their edges."""
+    work = _Work(draft, _Files(draft.read))
+    for edge in draft.edges:
+        if group := group_of(edge):
+            work.inside.setdefault(group, set()).add(edge.child)
+    for index in draft.keys:
+        work.measure(index)
+    for position, name in enumerate(draft.spec.calibrations):
+        work.apply(name, draft.spec.at(("calibrations", position)))
+    yield from (*work.files.found, *work.found)
 
 
 @dataclass(slots=True)
@@ -121,32 +116,36 @@ def _matches(
 
 @dataclass(slots=True)
 class _Work:
+    draft: Draft
     files: _Files
-    frames: frozenset[str]
-    spec: RobotSpec
     found: list[Finding] = field(default_factory=list)
     used: set[int] = field(default_factory=set)
-    inside: dict[tuple[str, str], set[str]] = field(default_factory=dict)
+    inside: dict[Path, set[str]] = field(default_factory=dict)
 
-    def own(self, draft: Draft) -> Draft:
-        """Return the draft with what its own ``calibration`` says."""
-        declared = _declared(draft, self.spec)
+    def measure(self, index: int) -> None:
+        """Apply an edge's own ``calibration``."""
+        edge, keys = self.draft.edges[index], self.draft.keys[index]
+        declared = keys.calibration if isinstance(keys, MountKeys) else None
         if declared is None:
-            return draft
-        at = self.spec.at((*draft.at, "calibration", "file"))
+            return
+        at = self.draft.spec.at((*edge.entry, "calibration", "file"))
         file = self.files.get(declared.file, at, declared.format)
-        match = self._pick(draft, declared, file, at)
-        return self._measured(draft, match, file, declared, at) if match else draft
+        match = self._pick(index, declared, file, at)
+        if match:
+            self._take(index, match, file, declared, at)
 
-    def _around(self, draft: Draft) -> tuple[set[str], set[str]]:
+    def _around(self, index: int) -> tuple[set[str], set[str]]:
         """Return the frame names that the edge's parent and child can have in its entry."""
-        inside = self.inside[draft.group] if draft.group else {draft.edge.child}
-        return {draft.edge.parent, draft.relative_to or draft.edge.parent}, inside
+        edge = self.draft.edges[index]
+        relative_to = self.draft.keys[index].relative_to
+        return {edge.parent, relative_to or edge.parent}, self.inside.get(
+            group_of(edge), {edge.child}
+        )
 
     def _pick(
-        self, draft: Draft, declared: CalibrationSpec, file: CalibrationFile, at: Span
+        self, index: int, declared: CalibrationSpec, file: CalibrationFile, at: Span
     ) -> _Match | None:
-        own_parents, inside = self._around(draft)
+        own_parents, inside = self._around(index)
         nameless = [one for one in file.entries if one.parent is None]
         if nameless:
             return _Match(
@@ -156,21 +155,22 @@ class _Work:
         children = _alias(declared.child) if declared.child else inside
         matches = _matches(file.entries, parents, children)
         if not matches and not file.found:
-            self._missing(declared, file, at, draft)
+            self._missing(declared, file, at, index)
         if len(matches) > 1:
             self._ambiguous(
-                f"{draft.edge.name}: {len(matches)} entries of {file.file} fit", at, matches
+                f"{self.draft.edges[index].name}: {len(matches)} entries of {file.file} fit",
+                at,
+                matches,
             )
             return None
         return matches[0] if matches else None
 
     def _missing(
-        self, declared: CalibrationSpec, file: CalibrationFile, at: Span, draft: Draft
+        self, declared: CalibrationSpec, file: CalibrationFile, at: Span, index: int
     ) -> None:
-        child, parent = (
-            declared.child or draft.place or draft.edge.child,
-            declared.parent or draft.edge.parent,
-        )
+        edge = self.draft.edges[index]
+        child = declared.child or place_of(self.draft.keys[index]) or edge.child
+        parent = declared.parent or edge.parent
         names = [name for entry in file.entries for name in (entry.child, entry.parent) if name]
         near = next(
             (
@@ -202,15 +202,17 @@ class _Work:
         )
         self.found.append(finding("TF613", message, at, help=advice, notes=notes))
 
-    def _measured(
+    def _take(
         self,
-        draft: Draft,
+        index: int,
         match: _Match,
         file: CalibrationFile,
         declared: CalibrationSpec | None,
         at: Span,
-    ) -> Draft:
+    ) -> None:
+        """Give the edge what an entry says."""
         self.used.add(id(match.entry))
+        edge, keys, frames = self.draft.edges[index], self.draft.keys[index], self.draft.frames
         parent, child = match.names
         if parent is None and declared:
             parent, child = (
@@ -221,12 +223,8 @@ class _Work:
         limit = declared.limit if declared else _DEFAULT_LIMIT
         pose = match.entry.pose.inverse() if match.inverted else match.entry.pose
         calibration = Calibration(
-            parent=(
-                parent
-                if parent in self.frames and parent
-                else draft.relative_to or draft.edge.parent
-            ),
-            child=child if child in self.frames and child else draft.place or draft.edge.child,
+            parent=(parent if parent in frames and parent else keys.relative_to or edge.parent),
+            child=child if child in frames and child else place_of(keys) or edge.child,
             pose=pose,
             entry=match.entry.pose,
             at=match.entry.at,
@@ -236,82 +234,63 @@ class _Work:
             limit_rad=limit.rot,
             inverted=match.inverted,
         )
-        return replace(draft, measured=calibration, has_nominal=_has_pose(draft, self.spec))
+        self.draft.edges[index] = replace(edge, calibration=calibration)
 
-    def apply(self, named: str, at: Span, drafts: list[Draft]) -> list[Draft]:
-        """Return the drafts with every entry of a file applied.
-
-        One that nothing takes is a finding.
-        """
+    def apply(self, named: str, at: Span) -> None:
+        """Apply every entry of a file; one that nothing takes is a finding."""
         file = self.files.get(named, at)
-        result = []
-        for draft in drafts:
-            matches = self._fitting(draft, file)
-            if len(matches) > 1:
-                self._ambiguous(
-                    f"{draft.edge.name}: {len(matches)} entries of {file.file} fit", at, matches
-                )
-                self.used.update(id(match.entry) for match in matches)
-            elif matches and draft.measured:
-                notes = [
-                    Note("the other one", draft.measured.at),
-                    Note("this one", matches[0].entry.at),
-                ]
-                message = (
-                    f"{draft.edge.name} is measured twice: by {draft.measured.at.file} and by"
-                    f" {file.file}"
-                )
-                if matches[0].entry.at != draft.measured.at:
-                    self.found.append(
-                        finding("TF613", message, at, help="keep one of them", notes=notes)
-                    )
-                self.used.add(id(matches[0].entry))
-            one = matches[0] if len(matches) == 1 and not draft.measured else None
-            result.append(self._measured(draft, one, file, None, at) if one else draft)
+        for index in self.draft.keys:
+            self._apply_to(index, file, at)
         self._unused(file, at)
-        return result
 
-    def _fitting(self, draft: Draft, file: CalibrationFile) -> list[_Match]:
-        if not draft.at or draft.at[0] not in _MEASURABLE or not draft.edge.given:
+    def _apply_to(self, index: int, file: CalibrationFile, at: Span) -> None:
+        edge, matches = self.draft.edges[index], self._fitting(index, file)
+        measured = edge.calibration
+        if len(matches) > 1:
+            self._ambiguous(f"{edge.name}: {len(matches)} entries of {file.file} fit", at, matches)
+            self.used.update(id(match.entry) for match in matches)
+        elif matches and measured:
+            notes = [Note("the other one", measured.at), Note("this one", matches[0].entry.at)]
+            message = f"{edge.name} is measured twice: by {measured.at.file} and by {file.file}"
+            if matches[0].entry.at != measured.at:
+                self.found.append(
+                    finding("TF613", message, at, help="keep one of them", notes=notes)
+                )
+            self.used.add(id(matches[0].entry))
+        elif matches:
+            self._take(index, matches[0], file, None, at)
+
+    def _fitting(self, index: int, file: CalibrationFile) -> list[_Match]:
+        if not isinstance(self.draft.keys[index], MountKeys):
             return []
-        own, inside = self._around(draft)
+        own, inside = self._around(index)
         elsewhere = [
-            one for one in file.entries if one.parent in self.frames and one.parent not in inside
+            entry
+            for entry in file.entries
+            if entry.parent in self.draft.frames and entry.parent not in inside
         ]
         return _matches(file.entries, own, inside) or [
-            _Match(one, inverted=False) for one in elsewhere if one.child in inside
+            _Match(entry, inverted=False) for entry in elsewhere if entry.child in inside
         ]
 
     def _unused(self, file: CalibrationFile, at: Span) -> None:
         for entry in file.entries:
-            if id(entry) in self.used or self.spec.spans.is_variant:  # the file alone may use it
+            if (
+                id(entry) in self.used or self.draft.spec.spans.is_variant
+            ):  # the file alone may use it
                 continue
             advice = (
                 "calibration: beside the mount takes it"
                 if entry.child is None
                 else "no such mount: remove it"
             )
-            if entry.child is not None and entry.child not in self.frames:
-                advice = did_you_mean(entry.child, self.frames, advice)
+            if entry.child is not None and entry.child not in self.draft.frames:
+                advice = did_you_mean(entry.child, self.draft.frames, advice)
             message = f"{file.file}: no mount uses {entry.name}"
             note = Note("defined here", entry.at)
             self.found.append(finding("TF619", message, at, help=advice, notes=[note]))
 
 
-def _declared(draft: Draft, spec: RobotSpec) -> CalibrationSpec | None:
-    if not draft.at or draft.at[0] not in _MEASURABLE:
-        return None
-    section: dict[str, Any] = getattr(spec, str(draft.at[0]))
-    found: CalibrationSpec | None = section[str(draft.at[1])].calibration
-    return found
-
-
 def _alias(name: str) -> set[str]:
     """Return the name, and what Kalibr's results call the IMU that its input calls imu0."""
     return {name, "imu"} if name == "imu0" else {name}
-
-
-def _has_pose(draft: Draft, spec: RobotSpec) -> bool:
-    section, name = draft.at
-    entry: MountKeys = getattr(spec, str(section))[name]
-    return bool((ROTATIONS | {"xyz"}) & entry.model_fields_set)

@@ -19,21 +19,30 @@ from tfcompose.model.plan import switch_text
 from tfcompose.model.robot import BUILT_IN, Claim, Edge, Node, Process
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.model.robot import Edge, Robot
     from tfcompose.spec.language.node_preset import ClaimSpec, NodePresetSpec
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path
 
 
-def settled(robot: Robot, spec: RobotSpec) -> tuple[Robot, list[Finding]]:
-    """Return the robot with claims settled by parameters, and claims that cannot be settled."""
-    work = _Work(robot, spec)
+def settle_claims(draft: Draft) -> Iterator[Finding]:
+    """Settle claims by parameters, and yield those that cannot be settled."""
+    robot = draft.robot
+    if not any(
+        declared.nodes or declared.publishes or (declared.node and declared.node.preset)
+        for declared in draft.spec.processes.values()
+    ):
+        return
+    work = _Work(robot, draft.spec)
     processes = tuple(work.process(process) for process in robot.processes)
     edges = tuple(work.edge(edge) for edge in robot.edges)
-    return (
-        replace(robot, processes=processes, edges=edges, claims=(*robot.claims, *work.claims)),
-        work.found,
+    draft.robot = replace(
+        robot, processes=processes, edges=edges, claims=(*robot.claims, *work.claims)
     )
+    yield from work.found
 
 
 @dataclass(slots=True)
@@ -75,9 +84,9 @@ class _Work:
         if owner is None or owner.name in BUILT_IN or owner.name not in self.spec.processes:
             return edge
         at = edge.owner_at or edge.at
+        entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
         if owner.name in self.known and owner.kind != "simulate":
             message = f"{owner.name} is not known to publish {edge.name}"
-            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
             advice = (
                 f"if it does, add {entry} to {owner.name}; off can name the parameter that"
                 " stops it"
@@ -88,7 +97,6 @@ class _Work:
                 f"{owner.name} has {len(owner.nodes)} nodes, and none is known to publish"
                 f" {edge.name}"
             )
-            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: none}}]"
             advice = f"add to the node that does: {entry}"
             self.found.append(finding("TF332", message, at, help=advice))
         return edge

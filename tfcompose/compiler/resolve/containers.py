@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.compiler.resolve.processes import full_name, how, namespace_of
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.model.plan import Component, Ready
@@ -23,8 +24,8 @@ from tfcompose.model.robot import Node, Process
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.model.plan import ProcessKind, StartCondition
-    from tfcompose.spec.language import Validated
     from tfcompose.spec.language.process import ContainerSpec, Started
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path
@@ -38,9 +39,8 @@ _PROGRAMS = {
 }
 
 
-def container_process(name: str, declared: ContainerSpec, validated: Validated) -> Process:
+def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Process:
     """Return the process of a container; it is ready when it can load."""
-    spec = validated.spec
     at: Path = ("containers", name)
     namespace = namespace_of(declared, spec.ros.namespace)
     node = Node(full_name(namespace, declared.node or name), spec.at_key(at), at, declared.params)
@@ -81,17 +81,18 @@ def component_process(process: Process, declared: Started, spec: RobotSpec) -> P
     )
 
 
-def component_findings(path: Path, process: Process, validated: Validated) -> Iterator[Finding]:
-    """Yield what is wrong with a component, whose keys are at the path.
+def check_components(draft: Draft) -> Iterator[Finding]:
+    """Yield what is wrong with components: no such container, and what they cannot have."""
+    for process in draft.robot.processes:
+        if process.component:
+            yield from _check_component(process, process.component, draft)
 
-    No such container, and what it cannot have.
-    """
-    spec = validated.spec
-    component = process.component
-    if component is None:
-        return
+
+def _check_component(process: Process, component: Component, draft: Draft) -> Iterator[Finding]:
+    spec = draft.spec
+    path = entry_of(process, spec)
     name, known = component.container, spec.containers
-    if name not in known and ("containers", name) not in validated.broken:
+    if name not in known and ("containers", name) not in draft.validated.broken:
         otherwise = f"containers: {{{name}: {{}}}}"
         if any(name in section for section in (spec.processes, spec.sensors)):
             otherwise = (

@@ -7,11 +7,11 @@ to know.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.compiler.resolve.poses import Draft, pose_of
+from tfcompose.compiler.resolve.bodies import Bodies
+from tfcompose.compiler.resolve.poses import place_of, pose_of
 from tfcompose.foundation.findings import Edit, Finding, Note, Span, finding
 from tfcompose.foundation.geometry import norm
 from tfcompose.foundation.units import WithUnit, quantity
@@ -22,221 +22,117 @@ from tfcompose.model.robot import (
     Edge,
     Joint,
     Limit,
-    Link,
-    MountedSensor,
-    Process,
     SourceNumbers,
     is_optical,
 )
+from tfcompose.spec.language.robot import JointSpec
 from tfcompose.spec.language.spec import Spec
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-    from tfcompose.compiler.resolve.bodies import Bodies
-    from tfcompose.compiler.resolve.part import Joined
-    from tfcompose.compiler.resolve.presets import Sensor
+    from tfcompose.compiler.resolve.draft import Draft, Finds
     from tfcompose.model.plan import EdgeKind
-    from tfcompose.spec.language import Validated
     from tfcompose.spec.language.pose import EdgeKeys
-    from tfcompose.spec.language.robot import JointSpec, RobotSpec
+    from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path, Spans
 
 
-@dataclass(slots=True)
-class Drafts:
-    """What is known of a robot while it is resolved."""
+def add_frames(draft: Draft) -> Iterator[Finding]:
+    """Take the bare frames; one without a parent is a root, said so."""
+    for name, frame in draft.spec.frames.items():
+        at = ("frames", name)
+        draft.frames.setdefault(name, draft.spec.at_key(at))
+        yield from add_edge(draft, at, name, frame, joint_name=frame.joint)
 
-    validated: Validated
-    simulated: frozenset[str]
-    bodies: Bodies
-    frames: dict[str, Span] = field(default_factory=dict)
-    joints: dict[str, Span] = field(default_factory=dict)
-    edges: list[Draft] = field(default_factory=list)
-    links: dict[str, Link] = field(default_factory=dict)
-    drivers: list[Process] = field(default_factory=list)
-    sensors: list[MountedSensor] = field(default_factory=list)
-    found: list[Finding] = field(default_factory=list)
 
-    @property
-    def spec(self) -> RobotSpec:
-        """What the user wrote."""
-        return self.validated.spec
+def add_links(draft: Draft) -> Iterator[Finding]:
+    """Take the bodies; one with a parent has a fixed edge."""
+    bodies = Bodies(draft.spec, draft.packages)
+    for name, link in draft.spec.links.items():
+        at = ("links", name)
+        draft.frames.setdefault(name, draft.spec.at_key(at))
+        draft.links[name] = bodies.link(name, link)
+        yield from add_edge(draft, at, name, link, joint_name=link.joint)
+    yield from bodies.found
 
-    def add_frames(self) -> None:
-        """Take the bare frames; one without a parent is a root, said so."""
-        for name, frame in self.spec.frames.items():
-            self.frames.setdefault(name, self.spec.at_key(("frames", name)))
-            if frame.parent is not None:
-                self.add(("frames", name), frame.parent, name, frame, joint_name=frame.joint)
 
-    def add_links(self) -> None:
-        """Take the bodies; one with a parent has a fixed edge."""
-        for name, link in self.spec.links.items():
-            at = self.spec.at_key(("links", name))
-            self.frames.setdefault(name, at)
-            self.links[name] = self.bodies.link(name, link)
-            if link.parent is not None:
-                self.add(("links", name), link.parent, name, link, joint_name=link.joint)
+def add_joints(draft: Draft) -> Iterator[Finding]:
+    """Take the edges between bodies."""
+    for name, joint in draft.spec.joints.items():
+        yield from _idle_joint_keys(name, joint, draft.spec)
+        yield from add_edge(draft, ("joints", name), joint.child, joint, joint_name=name)
 
-    def add_joints(self) -> None:
-        """Take the edges between bodies."""
-        for name, joint in self.spec.joints.items():
-            moving = joint_of(name, joint, self.spec)
-            self.found += idle_joint_keys(name, joint, self.spec)
-            self.add(
-                ("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name
-            )
 
-    def add_part(self, part: Joined) -> bool:
-        """Take a part: its frames, edges and bodies under their new names, and its mount edge.
+def add_edge(  # noqa: PLR0913 (an edge has that many parts)
+    draft: Draft,
+    at: Path,
+    child: str,
+    keys: EdgeKeys,
+    *,
+    joint_name: str | None,
+    sensor: str | None = None,
+    owner: str | None = None,
+) -> Iterator[Finding]:
+    """Take the edge that is written at a place; a sensor's and a part's is its mount.
 
-        Return False, and take nothing, if it brings names that are there already.
-        """
-        robot, at = part.robot, ("parts", part.name)
-        hanging = {edge.child for edge in robot.edges}
-        free = part.shared | (
-            self.spec.frames.keys() - hanging
-        )  # a free root can have its edge here
-        taken = [name for name in robot.frames if name in self.frames and name not in free]
-        named = [edge for edge in robot.edges if edge.joint_name and not part.declared.is_alone]
-        joints = {edge.joint_name: edge.joint_at or edge.at for edge in named}
-        taken_joints = [name for name in joints if name in self.joints]
-        if taken:
-            self._refuse_names(taken, part)
-        elif taken_joints:
-            self._refuse("joint", taken_joints, self.joints, joints, part)
-        if taken or taken_joints:
-            return False
-        self.joints |= joints
-        for name, place in robot.frames.items():
-            self.frames.setdefault(name, place)
-        for name, link in robot.links.items():
-            self.links.setdefault(name, link)
-        keys = part.declared
-        if keys.parent is not None and part.root is not None:
-            switched = len(keys.parent) > 1  # then the part's owner is who carries it about
-            owner = keys.owner if switched else STATIC
-            self.add(
-                at,
-                keys.parent,
-                part.root,
-                keys,
-                joint_name=keys.joint,
-                owner=owner,
-                part=part.name,
-            )
-        self.edges += [
-            Draft(replace(edge, entry=(*at, *edge.entry)), part=part.name) for edge in robot.edges
-        ]
-        self.sensors += robot.sensors
-        return True
+    There is none without a parent.
+    """
+    spec = draft.spec
+    if keys.parent is None:
+        return
+    joint = _joint_of(at, keys, spec) if isinstance(keys, JointSpec) else None
+    free = joint if joint and joint.type in FREE else None
+    joint = None if free else joint
+    joint_at = yield from add_joint_name(draft, joint_name, at)
+    owner = owner or keys.owner or (JOINTS if joint else STATIC)
+    is_simulated = keys.static and any(
+        process.name == owner and process.kind == "simulate" for process in draft.all_processes
+    )
+    kind: EdgeKind = "dynamic"
+    if owner == STATIC or (keys.static and not is_simulated):
+        kind = "static"
+    if joint and owner == JOINTS:
+        kind = "joint"
+    draft.keys[len(draft.edges)] = keys
+    edge = Edge(
+        parent=keys.parent[0],
+        child=child,
+        kind=kind,
+        pose=pose_of(keys, place_of(keys) or child),
+        owner=owner,
+        at=spec.at((*at, "parent")),
+        rate=keys.rate,
+        joint=joint,
+        free=free,
+        joint_name=joint_name or "",
+        joint_at=joint_at,
+        child_at=spec.at((*at, "child")) if at[0] == "joints" else None,
+        entry=at,
+        owner_at=spec.at((*at, "owner")) if keys.owner else None,
+        sensor=sensor,
+        rate_at=spec.at((*at, "rate")) if keys.rate else None,
+        switched=keys.parent[1:],
+        optical_edits=partial(optical_edits, at, keys, spec.spans) if is_optical(child) else tuple,
+    )
+    draft.edges.append(edge)
 
-    def _refuse_names(self, taken: list[str], part: Joined) -> None:
-        first = taken[0]
-        more = f"; or ros: {{shared_frames: [{first}]}}"
-        root = (
-            not part.declared.prefix
-            and len(taken) == 1
-            and first != part.root
-            and part.declared.root is None
-        )
-        before = f"root: {first}, if the part begins there; or " if root else ""
-        self._refuse("frame", taken, self.frames, part.robot.frames, part, (before, more))
 
-    def _refuse(  # noqa: PLR0913, PLR0917 (what is taken, where, by whom, and what else could be done)
-        self,
-        kind: str,
-        taken: list[str],
-        there: Mapping[str, Span],
-        brought: Mapping[str, Span],
-        part: Joined,
-        else_: tuple[str, str] = ("", ""),
-    ) -> None:
-        first, more = taken[0], f" and {len(taken) - 1} more" if taken[1:] else ""
-        notes = [Note(f"{first} is defined here", there[first]), Note("and here", brought[first])]
-        advice = f"{else_[0]}a prefix of its own, prefix: {part.name}/{else_[1]}"
-        message = f"the part {part.name} brings the {kind} {first}{more}, which already exists"
-        place = self.spec.at_key(("parts", part.name))
-        self.found.append(finding("TF505", message, place, notes=notes, help=advice))
+def add_joint_name(draft: Draft, name: str | None, at: Path) -> Finds[Span | None]:
+    """Take the name of the joint that an entry is, or whose key ``joint`` it is.
 
-    def add(  # noqa: PLR0913 (an edge has that many parts)
-        self,
-        at: Path,
-        parents: tuple[str, ...],
-        child: str,
-        keys: EdgeKeys,
-        *,
-        joint: Joint | None = None,
-        joint_name: str | None = None,
-        sensor: Sensor | None = None,
-        owner: str | None = None,
-        part: str | None = None,
-    ) -> None:
-        """Take the edge that is written at a place; a sensor's and a part's is its mount."""
-        named_at = self.named_joint(joint_name, at) if joint_name else None
-        free = joint if joint and joint.type in FREE else None
-        joint = None if free else joint
-        owner = owner or keys.owner or (JOINTS if joint else STATIC)
-        place: str | None = getattr(keys, "place", None)
-        edge = Edge(
-            parent=parents[0],
-            child=child,
-            kind=self._kind(owner, keys, joint),
-            pose=pose_of(keys, place or child),
-            owner=owner,
-            at=self.spec.at((*at, "parent")),
-            rate=keys.rate,
-            joint=joint,
-            free=free,
-            joint_name=joint_name or "",
-            joint_at=named_at,
-            child_at=self.spec.at((*at, "child")) if at[0] == "joints" else None,
-            entry=at,
-            owner_at=self.spec.at((*at, "owner")) if keys.owner else None,
-            sensor=sensor.name if sensor else None,
-            rate_at=self.spec.at((*at, "rate")) if keys.rate else None,
-            switched=parents[1:],
-            optical_edits=(
-                partial(optical_edits, at, keys, self.spec.spans) if is_optical(child) else tuple
-            ),
-        )
-        relative_at = self.spec.at((*at, "relative_to")) if keys.relative_to else None
-        place_at = self.spec.at((*at, "place")) if place else None
-        self.edges.append(
-            Draft(
-                edge,
-                keys.relative_to,
-                relative_at,
-                place=place,
-                place_at=place_at,
-                at=at,
-                part=part,
-            )
-        )
-
-    def named_joint(self, name: str, at: Path) -> Span:
-        """Take the name of the joint that an entry is, or whose key ``joint`` it is.
-
-        Return its place.
-        """
-        place = self.spec.at_key(at) if at[0] == "joints" else self.spec.at((*at, "joint"))
-        if name in self.joints:
-            notes = [Note("the other one", self.joints[name])]
-            self.found.append(
-                finding(
-                    "TF502", f"two joints are called {name}", place, notes=notes, help="rename one"
-                )
-            )
-        self.joints.setdefault(name, place)
-        return place
-
-    def _kind(self, owner: str, keys: EdgeKeys, joint: Joint | None) -> EdgeKind:
-        if owner == STATIC:
-            return "static"
-        if joint and owner == JOINTS:
-            return "joint"
-        return "static" if keys.static and owner not in self.simulated else "dynamic"
+    Return its place, None where there is no name.
+    """
+    if not name:
+        return None
+    spec = draft.spec
+    place = spec.at_key(at) if at[0] == "joints" else spec.at((*at, "joint"))
+    if name in draft.joints:
+        notes = [Note("the other one", draft.joints[name])]
+        message = f"two joints are called {name}"
+        yield finding("TF502", message, place, notes=notes, help="rename one")
+    draft.joints.setdefault(name, place)
+    return place
 
 
 _MOVING = "revolute, continuous or prismatic"
@@ -248,7 +144,7 @@ _IDLE = {
 }
 
 
-def joint_of(name: str, declared: JointSpec, spec: RobotSpec) -> Joint | None:
+def _joint_of(at: Path, declared: JointSpec, spec: RobotSpec) -> Joint | None:
     """Return the joint with a unit axis, or None where it is fixed."""
     kind: Any = declared.type
     if kind == "fixed":
@@ -257,10 +153,10 @@ def joint_of(name: str, declared: JointSpec, spec: RobotSpec) -> Joint | None:
     x, y, z = declared.axis
     mimic = declared.mimic
     return Joint(
-        name=name,
+        name=str(at[1]),
         type=kind,
-        at=spec.at_key(("joints", name)),
-        mimic_at=spec.spans.exactly_at(("joints", name, "mimic", "joint")),
+        at=spec.at_key(at),
+        mimic_at=spec.spans.exactly_at((*at, "mimic", "joint")),
         axis=(x / length, y / length, z / length),
         limit=declared.limit,
         mimic=mimic.joint if mimic else None,
@@ -273,7 +169,7 @@ def joint_of(name: str, declared: JointSpec, spec: RobotSpec) -> Joint | None:
     )
 
 
-def idle_joint_keys(name: str, joint: JointSpec, spec: RobotSpec) -> Iterator[Finding]:
+def _idle_joint_keys(name: str, joint: JointSpec, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding where a joint has keys that joints of its type do not use."""
     at: Path = ("joints", name)
     unused = joint.model_fields_set & {*_IDLE.get(joint.type, ())}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 from tfcompose.compiler.resolve.isolation import topics_below
 from tfcompose.compiler.resolve.poses import pose_of
 from tfcompose.compiler.resolve.processes import full_name
-from tfcompose.compiler.resolve.stock import with_stock
+from tfcompose.compiler.resolve.stock import stock_faults, with_stock
 from tfcompose.compiler.urdf.blocks import read_block, with_hardware
 from tfcompose.compiler.urdf.convert import robot_of
 from tfcompose.compiler.urdf.read import read_expansion, read_xml
@@ -95,9 +95,9 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         robot, source_numbers=(), source_data={"urdf": digest}
     )  # its numbers are judged where it is linted
     own = _with_base(replace(robot, ros=part.settings, processes=_own(part)))
-    if part.declared.is_alone and part.spec.ros.state_publisher == "stock":
-        own, refused = with_stock(own)
-        found += refused
+    if part.declared.is_alone and part.spec.ros.state_publisher == "stock" and own.base:
+        found += stock_faults(own)
+        own = with_stock(own)
     return Foreign(own, files, tuple(found), implied)
 
 

@@ -10,6 +10,7 @@ from tfcompose.model.robot import Host
 if TYPE_CHECKING:
     from tfcompose.model.robot import Process
     from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Path
 
 
 def hosts_of(spec: RobotSpec) -> dict[str, Host]:
@@ -30,16 +31,16 @@ def hosts_of(spec: RobotSpec) -> dict[str, Host]:
     }
 
 
+def entry_of(process: Process, spec: RobotSpec) -> Path:
+    """Return the path of the entry that has the keys of a process."""
+    sections = (("containers", process.name), ("processes", process.name))
+    return next(filter(spec.spans.has, sections), ("sensors", process.name, "driver"))
+
+
 def with_host_place(process: Process, spec: RobotSpec) -> Process:
     """Return the process with the place of its host.
 
     A component that runs where its container does has none.
     """
-    for path in (
-        ("processes", process.name),
-        ("containers", process.name),
-        ("sensors", process.name, "driver"),
-    ):
-        if process.host is not None and spec.spans.has((*path, "host")):
-            return replace(process, host_at=spec.at((*path, "host")))
-    return process
+    host_at = spec.spans.exactly_at((*entry_of(process, spec), "host"))
+    return replace(process, host_at=host_at)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.model.plan import RosSettings, known_at_launch
 from tfcompose.model.plan.codec import narrowed
@@ -18,7 +19,9 @@ from tfcompose.spec.language.variables import CALLS
 from tfcompose.spec.load import path_named
 
 if TYPE_CHECKING:
-    from tfcompose.compiler.urdf.packages import Disk
+    from collections.abc import Iterator
+
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.model.robot import Node, Process, Robot
     from tfcompose.spec.language.robot import RobotSpec, RosSpec
     from tfcompose.spec.load import Path
@@ -45,58 +48,46 @@ def topics_below(namespace: str, isolate: str) -> dict[str, str]:
     return {topic: f"/{namespace}{topic}" for topic in TF_TOPICS} if moves else {}
 
 
-def isolate(
-    robot: Robot, spec: RobotSpec, disk: Disk | None = None
-) -> tuple[Robot, list[Finding]]:
-    """Return the robot with its processes' topics moved, and frames and files in them named.
-
-    And what is wrong.
-    """
-    found = _wrong(robot, spec)
+def isolate(draft: Draft) -> Iterator[Finding]:
+    """Move the topics of all processes, and fill in the frames and files that they name."""
+    robot, spec = draft.robot, draft.spec
+    yield from _faults(robot, spec)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
     processes = []
-    filler = _Filler(robot, spec, disk)
+    filler = _Filler(draft)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
         processes.append(filler.filled(moved))
-    return replace(robot, processes=tuple(processes)), [*found, *filler.found]
+    yield from filler.found
+    draft.robot = replace(robot, processes=tuple(processes))
 
 
-def _wrong(robot: Robot, spec: RobotSpec) -> list[Finding]:
-    found, ros = [], spec.ros
+def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
+    ros = spec.ros
     has_parts = spec.parts or any(section == "parts" for section, _ in robot.broken)
     named = robot.ros.namespace or has_parts or (ros.isolate == "frames" and ros.frame_prefix)
     if ros.isolate != "none" and not named:
         message = f"isolate: {ros.isolate} needs a namespace"
-        found.append(
-            finding("TF304", message, spec.at(("ros", "isolate")), help="ros: {namespace: robot1}")
-        )
+        advice = "ros: {namespace: robot1}"
+        yield finding("TF304", message, spec.at(("ros", "isolate")), help=advice)
     for index, frame in enumerate(ros.shared_frames):
         if frame not in robot.frames and not robot.excuses(frame):
-            place = spec.at(("ros", "shared_frames", index))
+            message = f"shared_frames: unknown frame {frame}"
             advice = did_you_mean(frame, robot.frames, "remove it")
-            found.append(
-                finding("TF203", f"shared_frames: unknown frame {frame}", place, help=advice)
-            )
-    return found
+            at = spec.at(("ros", "shared_frames", index))
+            yield finding("TF203", message, at, help=advice)
 
 
 @dataclass(slots=True)
 class _Filler:
     """Fills in processes; ``found`` is what cannot be."""
 
-    robot: Robot
-    spec: RobotSpec
-    disk: Disk | None
+    draft: Draft
     found: list[Finding] = field(default_factory=list)
 
     def filled(self, process: Process) -> Process:
         """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
-        section: Path = ("processes", process.name)
-        if self.spec.spans.has(("containers", process.name)):
-            section = ("containers", process.name)
-        elif not self.spec.spans.has(section):
-            section = ("sensors", process.name, "driver")
+        section = entry_of(process, self.draft.spec)
         done = replace(
             process,
             ros_nodes=tuple(
@@ -131,16 +122,16 @@ class _Filler:
         return self._frame(name, path) if what == "frame" else self._file(name, path)
 
     def _frame(self, frame: str, path: Path) -> str:
-        if frame not in self.robot.frames and not self.robot.excuses(frame):
-            advice = did_you_mean(frame, self.robot.frames)
-            at = self.spec.at(path)
+        if frame not in self.draft.robot.frames and not self.draft.robot.excuses(frame):
+            advice = did_you_mean(frame, self.draft.robot.frames)
+            at = self.draft.spec.at(path)
             self.found.append(
                 finding("TF203", f"${{frame({frame})}}: unknown frame {frame}", at, help=advice)
             )
-        return self.robot.final(frame)
+        return self.draft.robot.final(frame)
 
     def _file(self, name: str, path: Path) -> str:
-        at = self.spec.at(path)
+        at = self.draft.spec.at(path)
         place = path_named(name, at)
         if name.startswith("/"):
             advice = (
@@ -150,7 +141,9 @@ class _Filler:
             self.found.append(
                 finding("TF106", f"${{file({name})}} is an absolute path", at, help=advice)
             )
-        elif self.disk and not (self.disk.is_file(place) or self.disk.is_folder(place)):
+        elif self.draft.disk and not (
+            self.draft.disk.is_file(place) or self.draft.disk.is_folder(place)
+        ):
             message = f"${{file({name})}}: {place} does not exist"
             self.found.append(
                 finding("TF019", message, at, help="a path is relative to the file that writes it")
@@ -164,9 +157,9 @@ class _Filler:
         """
         if cwd is None or cwd.startswith(("/", "${")):
             return self._fill(cwd, path)  # type: ignore[no-any-return]
-        at = self.spec.at(path)
+        at = self.draft.spec.at(path)
         place = path_named(cwd, at)
-        if self.disk and not self.disk.is_folder(place):
+        if self.draft.disk and not self.draft.disk.is_folder(place):
             advice = "a path is relative to the file that writes it"
             self.found.append(
                 finding("TF019", f"cwd: the folder {place} does not exist", at, help=advice)
@@ -185,5 +178,5 @@ class _Filler:
                     " start only"
                 )
                 advice = "write it among the arguments of run"
-                place = self.spec.at((*node.path, "params", key))
+                place = self.draft.spec.at((*node.path, "params", key))
                 self.found.append(finding("TF816", message, place, help=advice))

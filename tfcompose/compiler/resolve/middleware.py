@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.compiler.resolve.processes import added, says_how
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.model.plan import Ready
@@ -23,6 +24,7 @@ from tfcompose.model.robot import GUARD, STATIC, Process
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.model.robot import Robot
     from tfcompose.spec.language.process import ProcessSpec
     from tfcompose.spec.language.robot import RobotSpec
@@ -64,7 +66,7 @@ def own_router(spec: RobotSpec) -> list[Process]:
     return [replace(process, ready=process.ready or _READY)]
 
 
-def with_router(robot: Robot) -> Robot:
+def _with_router(robot: Robot) -> Robot:
     """Return the robot whose processes start once Zenoh's router listens.
 
     The router knows where.
@@ -98,7 +100,14 @@ def _routers(robot: Robot) -> list[Process]:
     ]
 
 
-def wrong_middleware(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
+def use_middleware(draft: Draft) -> Iterator[Finding]:
+    """Let processes wait for Zenoh's router; a part's do so in the robot that holds it."""
+    if draft.holder is None:
+        yield from _faults(draft.robot, draft.spec)
+        draft.robot = _with_router(draft.robot)
+
+
+def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     """Yield what the middleware cannot do, conflicts, and hosts that do not reach the router."""
     ros = robot.ros
     if spec.ros.router and ros.rmw != "zenoh":
@@ -142,13 +151,8 @@ def _disagreeing(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
         own = process.env.get(_RMW)
         if own is None or own == wanted:
             continue
-        sections = (
-            ("processes", process.name),
-            ("containers", process.name),
-            ("sensors", process.name, "driver"),
-        )
-        paths = [(*section, "env", _RMW) for section in sections]
-        place = next((spec.at(path) for path in paths if spec.spans.has(path)), process.at)
+        path = (*entry_of(process, spec), "env", _RMW)
+        place = spec.spans.exactly_at(path) or process.at
         message = f"{process.name} is given {_RMW}={own}, and the robot has rmw: {robot.ros.rmw}"
         notes = [Note("set here", spec.at(("ros", "rmw")))]
         advice = f"remove {_RMW} from its env: {process.name} finds none of the others with it"

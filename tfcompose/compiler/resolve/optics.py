@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.foundation.findings import Finding, did_you_mean, finding
+from tfcompose.foundation.findings import did_you_mean, finding
 from tfcompose.model.robot import Optics, OpticsSource
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
+    from tfcompose.compiler.resolve.draft import Finds
     from tfcompose.compiler.resolve.presets import Sensor
     from tfcompose.model.robot import OpticsKind
     from tfcompose.spec.language.optics import OpticsSourceSpec, OpticsSpec
@@ -38,13 +39,13 @@ _REPLACES = {"elevations": ("channels", "vertical"), "channels": ("elevations",)
 
 def optics_of(
     sensor: Sensor, frames: Collection[str], renamed: Callable[[str], str], spec: RobotSpec
-) -> tuple[tuple[Optics, ...], list[Finding]]:
-    """Return the optics of the sensor's streams in ``frames``, and what is wrong with them.
+) -> Finds[tuple[Optics, ...]]:
+    """Return the optics of the sensor's streams in ``frames``.
 
     ``frames`` are the sensor's, its mount among them, before any renaming.
     """
     declared, preset = sensor.spec.optics, sensor.preset
-    made, found = [], []
+    made = []
     for stream in dict.fromkeys((*preset.optics, *declared)):
         base, own = preset.optics.get(stream), declared.get(stream)
         at = ("sensors", sensor.name, "optics", stream)
@@ -53,15 +54,13 @@ def optics_of(
             advice = f"frame: {sensor.named(preset.mount)}; {sensor.spec.preset} has "
             advice += f"the streams {', '.join(preset.optics)}" if preset.optics else "no streams"
             message = f"the stream {stream} has no frame"
-            found.append(finding("TF102", message, spec.at_key(at), help=advice))
+            yield finding("TF102", message, spec.at_key(at), help=advice)
             continue
         frame = sensor.named(pattern)
         if own and own.frame and frame not in frames:
             advice = did_you_mean(frame, frames, f"there is {', '.join(frames)}")
             place = spec.at((*at, "frame"))
-            found.append(
-                finding("TF203", f"{sensor.name} has no frame {frame}", place, help=advice)
-            )
+            yield finding("TF203", f"{sensor.name} has no frame {frame}", place, help=advice)
             continue
         if frame not in frames or not (own or base is None or sensor.holds(base.when)):
             continue
@@ -71,13 +70,13 @@ def optics_of(
         if kind is None:
             advice = "kind: camera, lidar, radar or ultrasonic"
             message = f"{preset.kind} sees nothing: the stream {stream} has no kind"
-            found.append(finding("TF102", message, spec.at_key(at), help=advice))
+            yield finding("TF102", message, spec.at_key(at), help=advice)
             continue
         place = spec.at_key(at) if own else spec.at_key(at[:2])
         values, sources = _merged(base, own, str(spec.at_key(at)))
         values.setdefault("active", kind != "camera")
         made.append(Optics(stream, renamed(frame), kind, place, sources=tuple(sources), **values))
-    return tuple(made), found
+    return tuple(made)
 
 
 def _merged(

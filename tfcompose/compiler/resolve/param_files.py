@@ -16,43 +16,38 @@ from tfcompose.spec.language.variables import OF_FILES
 from tfcompose.spec.load.params import NodeParams, ParamsFile, Word, load_params
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Sequence
+    from collections.abc import Iterator, Sequence
 
-    from tfcompose.compiler.urdf.packages import Packages
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.foundation.findings import Span
-    from tfcompose.model.robot import Node, Process, Robot
-    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.model.robot import Node, Process
 
 
-def with_param_files(
-    robot: Robot,
-    own: Container[str],
-    spec: RobotSpec,
-    read: Callable[[str], str] | None,
-    packages: Packages,
-) -> tuple[Robot, list[Finding]]:
-    """Return the robot with parameters read from files, and what is wrong with the files.
+def read_param_files(draft: Draft) -> Iterator[Finding]:
+    """Lay the parameters of processes over those in files; processes of parts have theirs.
 
-    ``own`` are the processes of the file; those of parts have theirs. A file may be in a
-    package.
+    A file may be in a package.
     """
-    work = _Work(spec, read, packages, robot.ros.namespace)
+    robot, work = draft.robot, _Work(draft)
+    names = {
+        process.name
+        for process in draft.processes
+        if any(node.params for node in process.ros_nodes)
+    }
     processes = list(robot.processes)
     for index, process in enumerate(processes):
-        if process.name in own:
+        if process.name in names:
             processes[index] = work.process(process)
     source_data = dict(robot.source_data)
     if work.digests:
         source_data["parameter files"] = work.digests
-    return replace(robot, processes=tuple(processes), source_data=source_data), work.found
+    draft.robot = replace(robot, processes=tuple(processes), source_data=source_data)
+    yield from work.found
 
 
 @dataclass(slots=True)
 class _Work:
-    spec: RobotSpec
-    read: Callable[[str], str] | None
-    packages: Packages
-    namespace: str
+    draft: Draft
     found: list[Finding] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
     _known: dict[str, ParamsFile] = field(default_factory=dict)
@@ -88,9 +83,9 @@ class _Work:
         }
         paths = {key: (*node.path, "params", key) for key in inline}
         places |= {
-            key: (self.spec.at_key(path),)
+            key: (self.draft.spec.at_key(path),)
             for key, path in paths.items()
-            if self.spec.spans.has_key(path)
+            if self.draft.spec.spans.has_key(path)
         }
         return replace(node, params=_laid_over(params, inline), places=places)
 
@@ -104,7 +99,7 @@ class _Work:
             if isinstance(named, str)
             else [(one, (*at, i)) for i, one in enumerate(named)]
         )
-        return [(file, self.spec.at(path)) for file, path in paths]
+        return [(file, self.draft.spec.at(path)) for file, path in paths]
 
     def _params_in(
         self, file: str, at: Span, node: Node, process: Process, without: list[Finding]
@@ -115,14 +110,16 @@ class _Work:
         """
         call = OF_FILES.fullmatch(file)
         try:
-            path = self.packages.path_of(call[2] if call else file, at)
+            path = self.draft.packages.path_of(call[2] if call else file, at)
         except RejectedError as error:
             self.found += error.findings
             return {}
         loaded = self._load(path, at)
         if loaded is None:
             return {}
-        namespace = self.namespace if process.namespace is None else process.namespace
+        namespace = (
+            self.draft.robot.ros.namespace if process.namespace is None else process.namespace
+        )
         meant = [one for one in loaded.nodes if matches(full_name(namespace, one.name), node.name)]
         if not meant and not loaded.found:
             without.append(_nothing(path, at, node, process, loaded.nodes))
@@ -135,11 +132,11 @@ class _Work:
         if path in self._known:
             return self._known[path]
         note = Note("named here", at)
-        if self.read is None:
+        if self.draft.read is None:
             self.found.append(finding("TF001", f"{path}: files cannot be read here", at))
             return None
         try:
-            text = self.read(path)
+            text = self.draft.read(path)
             loaded = load_params(text, path)
         except RejectedError as error:
             self.found += [replace(one, notes=(*one.notes, note)) for one in error.findings]

@@ -48,7 +48,6 @@ class PartEntry:
     declared: PartSpec
     spec: RobotSpec
     outer_prefix: str
-    is_broken: bool = False
     found: list[Finding] = field(default_factory=list)
 
     @property

@@ -7,115 +7,162 @@ names that it has in the holder.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.compiler.resolve.edges import add_edge
 from tfcompose.compiler.resolve.foreign import foreign
+from tfcompose.compiler.resolve.isolation import settings_of
 from tfcompose.compiler.resolve.part import PartEntry
-from tfcompose.compiler.resolve.resolved import Collected, Resolved
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
+from tfcompose.model.robot import STATIC
 from tfcompose.spec.language import Given, composed, load_named, validate, with_includes
 from tfcompose.spec.load import path_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.compiler.resolve.part import Joined
-    from tfcompose.compiler.resolve.presets import Library
-    from tfcompose.compiler.urdf.packages import Disk, Packages
+    from tfcompose.foundation.findings import Span
     from tfcompose.model.robot import Robot
     from tfcompose.spec.language import Validated
+    from tfcompose.spec.language.robot import RobotSpec
 
     Reader = Callable[[str], str]
+    Resolve = Callable[..., tuple[Draft, list[Finding]]]
 
 
 #: How many parts a robot may have, those of its parts counted.
 MOST_PARTS = 100
 
 
-@dataclass(slots=True)
-class Parts:
-    """Resolves the parts of one robot file, and theirs.
-
-    ``resolve`` is what resolves a robot within these ``files``.
-
-    ``environment`` is what their files may read of it.
-    """
-
-    library: Library
-    read: Reader | None
-    disk: Disk | None
-    resolve: Callable[..., Resolved]
-    environment: Mapping[str, str]
-    files: tuple[str, ...] = ()
-    collected: Collected = field(default_factory=Collected)
-    found: list[Finding] = field(default_factory=list)
-    missing: list[tuple[str, str]] = field(default_factory=list)
-
-    def join(self, validated: Validated, prefix: str, packages: Packages) -> list[Joined]:
-        """Return the parts of a robot whose own frames have the prefix.
-
-        Those that cannot be had are findings.
-        """
-        spec, joined = validated.spec, []
-        for name, declared in spec.parts.items():
-            part = PartEntry(
-                name,
-                declared,
-                spec,
-                outer_prefix=prefix,
-                is_broken=("parts", name) in validated.broken,
-            )
-            try:
-                joined.append(part.joined(*self._robot(part, packages)))
-                self.found += part.found
-            except RejectedError as error:
-                self.found += [*part.found, *error.findings]
-                self.missing += [("parts", f"{name}/"), ("parts", part.prefix)]
-        return joined
-
-    def _robot(self, part: PartEntry, packages: Packages) -> tuple[Robot, frozenset[str]]:
-        """Return the part under its own names, and the frames of its holder it attaches to."""
-        self.collected.count += 1
-        if self.read is None or self.collected.count > MOST_PARTS:
-            message = f"more than {MOST_PARTS} parts" if self.read else "files cannot be read here"
-            raise RejectedError([finding("TF008", message, part.place)])
-        if part.declared.spec is part.declared.urdf is part.declared.xacro is None:
-            raise RejectedError([])  # it was refused already
-        if part.declared.xacro is not None and part.is_broken:
-            raise RejectedError([])  # and so were arguments, which xacro would miss
+def join(draft: Draft, resolve: Resolve) -> Iterator[Finding]:
+    """Resolve the parts of a draft; one that cannot be had is a finding."""
+    spec = draft.spec
+    prefix = settings_of(spec.ros).frame_prefix
+    for name, declared in spec.parts.items():
+        part = PartEntry(name, declared, spec, outer_prefix=prefix)
         try:
-            if part.declared.spec is not None:
-                return self._resolved(part, part.declared.spec, self.read), frozenset()
-            made = foreign(part, packages, self.read)
+            draft.joined.append(part.joined(*_robot_of(part, draft, resolve)))
         except RejectedError as error:
-            raise RejectedError([_noted(one, part) for one in error.findings]) from None
-        for file in made.files:
-            self.collected.notes.setdefault(file, []).append(_note(part))
-        self.found += [_noted(one, part) for one in made.found]
-        return made.robot, made.implied
+            part.found += error.findings
+            draft.broken |= {("parts", f"{name}/"), ("parts", part.prefix)}
+        yield from part.found
+    draft.broken.update(*(part.robot.broken for part in draft.joined))
 
-    def _resolved(self, part: PartEntry, named: str, read: Reader) -> Robot:
-        at = part.spec.at((*part.at, "spec"))
-        file = path_named(named, at)
-        if file in self.files:
-            circle = " → ".join([*self.files[self.files.index(file) :], file])
-            raise RejectedError(
-                [finding("TF015", f"robots are parts of each other: {circle}", at)]
-            )
-        inside = replace(self, files=(*self.files, file), found=[], missing=[])
-        loaded = with_includes(load_named(read(file), file), read)
-        self.collected.notes.setdefault(file, []).append(_note(part))
-        given = Given(part.given_args(), self.environment)
-        validated = validate(
-            part.laid_over(composed(loaded, part.declared.profiles, given=given)), None, given
-        )
-        resolved = self.resolve(validated, self.library, self.read, self.disk, inside)
-        self.found += [_noted(one, part) for one in (*validated.found, *resolved.found)]
-        self.found += _useless(part, file, validated)
-        self.collected.allows += validated.source.allows
-        self.collected.sources.append(validated.source)
-        return resolved.robot
+
+def _robot_of(part: PartEntry, draft: Draft, resolve: Resolve) -> tuple[Robot, frozenset[str]]:
+    """Return the part under its own names, and the frames of its holder it attaches to."""
+    draft.collected.count += 1
+    if draft.read is None or draft.collected.count > MOST_PARTS:
+        message = f"more than {MOST_PARTS} parts" if draft.read else "files cannot be read here"
+        raise RejectedError([finding("TF008", message, part.place)])
+    if part.declared.spec is part.declared.urdf is part.declared.xacro is None:
+        raise RejectedError([])  # it was refused already
+    if part.declared.xacro is not None and part.at in draft.validated.broken:
+        raise RejectedError([])  # and so were arguments, which xacro would miss
+    try:
+        if part.declared.spec is not None:
+            validated = _validated(part, part.declared.spec, draft, draft.read)
+            inner, findings = resolve(validated, draft.library, draft.read, draft.disk, draft)
+            part.found += [_noted(one, part) for one in (*validated.found, *findings)]
+            return inner.robot, frozenset()
+        made = foreign(part, draft.packages, draft.read)
+    except RejectedError as error:
+        raise RejectedError([_noted(one, part) for one in error.findings]) from None
+    for file in made.files:
+        draft.collected.notes.setdefault(file, []).append(_note(part))
+    part.found += [_noted(one, part) for one in made.found]
+    return made.robot, made.implied
+
+
+def _validated(part: PartEntry, named: str, draft: Draft, read: Reader) -> Validated:
+    """Return a robot file that is a part, with what its holder says laid over it."""
+    at = part.spec.at((*part.at, "spec"))
+    file = path_named(named, at)
+    if file in draft.files:
+        circle = " → ".join([*draft.files[draft.files.index(file) :], file])
+        raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", at)])
+    loaded = with_includes(load_named(read(file), file), read)
+    draft.collected.notes.setdefault(file, []).append(_note(part))
+    given = Given(part.given_args(), draft.validated.given.environment)
+    source = composed(loaded, part.declared.profiles, given=given)
+    validated = validate(part.laid_over(source), None, given)
+    part.found += _useless(part, file, validated)
+    draft.collected.allows += validated.source.allows
+    draft.collected.sources.append(validated.source)
+    return validated
+
+
+def take(draft: Draft) -> Iterator[Finding]:
+    """Take the parts: their frames, edges and bodies under their new names, and their mounts.
+
+    One that brings names that are there already is refused, and nothing of it is taken.
+    """
+    for part in tuple(draft.joined):
+        refusal = _name_clash(draft, part)
+        if refusal:
+            yield refusal
+            draft.joined.remove(part)
+            names = (*part.robot.frames, *(process.name for process in part.robot.processes))
+            draft.broken |= {("parts", name) for name in names}
+        else:
+            yield from _take(draft, part)
+
+
+def _take(draft: Draft, part: Joined) -> Iterator[Finding]:
+    robot, keys, at = part.robot, part.declared, ("parts", part.name)
+    draft.joints |= _joints_of(part)
+    for name, place in robot.frames.items():
+        draft.frames.setdefault(name, place)
+    for name, link in robot.links.items():
+        draft.links.setdefault(name, link)
+    if keys.parent is not None and part.root is not None:
+        switched = len(keys.parent) > 1  # then the part's owner is who carries it about
+        owner = keys.owner if switched else STATIC
+        yield from add_edge(draft, at, part.root, keys, joint_name=keys.joint, owner=owner)
+    draft.edges += [replace(edge, entry=(*at, *edge.entry)) for edge in robot.edges]
+    draft.sensors += robot.sensors
+
+
+def _joints_of(part: Joined) -> dict[str, Span]:
+    """Return the named joints of a part, which those of one beside others are not among."""
+    named = [edge for edge in part.robot.edges if edge.joint_name and not part.declared.is_alone]
+    return {edge.joint_name: edge.joint_at or edge.at for edge in named}
+
+
+def _name_clash(draft: Draft, part: Joined) -> Finding | None:
+    """Return a finding where a part brings names that are there already."""
+    robot, joints = part.robot, _joints_of(part)
+    hanging = {edge.child for edge in robot.edges}
+    # A free root can have its edge here.
+    free = part.shared | (draft.spec.frames.keys() - hanging)
+    frames = [name for name in robot.frames if name in draft.frames and name not in free]
+    if frames:
+        return _names_twice("frame", frames, draft.frames, robot.frames, part, draft.spec)
+    twice = [name for name in joints if name in draft.joints]
+    return _names_twice("joint", twice, draft.joints, joints, part, draft.spec) if twice else None
+
+
+def _names_twice(  # noqa: PLR0913, PLR0917 (what is there, where, and who brings it)
+    kind: str,
+    names: list[str],
+    there: Mapping[str, Span],
+    brought: Mapping[str, Span],
+    part: Joined,
+    spec: RobotSpec,
+) -> Finding:
+    first, more = names[0], f" and {len(names) - 1} more" if names[1:] else ""
+    notes = [Note(f"{first} is defined here", there[first]), Note("and here", brought[first])]
+    advice, keys = f"a prefix of its own, prefix: {part.name}/", part.declared
+    if kind == "frame":
+        advice += f"; or ros: {{shared_frames: [{first}]}}"
+        if not (keys.prefix or keys.root or names[1:] or first == part.root):
+            advice = f"root: {first}, if the part begins there; or {advice}"
+    message = f"the part {part.name} brings the {kind} {first}{more}, which already exists"
+    place = spec.at_key(("parts", part.name))
+    return finding("TF505", message, place, notes=notes, help=advice)
 
 
 def _noted(found: Finding, part: PartEntry) -> Finding:
@@ -126,18 +173,15 @@ def _note(part: PartEntry) -> Note:
     return Note(f"as the part {part.name}", part.place)
 
 
-def _useless(part: PartEntry, file: str, validated: Validated) -> list[Finding]:
-    """Return a finding for each variable given to the part that it neither has nor uses."""
-    given, replaced = part.declared.vars, validated.source.replaced
+def _useless(part: PartEntry, file: str, validated: Validated) -> Iterator[Finding]:
+    """Yield a finding for each variable given to the part that it neither has nor uses."""
+    given, replaced = part.declared.vars, validated.spec.spans.replaced
     known = [
         name for name in validated.spec.vars if name not in given or ("vars", name) in replaced
     ]
-    found = []
     for section, name in validated.unused:
         if section == "vars" and name in given and name not in known:
             at = part.spec.at_key((*part.at, "vars", name))
             advice = did_you_mean(name, known, "remove it")
-            found.append(
-                finding("TF105", f"{file} does not use the variable {name}", at, help=advice)
-            )
-    return found
+            message = f"{file} does not use the variable {name}"
+            yield finding("TF105", message, at, help=advice)

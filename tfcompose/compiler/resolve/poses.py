@@ -8,19 +8,22 @@ pose before the robot runs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 from tfcompose.foundation.text import listed
-from tfcompose.model.robot import STATIC, is_optical, left_out_by
+from tfcompose.model.robot import STATIC, is_optical, left_out_by, may_be_refused
+from tfcompose.spec.language.pose import ROTATIONS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Iterator
 
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.foundation.findings import Span
     from tfcompose.model.robot import Calibration, Edge
-    from tfcompose.spec.language.pose import Posed, Rotated
+    from tfcompose.spec.language.pose import EdgeKeys, Posed, Rotated
     from tfcompose.spec.load import Path
 
 
@@ -42,36 +45,32 @@ def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, 
     return rotation
 
 
-@dataclass(frozen=True, slots=True)
-class Draft:
-    """An edge whose pose may still have to be solved.
+def place_of(keys: EdgeKeys | None) -> str | None:
+    """Return the frame whose pose the keys of a mount give, or None for that of the mount."""
+    return getattr(keys, "place", None)
 
-    Its ``pose`` is that of ``place``, in ``relative_to``.
 
-    ``at`` is where it is written. With ``measured`` the pose is that of a calibration, and the one
-    that is written is the nominal one, if ``has_nominal``. An edge into or inside a ``part``
-    belongs to that.
+def group_of(edge: Edge) -> Path:
+    """Return the entry of the part or the sensor whose mount the edge is, or in which it is.
+
+    Empty for any other edge.
     """
+    return edge.entry[:2] if edge.entry[:1] in {("parts",), ("sensors",)} else ()
 
-    edge: Edge
-    relative_to: str | None = None
-    relative_at: Span | None = None
-    place: str | None = None
-    place_at: Span | None = None
-    at: Path = ()
-    part: str | None = None
-    measured: Calibration | None = None
-    has_nominal: bool = False
 
-    @property
-    def group(self) -> tuple[str, str] | None:
-        """The part or the sensor whose mount the edge is, or in which it is.
+def solve_poses(draft: Draft) -> Iterator[Finding]:
+    """Give each edge the pose of its child in its parent.
 
-        None for any other edge.
-        """
-        if self.part is not None:
-            return ("parts", self.part)
-        return ("sensors", self.edge.sensor) if self.edge.sensor else None
+    One that cannot be solved keeps the pose as written.
+    """
+    excuses = partial(
+        may_be_refused,
+        broken=frozenset(draft.broken),
+        known=(*draft.frames, *draft.process_names),
+    )
+    solver = _Solver(draft, draft.edges, excuses)
+    draft.edges = solver.solve()
+    yield from solver.found
 
 
 #: How deep a chain of poses that are given relative to each other is followed before it is solved
@@ -99,32 +98,26 @@ class _UnsolvableError(Exception):
 
 
 @dataclass(slots=True)
-class Solver:
-    """Solves the drafts of one robot; ``found`` holds what could not be solved.
+class _Solver:
+    """Solves the edges of one draft, by index; ``found`` holds what could not be solved.
 
-    ``broken`` are the paths of entries that were refused in part, ``excuses`` tells of a frame
-    whether it, or the edge above it, may be missing because an entry was refused, and
-    ``conditions`` are those of entries that are left out.
+    ``excuses`` tells of a frame whether it, or the edge above it, may be missing because an entry
+    was refused.
     """
 
-    drafts: list[Draft]
-    frames: dict[str, Span]
-    broken: Collection[Path] = ()
-    excuses: Callable[[str], bool] = lambda _frame: False
-    conditions: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    draft: Draft
+    edges: list[Edge]
+    excuses: Callable[[str], bool]
     found: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
     _open: list[int] = field(default_factory=list)
     _above: dict[str, int] = field(default_factory=dict)
 
-    def solve(self) -> tuple[Edge, ...]:
-        """Return the edges in the order of the drafts.
-
-        One that cannot be solved keeps the pose as written.
-        """
-        for index, draft in enumerate(self.drafts):
-            self._above.setdefault(draft.edge.child, index)
-        for index in range(len(self.drafts)):
+    def solve(self) -> list[Edge]:
+        """Return the edges with their poses, in order."""
+        for index, edge in enumerate(self.edges):
+            self._above.setdefault(edge.child, index)
+        for index in range(len(self.edges)):
             waiting = [index]
             while waiting:
                 try:
@@ -132,81 +125,86 @@ class Solver:
                     waiting.pop()
                 except _DeeperError as deeper:
                     if deeper.index in waiting:
-                        self._give_up(waiting.pop(), _circle([self.drafts[deeper.index]]))
+                        self._give_up(waiting.pop(), self._circle([deeper.index]))
                     else:
                         waiting.append(deeper.index)
                 except _UnsolvableError as error:
                     self._give_up(waiting.pop(), error.found)
                 self._open.clear()
-        return tuple(self._solved[index] for index in range(len(self.drafts)))
+        return [self._solved[index] for index in range(len(self.edges))]
 
     def _give_up(self, index: int, found: Finding | None) -> None:
         if found and found not in self.found:
             self.found.append(found)
-        self._solved[index] = self.drafts[index].edge
+        self._solved[index] = replace(self.edges[index], calibration=None)
 
     def _edge(self, index: int) -> Edge:
         if index in self._solved:
             return self._solved[index]
-        draft = self.drafts[index]
         if index in self._open:
-            raise _UnsolvableError(
-                _circle([self.drafts[i] for i in self._open[self._open.index(index) :]])
-            )
+            raise _UnsolvableError(self._circle(self._open[self._open.index(index) :]))
         if len(self._open) >= _DEEPEST:
             raise _DeeperError(index)
         self._open.append(index)
-        solved = draft.edge
-        if draft.measured:
-            solved = self._measured(draft, draft.measured)
-        elif draft.relative_to or draft.place:
-            solved = replace(draft.edge, pose=self._declared_pose(draft))
+        edge, keys = self.edges[index], self.draft.keys.get(index)
+        if edge.calibration and keys:
+            edge = self._measured(index, edge.calibration, keys)
+        elif keys and (keys.relative_to or place_of(keys)):
+            edge = replace(edge, pose=self._declared_pose(index, keys))
         self._open.pop()
-        self._solved[index] = solved
-        return solved
+        self._solved[index] = edge
+        return edge
 
-    def _declared_pose(self, draft: Draft) -> Pose:
+    def _at(self, index: int, key: str) -> Span:
+        """Return the place of the value of a key of an edge."""
+        return self.draft.spec.at((*self.edges[index].entry, key))
+
+    def _is_broken(self, index: int) -> bool:
+        """Whether something in the entry that gives the edge was refused."""
+        return index in self.draft.keys and self.edges[index].entry in self.draft.validated.broken
+
+    def _declared_pose(self, index: int, keys: EdgeKeys) -> Pose:
         """Return the pose of the edge's child in its parent, from the pose that is written."""
-        pose = draft.edge.pose
-        if draft.relative_to:
-            at = draft.relative_at or draft.edge.at
-            pose = self._between(draft.edge.parent, self._known(draft.relative_to, at), at) @ pose
-        if draft.place:
-            at = draft.place_at or draft.edge.at
-            inside = (
-                self._inside(draft) if draft.edge.sensor and draft.at not in self.broken else None
-            )
-            pose = pose @ self._below(draft, self._known(draft.place, at, inside), at).inverse()
+        edge, place = self.edges[index], place_of(keys)
+        pose = edge.pose
+        if keys.relative_to:
+            at = self._at(index, "relative_to")
+            pose = self._between(edge.parent, self._known(keys.relative_to, at), at) @ pose
+        if place:
+            at = self._at(index, "place")
+            inside = self._inside(edge) if edge.sensor and not self._is_broken(index) else None
+            pose = pose @ self._below(index, self._known(place, at, inside), at).inverse()
         return pose
 
-    def _measured(self, draft: Draft, measured: Calibration) -> Edge:
+    def _measured(self, index: int, measured: Calibration, keys: EdgeKeys) -> Edge:
         """Return the edge with its calibrated pose and its nominal one."""
-        edge, at = draft.edge, measured.named_at
+        edge, at = self.edges[index], measured.named_at
         above = below = Pose()
         if measured.parent != edge.parent:
             above = self._between(edge.parent, measured.parent, at)
         if measured.child != edge.child:
-            place_at = draft.place_at if measured.child == draft.place else None
-            below = self._below(draft, measured.child, place_at or at)
-        if draft.has_nominal:
-            measured = replace(
-                measured, nominal=above.inverse() @ self._declared_pose(draft) @ below
-            )
+            is_place = measured.child == place_of(keys)
+            below_at = self._at(index, "place") if is_place else at
+            below = self._below(index, measured.child, below_at)
+        if (ROTATIONS | {"xyz"}) & keys.model_fields_set:
+            nominal = above.inverse() @ self._declared_pose(index, keys) @ below
+            measured = replace(measured, nominal=nominal)
         return replace(edge, pose=above @ measured.pose @ below.inverse(), calibration=measured)
 
-    def _inside(self, draft: Draft) -> list[str]:
-        """Return the frames that the entry of the draft brings, its own first."""
-        return [one.edge.child for one in self.drafts if one.group == draft.group]
+    def _inside(self, edge: Edge) -> list[str]:
+        """Return the frames that the entry of the edge brings, its own first."""
+        group = group_of(edge)
+        return [other.child for other in self.edges if group_of(other) == group]
 
     def _known(self, frame: str, at: Span, inside: list[str] | None = None) -> str:
         """Return the frame, which must be one of ``inside``, those that nobody else brings."""
-        if frame in self.frames:
+        if frame in self.draft.frames:
             return frame
         if self.excuses(frame) and not inside:
             raise _UnsolvableError(None)
         otherwise = f"one of: {listed(inside)}" if inside else ""
-        advice = left_out_by(self.conditions, frame) or did_you_mean(
-            frame, inside or self.frames, otherwise
+        advice = left_out_by(self.draft.validated.conditions, frame) or did_you_mean(
+            frame, inside or self.draft.frames, otherwise
         )
         raise _UnsolvableError(finding("TF203", f"unknown frame {frame}", at, help=advice))
 
@@ -215,7 +213,7 @@ class Solver:
         chain: dict[str, int] = {}
         while frame in self._above and frame not in chain:
             chain[frame] = self._above[frame]
-            frame = self.drafts[self._above[frame]].edge.parent
+            frame = self.edges[self._above[frame]].parent
         return [*chain.items(), (frame, -1)]
 
     def _between(self, a: str, b: str, at: Span) -> Pose:
@@ -238,8 +236,8 @@ class Solver:
         for frame, index in chain:
             if frame == top:
                 break
-            edge = self.drafts[index].edge
-            if edge.kind != "static" and self.drafts[index].at in self.broken:
+            edge = self.edges[index]
+            if edge.kind != "static" and self._is_broken(index):
                 raise _UnsolvableError(None)
             if edge.kind != "static" and not (
                 edge.sensor and not edge.given
@@ -264,26 +262,27 @@ class Solver:
             pose = self._edge(index).pose @ pose
         return pose
 
-    def _below(self, draft: Draft, place: str, at: Span) -> Pose:
-        """Return the pose of ``place`` in the draft's child, which must be above it."""
+    def _below(self, index: int, place: str, at: Span) -> Pose:
+        """Return the pose of ``place`` in the edge's child, which must be above it."""
         chain = self._chain(place)
         names = [frame for frame, _ in chain]
-        mount = draft.edge.child
-        if mount not in names and (draft.at in self.broken or self.excuses(names[-1])):
+        outer, is_broken = self.edges[index], self._is_broken(index)
+        mount = outer.child
+        if mount not in names and (is_broken or self.excuses(names[-1])):
             raise _UnsolvableError(None)
         if mount not in names:
             message = (
                 f"{place} is not a frame of this sensor"
-                if draft.edge.sensor
+                if outer.sensor
                 else f"{place} is not below {mount}"
             )
-            inside = self._inside(draft)
+            inside = self._inside(outer)
             advice = did_you_mean(place, inside, f"one of: {listed(inside)}")
             raise _UnsolvableError(finding("TF404", message, at, help=advice))
         pose = self._down(chain, mount, at)
-        inner = [self.drafts[index].edge for _, index in chain[: names.index(mount)]]
+        inner = [self.edges[step] for _, step in chain[: names.index(mount)]]
         nominal = [edge for edge in inner if edge.nominal and edge.owner != STATIC]
-        if nominal and draft.at not in self.broken:
+        if nominal and not is_broken:
             edge = nominal[-1]
             message = (
                 f"{place} is placed through {edge.name}, which {edge.owner} publishes with its"
@@ -293,13 +292,17 @@ class Solver:
             self.found.append(finding("TF405", message, at, help=advice))
         return pose
 
-
-def _circle(drafts: list[Draft]) -> Finding:
-    names = ", ".join(draft.edge.name for draft in drafts)
-    at = next(
-        (at for draft in drafts if (at := draft.relative_at or draft.place_at)), drafts[0].edge.at
-    )
-    return finding("TF404", f"these poses are given relative to each other: {names}", at)
+    def _circle(self, indexes: list[int]) -> Finding:
+        edges = [self.edges[index] for index in indexes]
+        at = edges[0].at
+        for index in reversed(indexes):
+            keys = self.draft.keys.get(index)
+            if keys and keys.relative_to:
+                at = self._at(index, "relative_to")
+            elif place_of(keys):
+                at = self._at(index, "place")
+        names = ", ".join(edge.name for edge in edges)
+        return finding("TF404", f"these poses are given relative to each other: {names}", at)
 
 
 def _values_of(edge: Edge) -> str:

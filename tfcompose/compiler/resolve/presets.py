@@ -21,7 +21,7 @@ from tfcompose.spec.language.preset import PresetSpec
 from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Generator, Iterable, Mapping
 
     from tfcompose.spec.language.preset import Option, PresetFrame
     from tfcompose.spec.language.robot import RobotSpec, SensorSpec
@@ -100,21 +100,24 @@ def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
 
 def sensor_of(
     name: str, declared: SensorSpec, library: Library, spec: RobotSpec
-) -> tuple[Sensor | None, list[Finding]]:
-    """Return the sensor with its preset and options, or None and why not."""
+) -> Generator[Finding, None, Sensor | None]:
+    """Return the sensor with its preset and options, or None where it has none."""
     at: Path = ("sensors", name)
     span = spec.at((*at, "preset"))
     try:
         plain = library.get(declared.preset)
-        options, found = decided(plain, declared, at, spec)
+        options, refusals = decided(plain, declared, at, spec)
         choices = {
             key: options[key] for key, option in plain.options.items() if option.type == "choice"
         }
         preset = library.get(declared.preset, choices)
     except KeyError:
-        return None, [_no_preset(declared.preset, library, span)]
+        yield _no_preset(declared.preset, library, span)
+        return None
     except RejectedError as error:
-        return None, list(error.findings)
+        yield from error.findings
+        return None
+    yield from refusals
     hidden = library.hides(declared.preset)
     if hidden:
         message = (
@@ -122,11 +125,11 @@ def sensor_of(
             " tfcompose's own preset"
         )
         notes = [Note("its own", Span(hidden))]
-        found.append(finding("TF607", message, span, notes=notes, help="give it another name"))
+        yield finding("TF607", message, span, notes=notes, help="give it another name")
     sensor = Sensor(name, declared, preset, options, DRIVER)
     if _publisher(sensor) == TFCOMPOSE:
         sensor = Sensor(name, declared, preset, options, TFCOMPOSE)
-    return sensor, found
+    return sensor
 
 
 _OWN = "tfcompose help presets shows how to write one"

@@ -9,9 +9,10 @@ import math
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.compiler.resolve.poses import pose_of
 from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
-from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.findings import Note, did_you_mean, finding
 from tfcompose.model.plan import Ready, Simulation, Sweep
 from tfcompose.model.robot import (
     BUILT_IN,
@@ -36,12 +37,13 @@ from tfcompose.spec.language.process import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Iterator
 
-    from tfcompose.foundation.findings import Span
+    from tfcompose.compiler.resolve.draft import Draft, Finds
+    from tfcompose.foundation.findings import Finding, Span
     from tfcompose.model.plan import ProcessKind
     from tfcompose.model.process_keys import Way
-    from tfcompose.model.robot import Edge, Joint, Robot
+    from tfcompose.model.robot import Joint, Robot
     from tfcompose.spec.language import Validated
     from tfcompose.spec.language.process import (
         ContainerSpec,
@@ -54,79 +56,66 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path
 
 
-def user_process(
-    name: str, declared: ProcessSpec, validated: Validated
-) -> tuple[Process | None, list[Finding]]:
-    """Return the process that the user describes, or None and what is missing."""
+def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Finds[Process | None]:
+    """Return the process that the user describes, or None where something is missing."""
     spec = validated.spec
     at: Path = ("processes", name)
     place = spec.at_key(at)
-    if name in BUILT_IN:
-        return None, built_in_keys(name, declared, spec)
     namespace = namespace_of(declared, spec.ros.namespace)
-    nodes, found = nodes_of(name, declared, namespace, spec)
+    nodes = yield from nodes_of(name, declared, namespace, spec)
     if declared.external:
-        keys = how(declared, namespace, "external")
-        return replace(Process(name, "external", at=place, ros_nodes=nodes), **keys), found
+        process = Process(name, "external", at=place, ros_nodes=nodes)
+        return replace(process, **how(declared, namespace, "external"))
     if declared.simulate:
-        one = (Node(nodes[0].name, nodes[0].at),)
-        process, refused = _simulated(
-            Process(name, "simulate", at=place, ros_nodes=one), declared.simulate, validated
+        simulation = yield from _simulation(name, declared.simulate, validated)
+        if simulation is None:
+            return None
+        process = Process(
+            name, "simulate", at=place, ros_nodes=(Node(nodes[0].name, nodes[0].at),)
         )
-        keys = how(declared, namespace, "simulate")
-        return process and replace(process, **keys), [*found, *refused]
+        keys = how(declared, namespace, "simulate") | {"simulate": simulation}
+        return replace(process, **keys)
     if declared.component and declared.container:
         process = Process(name, "component", at=place, ros_nodes=nodes)
-        return replace(process, **how(declared, namespace, "component")), found
+        return replace(process, **how(declared, namespace, "component"))
     if declared.run and declared.run.is_startable:
         process = Process(name, "run", at=place, ros_nodes=nodes)
-        return (
-            replace(
-                process,
-                **how(declared, namespace),
-                **program(declared.run, shell=bool(declared.shell)),
-            ),
-            found,
-        )
+        started = program(declared.run, shell=bool(declared.shell))
+        return replace(process, **how(declared, namespace), **started)
     if _is_way_refused(name, validated):
-        return None, found
+        return None
     if declared.run:
         advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
-        at = (*at, "run")
-        return None, [
-            finding(
-                "TF102",
-                f"{name}: run needs package and executable",
-                spec.at_key(at),
-                help=advice,
-            )
-        ]
+        message = f"{name}: run needs package and executable"
+        yield finding("TF102", message, spec.at_key((*at, "run")), help=advice)
+        return None
     advice = (
         "run: {package: …, executable: …}, component: PACKAGE/CLASS, simulate: {…}, or external:"
         " true"
     )
-    return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
+    yield finding("TF102", f"{name} does not say how it runs", place, help=advice)
+    return None
 
 
-def _simulated(
-    process: Process, simulate: Simulate, validated: Validated
-) -> tuple[Process | None, list[Finding]]:
-    at: Path = ("processes", process.name, "simulate")
+def _simulation(name: str, simulate: Simulate, validated: Validated) -> Finds[Simulation | None]:
+    at: Path = ("processes", name, "simulate")
     if simulate.circle:
-        circle = simulate.circle
-        simulation = Simulation("circle", simulate.rate, radius=circle.radius, speed=circle.speed)
-    elif simulate.fixed:
-        simulation = Simulation("fixed", simulate.rate, pose=pose_of(simulate.fixed))
-    elif simulate.joints is not None:
-        simulation = Simulation("joints", simulate.rate)
-    elif any(
+        return Simulation(
+            "circle",
+            simulate.rate,
+            radius=simulate.circle.radius,
+            speed=simulate.circle.speed,
+        )
+    if simulate.fixed:
+        return Simulation("fixed", simulate.rate, pose=pose_of(simulate.fixed))
+    if simulate.joints is not None:
+        return Simulation("joints", simulate.rate)
+    if not any(
         path[:3] == at and path[3:4] and path[3] in SIMULATIONS for path in validated.refused
     ):
-        return None, []
-    else:
-        message = f"{process.name}: simulate needs circle, fixed or joints"
-        return None, [finding("TF102", message, validated.spec.at_key(at))]
-    return replace(process, simulate=simulation), []
+        message = f"{name}: simulate needs circle, fixed or joints"
+        yield finding("TF102", message, validated.spec.at_key(at))
+    return None
 
 
 def _is_way_refused(name: str, validated: Validated) -> bool:
@@ -143,18 +132,18 @@ def _is_way_refused(name: str, validated: Validated) -> bool:
     )
 
 
-def name_clashes(processes: list[Process], spec: RobotSpec) -> list[Finding]:
-    """Return a finding for each name that a sensor and a process, or two processes, share.
+def check_names(draft: Draft) -> Iterator[Finding]:
+    """Yield a finding for each name that a sensor and a process, or two processes, share.
 
     A sensor may have the name of the process that drives it.
     """
+    spec = draft.spec
     first: dict[str, Process] = {}
-    found = []
     for name, sensor in spec.sensors.items():
         driven_by_it = sensor.driver is not None and sensor.driver.process == name
         if name in spec.processes and not driven_by_it:
             first[name] = Process(name, "external", at=spec.at_key(("sensors", name)))
-    for process in processes:
+    for process in draft.all_processes:
         other = first.setdefault(process.name, process)
         if other.at != process.at:
             notes = [Note(f"{other.name} is also defined here", other.at)]
@@ -165,75 +154,43 @@ def name_clashes(processes: list[Process], spec: RobotSpec) -> list[Finding]:
                 f"the name {process.name} is used twice; sensors and processes share one name"
                 " space"
             )
-            found.append(finding("TF502", message, process.at, notes=notes, help=advice))
-    return found
+            yield finding("TF502", message, process.at, notes=notes, help=advice)
 
 
-def unknown_names(
-    processes: list[Process],
-    spec: RobotSpec,
-    known: Collection[str],
-    broken: Collection[tuple[str, str]],
-) -> list[Finding]:
-    """Return a finding for each unknown name under ``after`` and each end that never comes.
+def check_waits(draft: Draft) -> Iterator[Finding]:
+    """Yield a finding for each unknown name under ``after`` and each end that never comes.
 
-    ``known`` are the names of all processes; an entry among the ``broken`` ones may have brought
-    another.
+    An entry that was refused may have brought another name.
     """
-    refused = {name for _, name in broken}
-    missing = tuple(name for section, name in broken if section == "parts" and name)
-    lasting = {process.name: process for process in processes if process.kind != "run"}
-    found = []
-    for process in processes:
-        section = next(
-            (one for one in ("processes", "containers") if spec.spans.has((one, process.name))),
-            "sensors",
-        )
-        inside = ("driver", "after") if section == "sensors" else ("after",)
+    spec, known = draft.spec, draft.process_names
+    refused = {name for _, name in draft.broken}
+    missing = tuple(name for section, name in draft.broken if section == "parts" and name)
+    lasting = {process.name for process in draft.processes if process.kind != "run"}
+    for process in draft.processes:
+        path: Path = (*entry_of(process, spec), "after")
         for other, what in process.after.items():
             if what == "done" and other in lasting:
-                place = spec.at((section, process.name, *inside, other))
                 message = f"{process.name} waits until {other} is done, which never happens"
-                found.append(
-                    finding("TF813", message, place, help=f"after: {{{other}: ready}}, or started")
-                )
+                advice = f"after: {{{other}: ready}}, or started"
+                yield finding("TF813", message, spec.at((*path, other)), help=advice)
             elif process.component and other == process.component.container:
                 continue  # it was not written here
-            elif other not in known and other not in refused and not other.startswith(missing):
-                place = spec.at_key((section, process.name, *inside, other))
-                names = sorted(name for name in known if name != process.name)
+            elif other not in known | refused and not other.startswith(missing):
+                names = sorted(known - {process.name})
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
-                found.append(
-                    finding(
-                        "TF813",
-                        f"{process.name} waits for {other}, which is not a process",
-                        place,
-                        help=advice,
-                    )
-                )
-    return found
+                message = f"{process.name} waits for {other}, which is not a process"
+                yield finding("TF813", message, spec.at_key((*path, other)), help=advice)
 
 
-def unnamed_nodes(
-    edges: tuple[Edge, ...],
-    processes: list[Process],
-    spec: RobotSpec,
-    broken: Collection[tuple[str, str]],
-) -> Iterator[Finding]:
+def check_launch_nodes(draft: Draft) -> Iterator[Finding]:
     """Yield a finding for each owner that is a launch file without named nodes."""
-    owned = {edge.owner: edge for edge in reversed(edges)}
-    for process in processes:
-        edge, declared = owned.get(process.name), spec.processes.get(process.name)
+    owned = {edge.owner: edge for edge in reversed(draft.edges)}
+    for process in draft.processes:
+        edge, declared = owned.get(process.name), draft.spec.processes.get(process.name)
         is_launch = process.launch is not None or process.argv[:2] == ROS2_LAUNCH
-        is_read = ("processes", process.name) not in broken
-        if (
-            edge
-            and declared
-            and is_launch
-            and is_read
-            and declared.node is None
-            and not declared.nodes
-        ):
+        is_read = ("processes", process.name) not in draft.broken
+        is_named = declared is None or declared.node is not None or declared.nodes
+        if edge and is_launch and is_read and not is_named:
             message = (
                 f"{process.name} is a launch file, and the node in it that publishes {edge.name}"
                 " is not named"
@@ -358,8 +315,8 @@ def added(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Pr
     return replace(process, host=process.host or (static.host if static else None))
 
 
-def built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> list[Finding]:
-    """Return findings about what stands under the name of one of tfcompose's own processes."""
+def built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> Iterator[Finding]:
+    """Yield findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
     known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
     wrong = declared.model_fields_set - known
@@ -369,52 +326,43 @@ def built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> list[Fin
             f"give what {'joints publishes from' if name == JOINTS else 'you start'} a name of its"
             f" own; {advice}"
         )
-    found = [
-        finding(
-            "TF101", f"{name} is built in and has no {key}", spec.at_key((*at, key)), help=advice
-        )
-        for key in wrong
-    ]
-    return found + (_joints_params(declared.params, spec) if name == JOINTS else [])
+    for key in wrong:
+        message = f"{name} is built in and has no {key}"
+        yield finding("TF101", message, spec.at_key((*at, key)), help=advice)
+    if name == JOINTS:
+        yield from _joints_params(declared.params, spec)
 
 
-def _joints_params(params: dict[str, Any], spec: RobotSpec) -> list[Finding]:
-    """Return findings about the parameters of ``joints``."""
-    found = []
+def _joints_params(params: dict[str, Any], spec: RobotSpec) -> Iterator[Finding]:
+    """Yield findings about the parameters of ``joints``."""
     for name, value in params.items():
         at: Path = ("processes", JOINTS, "params", name)
         example = _JOINTS_PARAMS.get(name)
         if example is None:
             advice = did_you_mean(name, _JOINTS_PARAMS, f"it has {' and '.join(_JOINTS_PARAMS)}")
-            found.append(
-                finding("TF101", f"joints has no parameter {name}", spec.at_key(at), help=advice)
-            )
+            yield finding("TF101", f"joints has no parameter {name}", spec.at_key(at), help=advice)
         elif isinstance(value, bool) != isinstance(example, bool) or not isinstance(
             value, (bool, int, float)
         ):
             advice = f"for example {name}: {str(example).lower()}"
             what = "true or false" if isinstance(example, bool) else "a number of hertz"
-            found.append(finding("TF103", f"{name} is {what}", spec.at(at), help=advice))
+            yield finding("TF103", f"{name} is {what}", spec.at(at), help=advice)
         elif not isinstance(value, bool) and not 0 < value < math.inf:
             advice = "leave it out, and every joint state is published"
-            found.append(finding("TF106", f"{name} has to be above 0", spec.at(at), help=advice))
-    return found
+            yield finding("TF106", f"{name} has to be above 0", spec.at(at), help=advice)
 
 
-def idle_keys(spec: RobotSpec) -> list[Finding]:
-    """Return a finding for each key of a process that does nothing there."""
-    declared: dict[Path, tuple[str, Started | None]] = {}
-    declared |= {("processes", name): (name, process) for name, process in spec.processes.items()}
-    found: list[Finding] = [*_idle_of_containers(spec)]
-    declared |= {
-        ("sensors", name, "driver"): (f"the driver of {name}", s.driver)
-        for name, s in spec.sensors.items()
-    }
-    for path, (name, process) in declared.items():
-        if process is not None:
-            found += _idle_rate(path, name, process, spec)
-            found += _idle(path, name, process, spec)
-    return found
+def check_keys(draft: Draft) -> Iterator[Finding]:
+    """Yield a finding for each key of a process that does nothing there."""
+    spec = draft.spec
+    yield from _idle_of_containers(spec)
+    for name, process in spec.processes.items():
+        yield from _idle(("processes", name), name, process, spec)
+    for name, sensor in spec.sensors.items():
+        if sensor.driver:
+            yield from _idle(
+                ("sensors", name, "driver"), f"the driver of {name}", sensor.driver, spec
+            )
 
 
 def _idle_of_containers(spec: RobotSpec) -> Iterator[Finding]:
@@ -448,6 +396,7 @@ def _idle(path: Path, name: str, process: Started, spec: RobotSpec) -> Iterator[
     Where an overlay puts that in the place of something else, the keys below it are meant for what
     they stood beside.
     """
+    yield from _idle_rate(path, name, process, spec)
     way: Way = "external" if process.external else "simulate" if process.simulate else "run"
     way = "component" if process.component else way
     if (
@@ -479,22 +428,24 @@ _WORDS = {
 }
 
 
-def unreached(process: Process, spec: RobotSpec) -> list[Finding]:
-    """Return findings about files without parameters and keys that reach no node."""
-    at: Path = ("processes", process.name)
-    names_params_file = any("${params_file}" in text for text in process.texts)
-    if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
-        keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
-        given = [key for key in keys if getattr(process, key) and spec.spans.has((*at, key))]
-        return [_not_reached(key, process, spec.at_key((*at, key))) for key in given]
-    if (
-        not names_params_file
-        or any(node.params for node in process.ros_nodes)
-        or not spec.spans.has((*at, "run"))
-    ):
-        return []
-    message = f"{process.name} is given ${{params_file}}, and has no parameters"
-    return [finding("TF816", message, spec.at((*at, "run")), help="params: {…}")]
+def check_arguments(draft: Draft) -> Iterator[Finding]:
+    """Yield findings about files without parameters and keys that reach no node."""
+    spec = draft.spec
+    for process in draft.robot.processes:
+        at: Path = ("processes", process.name)
+        names_params_file = any("${params_file}" in text for text in process.texts)
+        if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
+            keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
+            for key in keys:
+                if getattr(process, key) and spec.spans.has((*at, key)):
+                    yield _not_reached(key, process, spec.at_key((*at, key)))
+        elif (
+            names_params_file
+            and not any(node.params for node in process.ros_nodes)
+            and spec.spans.has((*at, "run"))
+        ):
+            message = f"{process.name} is given ${{params_file}}, and has no parameters"
+            yield finding("TF816", message, spec.at((*at, "run")), help="params: {…}")
 
 
 def _not_reached(key: str, process: Process, at: Span) -> Finding:
@@ -534,14 +485,6 @@ def namespace_of(declared: Started | ContainerSpec | None, namespace: str) -> st
     return full_name(namespace, declared.namespace).strip("/")
 
 
-def has_claims(spec: RobotSpec) -> bool:
-    """Return whether anything is said of what nodes publish, or a process has several nodes."""
-    return any(
-        declared.nodes or declared.publishes or (declared.node and declared.node.preset)
-        for declared in spec.processes.values()
-    )
-
-
 def names_files(params: dict[str, Any]) -> bool:
     """Return whether parameters name files."""
     return isinstance(params.get(FILE_KEY), (str, list))
@@ -564,54 +507,45 @@ def _usual(declared: ProcessSpec) -> str | None:
 
 def nodes_of(
     name: str, declared: ProcessSpec, namespace: str, spec: RobotSpec
-) -> tuple[tuple[Node, ...], list[Finding]]:
-    """Return the nodes of a process, at least one, and what is wrong with them."""
+) -> Finds[tuple[Node, ...]]:
+    """Return the nodes of a process, at least one."""
     at: Path = ("processes", name)
     if not declared.nodes:
-        place = spec.at(("processes", name, "node")) if declared.node else spec.at_key(at)
-        own_name = (declared.node.name if declared.node else None) or _usual(declared) or name
-        return (
-            Node(full_name(namespace, own_name), place, at, declared.params, declared.lifecycle),
-        ), []
-    found = []
-    for key in ("publishes",) if declared.publishes else ():
-        message = f"{name} has nodes, and {key} names none of them"
-        found.append(
-            finding(
-                "TF107", message, spec.at_key((*at, key)), help="write it under one of its nodes"
-            )
-        )
+        place = spec.at((*at, "node")) if declared.node else spec.at_key(at)
+        own_name = (declared.node.name if declared.node else None) or _usual(declared)
+        node = full_name(namespace, own_name or name)
+        return (Node(node, place, at, declared.params, declared.lifecycle),)
+    if declared.publishes:
+        message = f"{name} has nodes, and publishes names none of them"
+        advice = "write it under one of its nodes"
+        yield finding("TF107", message, spec.at_key((*at, "publishes")), help=advice)
     for key in declared.params:
         advice = (
             f"write it under nodes: {{{next(iter(declared.nodes))}: {{params: {{{key}: …}}}}}}"
         )
         message = f"{name} has nodes, and the parameter {key} names none of them"
-        found.append(finding("TF107", message, spec.at_key((*at, "params", key)), help=advice))
-    nodes = [
-        Node(
-            full_name(namespace, node),
-            spec.at_key((*at, "nodes", node)),
-            (*at, "nodes", node),
-            own.params,
-            own.lifecycle,
+        yield finding("TF107", message, spec.at_key((*at, "params", key)), help=advice)
+    nodes = []
+    for node, own in declared.nodes.items():
+        path = (*at, "nodes", node)
+        nodes.append(
+            Node(full_name(namespace, node), spec.at_key(path), path, own.params, own.lifecycle)
         )
-        for node, own in declared.nodes.items()
-    ]
-    return tuple(nodes), found
+    return tuple(nodes)
 
 
 #: The time of one sweep, in seconds; longer where a joint may not move that fast.
 PERIOD_S = 6.0
 
 
-def with_positions(robot: Robot, spec: RobotSpec) -> tuple[Robot, list[Finding]]:
-    """Return the robot whose simulated joint states cover every independent joint.
+def set_positions(draft: Draft) -> Iterator[Finding]:
+    """Let simulated joint states cover every independent joint.
 
     A joint that mimics another is left out: it follows, and the process computes it. Where nothing
     is said a joint is at 0, or in the middle between its limits if 0 is not between them, as
     joint_state_publisher has it.
     """
-    found: list[Finding] = []
+    robot, spec = draft.robot, draft.spec
     processes = []
     for process in robot.processes:
         declared = spec.processes.get(process.name)
@@ -619,11 +553,11 @@ def with_positions(robot: Robot, spec: RobotSpec) -> tuple[Robot, list[Finding]]
         simulation = process.simulate
         if simulation and simulation.kind == "joints" and wanted is not None:
             if isinstance(wanted, dict):
-                found += _wrong_positions(wanted, robot, process, spec)
+                yield from _wrong_positions(wanted, robot, process, spec)
             processes.append(replace(process, simulate=_with_joints(simulation, wanted, robot)))
         else:
             processes.append(process)
-    return replace(robot, processes=tuple(processes)), found
+    draft.robot = replace(robot, processes=tuple(processes))
 
 
 def _with_joints(simulation: Simulation, wanted: str | dict[str, Any], robot: Robot) -> Simulation:

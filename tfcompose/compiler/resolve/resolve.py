@@ -1,73 +1,62 @@
 """From what the user wrote to a robot in which every name, pose and owner is decided.
 
-What only some robots have is loaded for those: parts, calibrations,
-parameter files, raw URDF, claims, and a stock robot_state_publisher.
+``PASSES`` are the steps, in order; what needs a module that only some robots need is loaded here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from dataclasses import replace
+from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tfcompose.compiler.resolve.bodies import Bodies, with_colours
+from tfcompose.compiler.resolve.bodies import with_colours
+from tfcompose.compiler.resolve.claims import settle_claims
 from tfcompose.compiler.resolve.containers import (
-    component_findings,
+    check_components,
     component_process,
     container_process,
 )
-from tfcompose.compiler.resolve.edges import Drafts, source_numbers
+from tfcompose.compiler.resolve.draft import Collected, Draft
+from tfcompose.compiler.resolve.edges import add_frames, add_joints, add_links, source_numbers
 from tfcompose.compiler.resolve.hosts import hosts_of, with_host_place
 from tfcompose.compiler.resolve.isolation import isolate, settings_of
-from tfcompose.compiler.resolve.middleware import (
-    is_own_router,
-    own_router,
-    with_router,
-    wrong_middleware,
-)
-from tfcompose.compiler.resolve.poses import Solver
-from tfcompose.compiler.resolve.presets import sensor_of
+from tfcompose.compiler.resolve.middleware import is_own_router, own_router, use_middleware
+from tfcompose.compiler.resolve.param_files import read_param_files
+from tfcompose.compiler.resolve.poses import solve_poses
 from tfcompose.compiler.resolve.processes import (
     built_in,
     built_in_keys,
-    has_claims,
-    idle_keys,
-    name_clashes,
-    unknown_names,
-    unnamed_nodes,
-    unreached,
+    check_arguments,
+    check_keys,
+    check_launch_nodes,
+    check_names,
+    check_waits,
+    set_positions,
     user_process,
-    with_positions,
 )
-from tfcompose.compiler.resolve.resolved import Collected, Resolved
 from tfcompose.compiler.resolve.rules import limits_of, zones_of
-from tfcompose.compiler.resolve.sensors import add_sensor
+from tfcompose.compiler.resolve.sensors import add_sensors
+from tfcompose.compiler.resolve.stock import use_stock_publisher
 from tfcompose.compiler.resolve.tool_sections import (
-    ToolSection,
+    add_sections,
     as_sections,
     check_sections,
-    processes_of,
-    sections_of,
 )
-from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
-from tfcompose.model.robot import Edge, Process, Robot, may_be_refused
-from tfcompose.spec.load import path_named
+from tfcompose.model.robot import Edge, Process, Robot
+from tfcompose.spec.language.pose import MountKeys
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from typing import Any
 
-    from tfcompose.compiler.resolve.part import Joined
-    from tfcompose.compiler.resolve.parts import Parts
-    from tfcompose.compiler.resolve.poses import Draft
+    from tfcompose.compiler.resolve.draft import Pass
     from tfcompose.compiler.resolve.presets import Library
     from tfcompose.compiler.urdf.packages import Disk
     from tfcompose.model.plan import GuardPolicy
     from tfcompose.model.robot.hardware import Block
     from tfcompose.spec.language import Validated
-    from tfcompose.spec.language.robot import RobotSpec
-    from tfcompose.spec.load import Path, Source
 
 
 def resolve(
@@ -75,277 +64,177 @@ def resolve(
     library: Library,
     read: Callable[[str], str] | None = None,
     disk: Disk | None = None,
-    holder: Parts | None = None,
-) -> Resolved:
-    """Return the robot with presets expanded, parts joined, poses solved and owners given.
+    holder: Draft | None = None,
+) -> tuple[Draft, list[Finding]]:
+    """Return the draft, whose robot is resolved, right or wrong, and what was found.
 
-    ``read`` gives the text of a calibration or a part; without ``disk`` no mesh and no package is
-    looked for. ``holder`` is what resolves the robot as a part.
+    Its presets are expanded, parts joined, poses solved and owners given. ``read`` gives the text
+    of a calibration or a part; without ``disk`` no mesh and no package is looked for. ``holder``
+    is what the robot is a part of.
     """
-    return _Work(validated, library, read, disk, holder).resolved()
+    collected = holder.collected if holder else Collected()
+    draft = Draft(validated, library, read, disk, collected=collected, holder=holder)
+    findings: list[Finding] = []
+    for run in PASSES:
+        findings += run(draft)
+    return draft, findings
 
 
-@dataclass(slots=True)
-class _Work:
-    """A robot while it is resolved: what was found, and which entries were refused already."""
+def add_processes(draft: Draft) -> Iterator[Finding]:
+    """Take tfcompose's own processes, those of tools, the containers, and what the user starts."""
+    spec = draft.spec
+    draft.processes += [*built_in(spec), *([] if draft.holder else own_router(spec))]
+    yield from add_sections(draft)
+    added = draft.process_names
+    for name, container in spec.containers.items():
+        draft.processes.append(container_process(name, container, spec))
+    for name, declared in spec.processes.items():
+        if name in added or is_own_router(name, declared, spec):
+            yield from built_in_keys(name, declared, spec)
+            continue
+        process = yield from user_process(name, declared, draft.validated)
+        if process and process.kind == "component":
+            process = component_process(process, declared, spec)
+        if process:
+            draft.processes.append(process)
+    started = draft.process_names
+    draft.broken |= {("processes", name) for name in spec.processes if name not in started}
 
-    validated: Validated
-    library: Library
-    read: Callable[[str], str] | None
-    disk: Disk | None
-    holder: Parts | None
-    found: list[Finding] = field(default_factory=list)
-    of_parts: list[Finding] = field(default_factory=list)
-    broken: set[tuple[str, str]] = field(default_factory=set)
-    collected: Collected = field(default_factory=Collected)
-    joined: list[Joined] = field(default_factory=list)
-    sections: list[ToolSection] = field(default_factory=list)
 
-    @property
-    def spec(self) -> RobotSpec:
-        return self.validated.spec
+def join_parts(draft: Draft) -> Iterator[Finding]:
+    """Resolve the parts, and note what was refused in them."""
+    if draft.spec.parts:
+        from tfcompose.compiler.resolve.parts import join
 
-    @property
-    def source(self) -> Source:
-        return self.validated.source
+        yield from join(draft, resolve)
 
-    def resolved(self) -> Resolved:
-        """Return the robot and what was found; each step knows what the ones before it refused."""
-        self.broken.update(self.validated.broken)
-        if self.holder is None:
-            self.sections = sections_of(self.spec, self.read)
-        of_tools = processes_of(self.sections, self.found)
-        own = _processes(self.validated, self.found, of_tools, is_part=self.holder is not None)
-        started = {process.name for process in own}
-        self.broken |= {("processes", name) for name in self.spec.processes if name not in started}
-        packages = self._packages()
-        self._join_parts(packages)
-        bodies = Bodies(self.spec, packages)
-        simulated = frozenset(one.name for one in self._everybody(own) if one.kind == "simulate")
-        drafts = Drafts(self.validated, simulated, bodies)
-        self._draft(drafts)
-        names = (*drafts.frames, *(process.name for process in self._everybody(own)))
-        excuses = partial(may_be_refused, broken=frozenset(self.broken), known=names)
-        solver = Solver(
-            self._measured(drafts),
-            drafts.frames,
-            self.validated.broken,
-            excuses,
-            self.validated.conditions,
-        )
-        edges = solver.solve()
-        own = [with_host_place(process, self.spec) for process in (*own, *drafts.drivers)]
-        self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
-        self.found += unnamed_nodes(edges, own, self.spec, self.broken)
-        robot = self._take(
-            with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec)
-        )
-        if any(node.params for process in own for node in process.ros_nodes):
-            from tfcompose.compiler.resolve.param_files import with_param_files
 
-            own_names = frozenset(one.name for one in own)
-            robot = self._take(with_param_files(robot, own_names, self.spec, self.read, packages))
-        if self.spec.ros2_control or self.spec.xml:
-            from tfcompose.compiler.resolve.blocks import with_blocks
+def add_parts(draft: Draft) -> Iterator[Finding]:
+    """Take the frames, edges, bodies and sensors of the parts."""
+    if draft.joined:
+        from tfcompose.compiler.resolve.parts import take
 
-            robot = self._take(with_blocks(robot, self.spec))
-        robot = replace(robot, base=self._base(robot))
-        if self.spec.ros.state_publisher == "stock":
-            from tfcompose.compiler.resolve.stock import with_stock
+        yield from take(draft)
 
-            robot = self._take(with_stock(robot))
-        robot = self._take(isolate(robot, self.spec, self.disk))
-        if has_claims(self.spec):
-            from tfcompose.compiler.resolve.claims import settled
 
-            robot = self._take(settled(robot, self.spec))
-        self.found += [one for process in robot.processes for one in unreached(process, self.spec)]
-        self.found += self._wrong_components(robot)
-        if self.holder is None:
-            self.found += wrong_middleware(robot, self.spec)
-            self.found += check_sections(self.sections, robot)
-            robot = with_router(robot)
-        return Resolved(robot, (*self.of_parts, *self.found), self.collected)
+def measure_mounts(draft: Draft) -> Iterator[Finding]:
+    """Give edges the poses of calibrations."""
+    mounts = (keys for keys in draft.keys.values() if isinstance(keys, MountKeys))
+    if draft.spec.calibrations or any(keys.calibration for keys in mounts):
+        from tfcompose.compiler.resolve.calibration import measure
 
-    def _wrong_components(self, robot: Robot) -> Iterator[Finding]:
-        for process in robot.processes:
-            section: Path = ("processes", process.name)
-            path = (
-                section
-                if process.name in self.spec.processes
-                else ("sensors", process.name, "driver")
-            )
-            yield from component_findings(path, process, self.validated)
+        yield from measure(draft)
 
-    def _take(self, done: tuple[Robot, list[Finding]]) -> Robot:
-        robot, found = done
-        self.found += found
-        return robot
 
-    def _packages(self) -> Packages:
-        places = {
-            name: (folder, self.spec.at(("packages", name)))
-            for name, folder in self.spec.packages.items()
-        }
-        return Packages(self.disk, places)
+def assemble(draft: Draft) -> Iterator[Finding]:
+    """Make the robot of what the passes before this one left."""
+    spec, validated = draft.spec, draft.validated
+    limits = yield from limits_of(spec)
+    parts = [part.robot for part in draft.joined]
+    in_tree = [part.robot for part in draft.joined if not part.declared.is_alone]
+    draft.processes = [with_host_place(process, spec) for process in draft.processes]
+    processes = draft.all_processes
+    draft.robot = Robot(
+        name=spec.robot,
+        file=spec.spans.file,
+        frames=draft.frames,
+        edges=_with_rates(draft.edges, processes),
+        links=with_colours(draft.links),
+        processes=tuple(processes),
+        base=None,
+        ros=settings_of(spec.ros),
+        guard=_guard(spec.guard, parts),
+        sensors=tuple(draft.sensors),
+        claims=tuple(claim for part in parts for claim in part.claims),
+        source_numbers=(
+            *source_numbers(spec),
+            *(numbers for part in parts for numbers in part.source_numbers),
+        ),
+        unused={path: spec.at_key(path) for path in validated.unused},
+        args=validated.args,
+        environment=reduce(or_, (part.environment for part in parts), validated.environment),
+        source_data=_source_data(draft),
+        broken=frozenset(draft.broken),
+        parts=tuple(alone for part in parts for alone in part.parts),
+        mounted={part.name: part.root for part in draft.joined if part.root is not None},
+        hardware=tuple(hardware for part in in_tree for hardware in part.hardware),
+        blocks=_blocks(in_tree),
+        foreign=frozenset(file for part in parts for file in part.foreign),
+        refused=tuple(
+            span for entry in sorted(validated.broken) if (span := spec.spans.exactly_at(entry))
+        ),
+        part_notes=draft.collected.notes,
+        is_variant=spec.spans.is_variant,
+        zones=(*zones_of(spec), *(zone for part in in_tree for zone in part.zones)),
+        limits=limits,
+        conditions=validated.conditions,
+        hosts=reduce(or_, (part.hosts for part in parts[::-1]), {}) | hosts_of(spec),
+        sections=as_sections(draft),
+    )
 
-    def _join_parts(self, packages: Packages) -> None:
-        """Resolve the parts, and note what was refused in them."""
-        if not self.spec.parts:
-            return
-        from tfcompose.compiler.resolve.parts import Parts
 
-        files, environment = (self.spec.spans.file,), self.validated.given.environment
-        parts = self.holder or Parts(
-            self.library,
-            self.read,
-            self.disk,
-            resolve=resolve,
-            environment=environment,
-            files=files,
-            collected=self.collected,
-        )
-        self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)
-        self.of_parts = parts.found
-        self.broken |= {
-            *parts.missing,
-            *(entry for part in self.joined for entry in part.robot.broken),
-        }
+def add_blocks(draft: Draft) -> Iterator[Finding]:
+    """Take the hardware of ros2_control, and raw URDF."""
+    if draft.spec.ros2_control or draft.spec.xml:
+        from tfcompose.compiler.resolve.blocks import take_blocks
 
-    def _everybody(self, own: list[Process]) -> list[Process]:
-        return [*own, *(process for part in self.joined for process in part.robot.processes)]
+        yield from take_blocks(draft)
 
-    def _draft(self, drafts: Drafts) -> None:
-        """Take what every section says, and forget the entries that cannot be taken."""
-        drafts.add_frames()
-        drafts.add_links()
-        drafts.add_joints()
-        presets = self._presets()
-        for name, declared in self.spec.sensors.items():
-            sensor, refused = sensor_of(name, declared, presets, self.spec)
-            self.found += refused
-            if sensor:
-                add_sensor(drafts, sensor)
-            else:
-                self.broken.add(("sensors", name))
-        for part in [part for part in self.joined if not drafts.add_part(part)]:
-            self.joined.remove(part)
-            names = (*part.robot.frames, *(process.name for process in part.robot.processes))
-            self.broken |= {("parts", name) for name in names}
 
-    def _presets(self) -> Library:
-        """Return the library with the user's folders before its own."""
-        if not self.spec.preset_path:
-            return self.library
-        places = [
-            self.spec.at(("preset_path", index)) for index in range(len(self.spec.preset_path))
-        ]
-        folders = [
-            path_named(folder, at)
-            for folder, at in zip(self.spec.preset_path, places, strict=True)
-        ]
-        self.found += [
-            finding(
-                "TF001",
-                f"preset_path: no folder {folder}",
-                at,
-                help="make it; it holds VENDOR/MODEL.yaml",
-            )
-            for folder, at in zip(folders, places, strict=True)
-            if not self.library.storage.is_folder(folder)
-        ]
-        return self.library.over(folders)
+def find_base(draft: Draft) -> Iterator[Finding]:
+    """Find where the URDF begins: as written; base_link, or a fixed base_footprint above it.
 
-    def _measured(self, drafts: Drafts) -> list[Draft]:
-        """Return the edges with the poses of calibrations."""
-        if not _has_calibrations(self.spec):
-            return drafts.edges
-        from tfcompose.compiler.resolve.calibration import calibrated
+    Else the only root.
+    """
+    robot, base = draft.robot, draft.spec.base
+    if base is None:
+        base = _usual_base(robot)
+    elif base not in robot.frames:
+        if not robot.excuses(base):
+            advice, at = did_you_mean(base, robot.frames), draft.spec.at(("base",))
+            yield finding("TF203", f"unknown frame {base}", at, help=advice)
+        base = None
+    draft.robot = replace(robot, base=base)
 
-        measured, refused = calibrated(drafts.edges, drafts.frames, self.spec, self.read)
-        self.found += refused
-        return measured
 
-    def _base(self, robot: Robot) -> str | None:
-        """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it.
+def _usual_base(robot: Robot) -> str | None:
+    if "base_link" in robot.frames:
+        above = robot.parent_edge("base_link")
+        if above and above.kind == "static" and above.parent == "base_footprint":
+            return "base_footprint"
+        return "base_link"
+    roots = robot.roots()
+    return roots[0] if len(roots) == 1 else None
 
-        Else the only root.
-        """
-        base = self.spec.base
-        if base is not None:
-            if base in robot.frames:
-                return base
-            if not robot.excuses(base):
-                advice = did_you_mean(base, robot.frames)
-                self.found.append(
-                    finding("TF203", f"unknown frame {base}", self.spec.at(("base",)), help=advice)
-                )
-            return None
-        if "base_link" in robot.frames:
-            above = robot.parent_edge("base_link")
-            if above and above.kind == "static" and above.parent == "base_footprint":
-                return "base_footprint"
-            return "base_link"
-        roots = robot.roots()
-        return roots[0] if len(roots) == 1 else None
 
-    def _limits(self) -> dict[str, float]:
-        limits, refused = limits_of(self.spec)
-        self.found += refused
-        return limits
-
-    def _wrong_names(self, own: list[Process]) -> list[Finding]:
-        everybody = self._everybody(own)
-        return [
-            *name_clashes(everybody, self.spec),
-            *idle_keys(self.spec),
-            *unknown_names(
-                own, self.spec, frozenset(process.name for process in everybody), self.broken
-            ),
-        ]
-
-    def _robot(self, drafts: Drafts, edges: tuple[Edge, ...], everybody: list[Process]) -> Robot:
-        parts = [part.robot for part in self.joined]
-        in_tree = [part.robot for part in self.joined if not part.declared.is_alone]
-        numbers = source_numbers(self.spec)
-        return Robot(
-            name=self.spec.robot,
-            file=self.spec.spans.file,
-            frames=drafts.frames,
-            edges=_with_rates(edges, everybody),
-            links=with_colours(drafts.links),
-            processes=tuple(everybody),
-            base=None,
-            ros=settings_of(self.spec.ros),
-            guard=_guard(self.spec.guard, parts),
-            sensors=tuple(drafts.sensors),
-            claims=tuple(one for part in parts for one in part.claims),
-            source_numbers=numbers + tuple(one for part in parts for one in part.source_numbers),
-            unused={path: self.spec.at_key(path) for path in self.validated.unused},
-            args=self.validated.args,
-            environment=reduce(
-                or_, (part.environment for part in parts), self.validated.environment
-            ),
-            source_data=_source_data(self.validated, self.joined),
-            broken=frozenset(self.broken),
-            parts=tuple(alone for part in parts for alone in part.parts),
-            mounted={part.name: part.root for part in self.joined if part.root is not None},
-            hardware=tuple(one for part in in_tree for one in part.hardware),
-            blocks=_blocks(in_tree),
-            foreign=frozenset(file for part in parts for file in part.foreign),
-            refused=tuple(
-                at
-                for entry in sorted(self.validated.broken)
-                if (at := self.spec.spans.exactly_at(entry))
-            ),
-            part_notes=self.collected.notes,
-            is_variant=self.spec.spans.is_variant,
-            zones=zones_of(self.spec) + tuple(zone for part in in_tree for zone in part.zones),
-            limits=self._limits(),
-            conditions=self.validated.conditions,
-            hosts=reduce(or_, (part.hosts for part in parts[::-1]), {}) | hosts_of(self.spec),
-            sections=as_sections(self.sections),
-        )
+#: Each reads what the ones before it left in the draft.
+PASSES: tuple[Pass, ...] = (
+    add_processes,
+    join_parts,
+    add_frames,
+    add_links,
+    add_joints,
+    add_sensors,
+    add_parts,
+    measure_mounts,
+    solve_poses,
+    check_keys,
+    check_names,
+    check_waits,
+    check_launch_nodes,
+    assemble,
+    set_positions,
+    read_param_files,
+    add_blocks,
+    find_base,
+    use_stock_publisher,
+    isolate,
+    settle_claims,
+    check_arguments,
+    check_components,
+    check_sections,
+    use_middleware,
+)
 
 
 def _blocks(parts: list[Robot]) -> tuple[Block, ...]:
@@ -360,44 +249,10 @@ def _blocks(parts: list[Robot]) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _has_calibrations(spec: RobotSpec) -> bool:
-    entries = (
-        *spec.frames.values(),
-        *spec.links.values(),
-        *spec.sensors.values(),
-        *spec.parts.values(),
-    )
-    return bool(spec.calibrations) or any(entry.calibration for entry in entries)
-
-
-def _processes(
-    validated: Validated, found: list[Finding], of_tools: list[Process], *, is_part: bool
-) -> list[Process]:
-    processes = built_in(validated.spec)
-    spec = validated.spec
-    processes += [] if is_part else own_router(spec)
-    processes += of_tools
-    processes += [
-        container_process(name, declared, validated) for name, declared in spec.containers.items()
-    ]
-    names = {process.name for process in of_tools}
-    for name, declared in spec.processes.items():
-        if is_own_router(name, declared, spec) or name in names:
-            found += built_in_keys(name, declared, validated.spec)
-            continue
-        process, refused = user_process(name, declared, validated)
-        found += refused
-        if process and process.kind == "component":
-            process = component_process(process, declared, spec)
-        if process:
-            processes.append(process)
-    return processes
-
-
-def _source_data(validated: Validated, joined: list[Joined]) -> dict[str, Any]:
+def _source_data(draft: Draft) -> dict[str, Any]:
     """Return what the robot was made from, with what its parts were made from."""
-    parts = {part.name: part.robot.source_data for part in joined}
-    return validated.source_data | ({"in parts": parts} if parts else {})
+    parts = {part.name: part.robot.source_data for part in draft.joined}
+    return draft.validated.source_data | ({"in parts": parts} if parts else {})
 
 
 def _guard(declared: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
@@ -408,14 +263,14 @@ def _guard(declared: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
     return replace(declared, allow=(*declared.allow, *more))
 
 
-def _with_rates(edges: tuple[Edge, ...], processes: list[Process]) -> tuple[Edge, ...]:
+def _with_rates(edges: list[Edge], processes: list[Process]) -> tuple[Edge, ...]:
     """Give moving edges without a rate their process's: that of ``joints``, or of the stand-in."""
     rates = {}
     for process in reversed(processes):
         rates[process.name] = process.simulate.rate if process.simulate else process.rate
     rated = []
     for edge in edges:
-        has_none = edge.rate is None and edge.kind != "static"
-        rate = rates.get(edge.owner) if has_none else edge.rate
-        rated.append(replace(edge, rate=rate))
+        if edge.rate is None and edge.kind != "static":
+            edge = replace(edge, rate=rates.get(edge.owner))  # noqa: PLW2901 (the same edge)
+        rated.append(edge)
     return tuple(rated)

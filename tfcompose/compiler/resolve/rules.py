@@ -8,12 +8,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.catalogue import CATALOGUE, code_of
-from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.findings import finding
 from tfcompose.foundation.units import ANGLE, LENGTH, NUMBER
 from tfcompose.model.robot import Zone
 from tfcompose.spec.language.rules import RuleSpec
 
 if TYPE_CHECKING:
+    from tfcompose.compiler.resolve.draft import Finds
     from tfcompose.spec.language.robot import RobotSpec
 
 #: What a limit can be, by its unit in the catalogue: its dimension, what that is called, and one
@@ -25,9 +26,9 @@ _KINDS = {
 }
 
 
-def limits_of(spec: RobotSpec) -> tuple[dict[str, float], list[Finding]]:
-    """Return the limits that the file sets, in SI by code, and what is wrong with them."""
-    limits, found = {}, []
+def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
+    """Return the limits that the file sets, in SI by code."""
+    limits = {}
     for word, setting in spec.rules.items():
         code = code_of(word)
         if code is None or not isinstance(setting, RuleSpec) or setting.limit is None:
@@ -37,15 +38,15 @@ def limits_of(spec: RobotSpec) -> tuple[dict[str, float], list[Finding]]:
         if known is None:
             others = ", ".join(one.code for one in CATALOGUE.values() if one.limit)
             message = f"{code} {CATALOGUE[code].name} has no limit"
-            found.append(finding("TF107", message, place, help=f"these have one: {others}"))
+            yield finding("TF107", message, place, help=f"these have one: {others}")
             continue
         dimension, kind, sample = _KINDS[known[1]]
         if setting.limit.dimension not in {NUMBER, dimension}:
             message = f"the limit of {code} is {kind}"
-            found.append(finding("TF104", message, place, help=f"for example {sample}"))
+            yield finding("TF104", message, place, help=f"for example {sample}")
         else:
             limits[code] = setting.limit.value
-    return limits, found
+    return limits
 
 
 def zones_of(spec: RobotSpec) -> tuple[Zone, ...]:

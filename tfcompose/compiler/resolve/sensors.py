@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from tfcompose.compiler.resolve.bodies import Bodies
 from tfcompose.compiler.resolve.containers import component_process
+from tfcompose.compiler.resolve.edges import add_edge, add_joint_name
 from tfcompose.compiler.resolve.isolation import settings_of
 from tfcompose.compiler.resolve.optics import optics_of
-from tfcompose.compiler.resolve.poses import Draft, rotation_of
-from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE
+from tfcompose.compiler.resolve.poses import rotation_of
+from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE, sensor_of
 from tfcompose.compiler.resolve.processes import full_name, how, namespace_of, program
 from tfcompose.compiler.urdf.inertia import of_primitives
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
@@ -18,12 +20,13 @@ from tfcompose.model.plan import switch_text
 from tfcompose.model.process_keys import PROCESS_KEYS
 from tfcompose.model.robot import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
 from tfcompose.spec.language.preset import Chosen
+from tfcompose.spec.load import path_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.compiler.resolve.edges import Drafts
-    from tfcompose.compiler.resolve.presets import Sensor
+    from tfcompose.compiler.resolve.draft import Draft, Finds
+    from tfcompose.compiler.resolve.presets import Library, Sensor
     from tfcompose.foundation.findings import Span
     from tfcompose.spec.language import Validated
     from tfcompose.spec.language.preset import DriverClaim, PresetDriver, PresetFrame
@@ -31,43 +34,67 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path
 
 
-def add_sensor(drafts: Drafts, sensor: Sensor) -> None:
-    """Take a sensor into the drafts of a robot."""
-    _Mounting(drafts, sensor).add()
+def add_sensors(draft: Draft) -> Iterator[Finding]:
+    """Take the sensors, with their mounts, frames, bodies and drivers."""
+    spec = draft.spec
+    library = yield from _library(draft)
+    for name, declared in spec.sensors.items():
+        sensor = yield from sensor_of(name, declared, library, spec)
+        if sensor:
+            yield from _Mounting(draft, sensor).add()
+        else:
+            draft.broken.add(("sensors", name))
+
+
+def _library(draft: Draft) -> Finds[Library]:
+    """Return the presets, with those in the user's folders before the others."""
+    folders = []
+    for index, named in enumerate(draft.spec.preset_path):
+        at = draft.spec.at(("preset_path", index))
+        folder = path_named(named, at)
+        folders.append(folder)
+        if not draft.library.storage.is_folder(folder):
+            advice = "make it; it holds VENDOR/MODEL.yaml"
+            yield finding("TF001", f"preset_path: no folder {folder}", at, help=advice)
+    return draft.library.over(folders) if folders else draft.library
 
 
 @dataclass(frozen=True, slots=True)
 class _Mounting:
-    """One sensor on its way into the drafts."""
+    """One sensor on its way into the draft."""
 
-    drafts: Drafts
+    draft: Draft
     sensor: Sensor
     unknown: dict[str, str] = field(default_factory=dict)
 
-    def add(self) -> None:
-        drafts, sensor = self.drafts, self.sensor
+    def add(self) -> Iterator[Finding]:
+        """Take the sensor."""
+        draft, sensor = self.draft, self.sensor
         mount = self.renamed(sensor.named(sensor.preset.mount))
-        drafts.frames.setdefault(mount, self.place())
+        draft.frames.setdefault(mount, self.place())
         keys, at = sensor.spec, ("sensors", sensor.name)
-        drafts.add(at, keys.parent, mount, keys, joint_name=keys.joint, sensor=sensor)
-        publisher = self.publisher()
+        yield from add_edge(draft, at, mount, keys, joint_name=keys.joint, sensor=sensor.name)
+        others = len(draft.processes)
+        publisher = yield from self.publisher()
+        driver = sensor.name if len(draft.processes) > others else ""
         for name, frame in sensor.frames().items():
-            self.add_frame(name, frame, publisher)
-        self.report_unknown()
-        self.check_overrides(mount)
-        self.add_body()
-        drafts.sensors.append(self.mounted(mount))
+            yield from self.add_frame(name, frame, publisher)
+        yield from self.report_unknown()
+        yield from self.check_overrides(mount)
+        yield from self.add_body()
+        mounted = yield from self.mounted(mount, driver)
+        draft.sensors.append(mounted)
 
     def place(self, *keys: str) -> Span:
         """Return the place of the sensor, or of the value of a key in it."""
         at: Path = ("sensors", self.sensor.name, *keys)
-        return self.drafts.spec.at(at) if keys else self.drafts.spec.at_key(at)
+        return self.draft.spec.at(at) if keys else self.draft.spec.at_key(at)
 
     def renamed(self, name: str) -> str:
         own = self.sensor.spec.frames.get(name)
         return own.name if own and own.name else name
 
-    def add_frame(self, name: str, frame: PresetFrame, publisher: str) -> None:
+    def add_frame(self, name: str, frame: PresetFrame, publisher: str) -> Iterator[Finding]:
         """Take one frame inside the sensor: the unit's own value before the preset's."""
         own, final = self.sensor.spec.frames.get(name), self.renamed(name)
         parent = self.sensor.parent_of(name, frame)
@@ -76,10 +103,10 @@ class _Mounting:
         if missing and owner == STATIC:
             self.unknown[name] = f"{name}: {{{', '.join(missing)}}}"
         kind = "dynamic" if frame.driver == "dynamic" and owner != STATIC else "static"
-        self.drafts.frames.setdefault(final, self.place())
+        self.draft.frames.setdefault(final, self.place())
         nominal = frame.nominal and not (own and (own.xyz or rotation_of(own, name)))
-        joint = own.joint if own else None
         at: Path = ("sensors", self.sensor.name, "frames", name)
+        joint_at = yield from add_joint_name(self.draft, own.joint if own else None, at)
         edge = Edge(
             parent=self.renamed(parent),
             child=final,
@@ -92,11 +119,11 @@ class _Mounting:
             nominal=nominal,
             other_axes=frame.other_axes,
             pose_known=not missing,
-            joint_name=joint or "",
-            joint_at=self.drafts.named_joint(joint, at) if joint else None,
-            entry=("sensors", self.sensor.name, "frames", name),
+            joint_name=(own.joint if own else None) or "",
+            joint_at=joint_at,
+            entry=at,
         )
-        self.drafts.edges.append(Draft(edge))
+        self.draft.edges.append(edge)
 
     def pose_of(
         self, name: str, frame: PresetFrame, own: FrameOverride | None
@@ -120,8 +147,8 @@ class _Mounting:
             return Pose(), missing
         return Pose(xyz, turned or rotation or Pose().quat_xyzw), []
 
-    def report_unknown(self) -> None:
-        """Note the frames whose poses nobody knows, with what to write."""
+    def report_unknown(self) -> Iterator[Finding]:
+        """Yield a finding for the frames whose poses nobody knows, with what to write."""
         if self.unknown:
             sensor, first = self.sensor, next(iter(self.unknown))
             *others, last = self.unknown
@@ -130,20 +157,17 @@ class _Mounting:
             message = f"{sensor.spec.preset} has no pose of {names}{parent}"
             frames = ", ".join(self.unknown.values())
             advice = f"measure, and write: sensors: {{{sensor.name}: {{frames: {{{frames}}}}}}}"
-            self.drafts.found.append(finding("TF605", message, self.place("preset"), help=advice))
+            yield finding("TF605", message, self.place("preset"), help=advice)
 
-    def publisher(self) -> str:
-        """Return who publishes the frames inside the sensor that a driver can publish.
-
-        Note what cannot be.
-        """
+    def publisher(self) -> Finds[str]:
+        """Return who publishes the frames inside the sensor that a driver can publish."""
         sensor, declared, driver = self.sensor, self.sensor.spec, self.sensor.preset.driver
         named = declared.driver.process if declared.driver else None
-        process, found = driver_process(sensor, self.drafts.validated)
-        self.drafts.found += found
+        process, findings = driver_process(sensor, self.draft.validated)
+        yield from findings
         if process:
-            self.drafts.drivers += [process, *further_processes(sensor, self.drafts.validated)]
-        elif found:
+            self.draft.processes += [process, *further_processes(sensor, self.draft.spec)]
+        elif findings:
             return STATIC
         if sensor.tf == DRIVER:
             return named or sensor.name
@@ -153,9 +177,8 @@ class _Mounting:
                 why = f"that of {declared.preset} publishes none" + (
                     " with these options" if _has_driven_frames(sensor) else ""
                 )
-            self.refuse(
-                f"{sensor.name}: the driver cannot publish its frames: {why}", "tf: tfcompose"
-            )
+            message = f"{sensor.name}: the driver cannot publish its frames: {why}"
+            yield finding("TF604", message, self.place("tf"), help="tf: tfcompose")
         elif (
             declared.tf == TFCOMPOSE
             and driver
@@ -166,27 +189,19 @@ class _Mounting:
             message = (
                 f"{sensor.name}: the driver of {declared.preset} has no switch for its frames"
             )
-            self.refuse(message, "tf: driver; or driver: none, where there is no device")
+            advice = "tf: driver; or driver: none, where there is no device"
+            yield finding("TF604", message, self.place("tf"), help=advice)
         return STATIC
 
-    def refuse(self, message: str, advice: str) -> None:
-        self.drafts.found.append(finding("TF604", message, self.place("tf"), help=advice))
-
-    def mounted(self, mount: str) -> MountedSensor:
+    def mounted(self, mount: str, driver: str) -> Finds[MountedSensor]:
         """Return what the rules see of the sensor."""
         sensor, declared, preset = self.sensor, self.sensor.spec, self.sensor.preset
         named = declared.driver.process if declared.driver else None
-        own = (
-            sensor.name
-            if any(process.name == sensor.name for process in self.drafts.drivers)
-            else ""
-        )
         serial = next(
             (option for option in ("serial", "serial_number") if option in preset.options), ""
         )
         inside = (sensor.named(preset.mount), *sensor.frames())
-        optics, wrong = optics_of(sensor, inside, self.renamed, self.drafts.spec)
-        self.drafts.found += wrong
+        optics = yield from optics_of(sensor, inside, self.renamed, self.draft.spec)
         return MountedSensor(
             sensor.name,
             declared.preset,
@@ -195,7 +210,7 @@ class _Mounting:
             mount=mount,
             frames=tuple(self.renamed(name) for name in sensor.frames()),
             driver_frames=tuple(self.renamed(name) for name in sensor.driven()),
-            driver="" if named == "none" else named or own,
+            driver="" if named == "none" else named or driver,
             switch=preset.driver.off if preset.driver else None,
             publishes=sensor.tf == DRIVER,
             claims={
@@ -209,8 +224,8 @@ class _Mounting:
             optics=optics,
         )
 
-    def check_overrides(self, mount: str) -> None:
-        sensor, spec = self.sensor, self.drafts.spec
+    def check_overrides(self, mount: str) -> Iterator[Finding]:
+        sensor, spec = self.sensor, self.draft.spec
         original = sensor.named(sensor.preset.mount)
         known = [*sensor.frames(), original]
         at: Path = ("sensors", sensor.name, "frames")
@@ -218,38 +233,32 @@ class _Mounting:
             place = spec.at_key((*at, name))
             if name not in known:
                 advice = did_you_mean(name, known, f"there is {', '.join(known)}")
-                self.drafts.found.append(
-                    finding("TF203", f"{sensor.name} has no frame {name}", place, help=advice)
-                )
+                yield finding("TF203", f"{sensor.name} has no frame {name}", place, help=advice)
             elif own.parent and own.parent not in known:
                 advice = did_you_mean(own.parent, known, f"there is {', '.join(known)}")
                 message = f"{sensor.name} has no frame {own.parent}"
-                self.drafts.found.append(
-                    finding("TF203", message, spec.at((*at, name, "parent")), help=advice)
-                )
+                yield finding("TF203", message, spec.at((*at, name, "parent")), help=advice)
         mounted = sensor.spec.frames.get(original)
         if mounted and (mounted.xyz or mounted.parent or mounted.joint or rotation_of(mounted)):
             advice = f"its pose and joint are those of {sensor.name}"
             message = f"{mount} is the mount, and has no pose inside"
-            self.drafts.found.append(
-                finding("TF106", message, spec.at_key((*at, original)), help=advice)
-            )
+            yield finding("TF106", message, spec.at_key((*at, original)), help=advice)
         if mount in sensor.frames():
             message = f"{mount} is a frame inside {sensor.name} already"
-            self.drafts.found.append(
-                finding("TF604", message, self.drafts.frames[mount], help="another name")
-            )
+            yield finding("TF604", message, self.draft.frames[mount], help="another name")
 
-    def add_body(self) -> None:
+    def add_body(self) -> Iterator[Finding]:
         body = self.sensor.preset.body
         if body is None:
             return
         frame = self.renamed(self.sensor.named(body.frame))
-        if frame in self.drafts.links:
+        if frame in self.draft.links:
             return
-        shape = self.drafts.bodies.shape(body.shape, ("sensors", self.sensor.name))
+        bodies = Bodies(self.draft.spec, self.draft.packages)
+        shape = bodies.shape(body.shape, ("sensors", self.sensor.name))
+        yield from bodies.found
         inertial = of_primitives(body.mass, (shape,)) if body.mass and not shape.mesh else None
-        self.drafts.links[frame] = Link(frame, self.place(), (shape,), (shape,), inertial)
+        self.draft.links[frame] = Link(frame, self.place(), (shape,), (shape,), inertial)
 
 
 def _has_driven_frames(sensor: Sensor) -> bool:
@@ -272,7 +281,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     spec = validated.spec
     at: Path = ("sensors", sensor.name, "driver")
     if declared and declared.process is not None:
-        return None, _named_driver(sensor, declared.process, validated)
+        return None, [*_named_driver(sensor, declared.process, validated)]
     if declared and declared.simulate:
         advice = "driver: none, and tf: tfcompose, where there is no device"
         return None, [
@@ -288,7 +297,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     if driver is None and declared is None:
         return None, []
     if not external and not loaded and not (run and run.is_startable) and (run or driver is None):
-        return None, _says_not_how(sensor.name, validated)
+        return None, [*_says_not_how(sensor.name, validated)]
     launched = driver is not None and driver.launch is not None and run is None and loaded is None
     computed = driver_parameters(sensor, settings_of(spec.ros).frame_prefix)
     params = (declared.params if declared else {}) | _node_parameters(
@@ -328,20 +337,19 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     ]
 
 
-def _says_not_how(name: str, validated: Validated) -> list[Finding]:
-    """Return a finding about a driver that does not say how it runs, unless refused."""
+def _says_not_how(name: str, validated: Validated) -> Iterator[Finding]:
+    """Yield a finding about a driver that does not say how it runs, unless refused."""
     at: Path = ("sensors", name, "driver")
-    if {(*at, "component"), (*at, "container")} & validated.refused:
-        return []
-    advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, or external: true"
-    place = validated.spec.at_key((*at, "run"))
-    return [finding("TF102", f"the driver of {name} does not say how it runs", place, help=advice)]
+    if not {(*at, "component"), (*at, "container")} & validated.refused:
+        advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, or external: true"
+        place = validated.spec.at_key((*at, "run"))
+        message = f"the driver of {name} does not say how it runs"
+        yield finding("TF102", message, place, help=advice)
 
 
-def further_processes(sensor: Sensor, validated: Validated) -> Iterator[Process]:
+def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
     """Yield the additional processes of a sensor's driver, if its preset starts it."""
     driver, declared = sensor.preset.driver, sensor.spec.driver
-    spec = validated.spec
     if driver is None or (
         declared and (declared.process or declared.run or declared.external or declared.simulate)
     ):
@@ -467,11 +475,11 @@ def _plain(value: Any) -> str:
     return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
 
 
-def _unreached(sensor: Sensor, spec: RobotSpec) -> list[Finding]:
-    """Return findings about names that the driver makes itself, against the spec."""
+def _unreached(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
+    """Yield findings about names that the driver makes itself, against the spec."""
     driver, declared = sensor.preset.driver, sensor.spec
     if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
-        return []
+        return
     settings = settings_of(spec.ros)
     named = {sensor.named(frame) for frame in driver.naming.values()}
     stamped = {
@@ -481,7 +489,6 @@ def _unreached(sensor: Sensor, spec: RobotSpec) -> list[Finding]:
     }
     own = (stamped | ({*sensor.driven()} if sensor.tf == DRIVER else set())) - named
     at: Path = ("sensors", sensor.name)
-    found = []
     for name in sorted(own & {frame for frame, one in declared.frames.items() if one.name}):
         wanted = declared.frames[name].name
         message = (
@@ -489,11 +496,8 @@ def _unreached(sensor: Sensor, spec: RobotSpec) -> list[Finding]:
             f" {wanted}"
         )
         place = spec.at((*at, "frames", name, "name"))
-        found.append(
-            finding(
-                "TF604", message, place, help=f"rename the sensor {sensor.name}, or keep the name"
-            )
-        )
+        advice = f"rename the sensor {sensor.name}, or keep the name"
+        yield finding("TF604", message, place, help=advice)
     if (
         settings.frame_prefix
         and not driver.prefixed
@@ -504,7 +508,7 @@ def _unreached(sensor: Sensor, spec: RobotSpec) -> list[Finding]:
             " frames"
         )
         advice = "ros: {isolate: topics} keeps robots apart without a prefix"
-        found.append(finding("TF604", message, spec.at_key(at), help=advice))
+        yield finding("TF604", message, spec.at_key(at), help=advice)
     if (
         driver.launch
         and declared.driver
@@ -513,18 +517,15 @@ def _unreached(sensor: Sensor, spec: RobotSpec) -> list[Finding]:
     ):
         message = f"{driver.launch} of {declared.preset} takes no file of parameters"
         place = spec.at_key((*at, "driver", "params"))
-        found.append(
-            finding("TF604", message, place, help="driver: {run: {package: …, executable: …}}")
-        )
-    return found
+        yield finding("TF604", message, place, help="driver: {run: {package: …, executable: …}}")
 
 
 #: Words for no driver that YAML 1.2 reads as strings.
 OFF = frozenset({"off", "Off", "OFF", "no", "No", "NO", "null", "None", "NONE", "disabled"})
 
 
-def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Finding]:
-    """Return findings about a driver that is the name of a process.
+def _named_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[Finding]:
+    """Yield findings about a driver that is the name of a process.
 
     It must be one, and has its own keys.
     """
@@ -532,7 +533,6 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Findi
     spec = validated.spec
     broken = (entry for section, entry in validated.broken if section in {"processes", "sensors"})
     known = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
-    found = []
     if name != "none" and name not in known:
         declare = f"processes: {{{name}: {{external: true}}}}"
         otherwise = (
@@ -543,25 +543,19 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Findi
         advice = did_you_mean(name, known, otherwise)
         if name in OFF:
             advice = "driver: none starts no driver"
-        found.append(
-            finding(
-                "TF813",
-                f"the driver of {sensor.name} is {name}, which is not a process",
-                spec.at(at),
-                help=advice,
-            )
-        )
+        message = f"the driver of {sensor.name} is {name}, which is not a process"
+        yield finding("TF813", message, spec.at(at), help=advice)
     driver = sensor.spec.driver
     for key in driver.model_fields_set - {"process"} if driver else ():
         place = spec.at_key((*at, key))
         advice = f"write it under processes: {name}"
-        found.append(finding("TF107", f"{key} and process exclude each other", place, help=advice))
-    return found
+        yield finding("TF107", f"{key} and process exclude each other", place, help=advice)
 
 
-def _given_parameters(sensor: Sensor, computed: dict[str, Any], spec: RobotSpec) -> list[Finding]:
-    """Return a finding for each parameter that the user gives and tfcompose computes."""
-    found = []
+def _given_parameters(
+    sensor: Sensor, computed: dict[str, Any], spec: RobotSpec
+) -> Iterator[Finding]:
+    """Yield a finding for each parameter that the user gives and tfcompose computes."""
     for key in sensor.spec.driver.params if sensor.spec.driver else ():
         if key in computed:
             message = (
@@ -569,5 +563,4 @@ def _given_parameters(sensor: Sensor, computed: dict[str, Any], spec: RobotSpec)
                 f" {sensor.spec.preset}"
             )
             place = spec.at_key(("sensors", sensor.name, "driver", "params", key))
-            found.append(finding("TF604", message, place, help="remove it; options and tf set it"))
-    return found
+            yield finding("TF604", message, place, help="remove it; options and tf set it")

@@ -20,39 +20,50 @@ from tfcompose.model.plan.stock import STATE_PUBLISHER as NAME
 from tfcompose.model.robot import JOINTS, STATIC, Node
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.model.robot import Process, Robot
 
 
-def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
-    """Return the robot with a stock publisher as ``joints``, and what that cannot do.
+def use_stock_publisher(draft: Draft) -> Iterator[Finding]:
+    """Put a stock robot_state_publisher in the place of ``joints``, where the file wants one."""
+    if draft.spec.ros.state_publisher == "stock" and draft.robot.base is not None:
+        yield from stock_faults(draft.robot)
+        draft.robot = with_stock(draft.robot)
 
-    Fixed edges elsewhere stay with ``static``, which then sends the description too.
-    """
-    if robot.base is None:
-        return robot, []
+
+def stock_faults(robot: Robot) -> Iterator[Finding]:
+    """Yield what a stock publisher cannot do for a robot with a base."""
     described = robot.described()
-    below = described - {robot.base}
-    found = [
-        finding(
-            "TF315",
-            f"the joint {edge.joint.name} is not below {robot.base}, and a stock {NAME} publishes"
-            " only what is",
-            edge.joint.at,
-            help="state_publisher: tfcompose, or another base",
-        )
-        for edge in robot.edges
-        if edge.joint and edge.owner == JOINTS and edge.child not in below
-    ]
-    for frame in (
-        sorted(described & set(robot.ros.shared_frames)) if robot.ros.frame_prefix else ()
-    ):
+    for edge in robot.edges:
+        if (
+            edge.joint
+            and edge.owner == JOINTS
+            and not (edge.child in described and edge.child != robot.base)
+        ):
+            message = (
+                f"the joint {edge.joint.name} is not below {robot.base}, and a stock {NAME}"
+                " publishes only what is"
+            )
+            advice = "state_publisher: tfcompose, or another base"
+            yield finding("TF315", message, edge.joint.at, help=advice)
+    shared = described & set(robot.ros.shared_frames) if robot.ros.frame_prefix else set[str]()
+    for frame in sorted(shared):
         message = (
             f"{frame} is shared and in the tree of {robot.base}: a stock {NAME} prefixes every"
             " frame"
         )
-        found.append(
-            finding("TF316", message, robot.frames.get(frame), help="state_publisher: tfcompose")
-        )
+        at = robot.frames.get(frame)
+        yield finding("TF316", message, at, help="state_publisher: tfcompose")
+
+
+def with_stock(robot: Robot) -> Robot:
+    """Return the robot with a stock publisher as ``joints``.
+
+    Fixed edges elsewhere stay with ``static``, which then sends the description too.
+    """
+    below = robot.described() - {robot.base}
     edges = []
     for edge in robot.edges:
         is_taken = edge.owner == STATIC and edge.kind == "static" and edge.child in below
@@ -62,7 +73,7 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
         for index, process in enumerate(processes):
             if process.name == JOINTS:
                 processes[index] = _stock(process, robot)
-    return replace(robot, edges=tuple(edges), processes=tuple(processes)), found
+    return replace(robot, edges=tuple(edges), processes=tuple(processes))
 
 
 def _stock(joints: Process, robot: Robot) -> Process:

@@ -15,11 +15,11 @@ from tfcompose.model.robot import Section
 from tfcompose.spec.language.tool_keys import keys_in
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterator
 
+    from tfcompose.compiler.resolve.draft import Draft, Finds
     from tfcompose.foundation.findings import Span
     from tfcompose.foundation.tool import Key
-    from tfcompose.model.robot import Process, Robot
     from tfcompose.spec.language.robot import RobotSpec
 
 
@@ -46,49 +46,50 @@ class ToolSection:
         return self.spec.at_key((self.key.name, *path))
 
 
-def sections_of(spec: RobotSpec, read: Callable[[str], str] | None) -> list[ToolSection]:
-    """Return the sections of tools that a robot file has, without those that were refused."""
-    values = {key: getattr(spec, key.name, None) for key in keys_in(spec.model_fields_set)}
-    return [
-        ToolSection(key, value, spec, read) for key, value in values.items() if value is not None
-    ]
+def sections_of(draft: Draft) -> list[ToolSection]:
+    """Return the sections of tools that a robot file has, without those that were refused.
+
+    Those of a part have no effect.
+    """
+    spec = draft.spec
+    keys = keys_in(spec.model_fields_set) if draft.holder is None else []
+    sections = [ToolSection(key, getattr(spec, key.name, None), spec, draft.read) for key in keys]
+    return [section for section in sections if section.value is not None]
 
 
-def as_sections(sections: Iterable[ToolSection]) -> dict[str, Section]:
+def as_sections(draft: Draft) -> dict[str, Section]:
     """Return the sections as rules find them in ``Robot.sections``."""
     return {
         section.key.name: Section(section.key.name, section.value, section.spec.at)
-        for section in sections
+        for section in sections_of(draft)
     }
 
 
-def processes_of(sections: Iterable[ToolSection], found: list[Finding]) -> list[Process]:
-    """Return the processes that tools add, with their keys from ``processes``.
+def add_sections(draft: Draft) -> Iterator[Finding]:
+    """Take the processes that tools add, with their keys from ``processes``.
 
     One whose name has an entry that says how it runs is not added: the entry takes its place.
     """
-    processes = []
-    for section in sections:
-        for process in _hook(section, section.key.processes, found):
-            declared = section.spec.processes.get(process.name)
+    for section in sections_of(draft):
+        processes = yield from _hook(section, section.key.processes)
+        for process in processes:
+            declared = draft.spec.processes.get(process.name)
             if says_how(declared):
                 continue
             if declared is not None:
-                at = section.spec.at_key(("processes", process.name))
+                at = draft.spec.at_key(("processes", process.name))
                 process = replace(process, at=at)  # noqa: PLW2901 (the place of its own entry)
-            processes.append(added(process, declared, section.spec))
-    return processes
+            draft.processes.append(added(process, declared, draft.spec))
 
 
-def check_sections(sections: Iterable[ToolSection], robot: Robot) -> list[Finding]:
-    """Return what tools find in their sections, of the robot and of files that they name."""
-    findings: list[Finding] = []
-    for section in sections:
-        findings += _hook(section, section.key.check, findings, robot)
-    return findings
+def check_sections(draft: Draft) -> Iterator[Finding]:
+    """Yield what tools find in their sections, of the robot and of files that they name."""
+    for section in sections_of(draft):
+        findings = yield from _hook(section, section.key.check, draft.robot)
+        yield from findings
 
 
-def _hook(section: ToolSection, reference: str, found: list[Finding], *more: Any) -> list[Any]:
+def _hook(section: ToolSection, reference: str, *more: Any) -> Finds[list[Any]]:
     """Return what a tool's function returns.
 
     Nothing where it has none, and a finding where it crashes.
@@ -100,5 +101,5 @@ def _hook(section: ToolSection, reference: str, found: list[Finding], *more: Any
     except Exception as error:  # noqa: BLE001 (a tool's fault must not hide the others' findings)
         message = f"{reference} of {section.key.name} crashed: {type(error).__name__}: {error}"
         advice = "this is a bug in the tool: please report it"
-        found.append(finding("TF903", message, section.at_key(), help=advice))
+        yield finding("TF903", message, section.at_key(), help=advice)
         return []

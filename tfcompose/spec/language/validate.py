@@ -40,7 +40,8 @@ class Validated:
     of variables and arguments that nothing uses. ``source`` has the entries that conditions and
     loops leave, and ``conditions`` are those of the others, by (section, name). ``args`` are the
     values of the arguments that were ``given`` or are their defaults, ``environment`` those of the
-    variables that the file names.
+    variables that the file names. ``source_data`` is all that, and the plain data of the source:
+    what a plan's digest is made of.
     """
 
     spec: RobotSpec
@@ -52,21 +53,8 @@ class Validated:
     args: dict[str, ParameterValue] = field(default_factory=dict)
     environment: dict[str, str] = field(default_factory=dict)
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
-    broken: frozenset[tuple[str, str]] = field(init=False)
-
-    @property
-    def source_data(self) -> dict[str, Any]:
-        """The plain data that the spec was made from, with what it was given."""
-        given = {"args given": self.args, "environment": self.environment}
-        return self.source.data | {name: values for name, values in given.items() if values}
-
-    def __post_init__(self) -> None:
-        entries = {(str(path[0]), str(path[1])) for path in self.refused if len(path) > 1}
-        object.__setattr__(
-            self,
-            "broken",
-            frozenset(entries | set(_children(entries, self.source.mapping("joints")))),
-        )
+    broken: frozenset[tuple[str, str]] = frozenset()
+    source_data: dict[str, Any] = field(default_factory=dict)
 
 
 def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -105,7 +93,9 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
         raise RejectedError(found)
     spec.carry(source)
     refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
+    entries = {(str(path[0]), str(path[1])) for path in refused if len(path) > 1}
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
+    from_outside = {"args given": args, "environment": variables.environment}
     return Validated(
         spec,
         source,
@@ -116,6 +106,8 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
         args=args,
         environment=variables.environment,
         conditions=done.conditions,
+        broken=frozenset((*entries, *_children(entries, source.mapping("joints")))),
+        source_data=source.data | {name: used for name, used in from_outside.items() if used},
     )
 
 

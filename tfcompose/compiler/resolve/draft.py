@@ -1,0 +1,109 @@
+"""A robot while it is resolved: what the file says, and what the passes made of it so far.
+
+A pass is a function of one draft that yields findings: it reads what the passes before it left,
+and fills in its own. A helper that finds something and returns a value besides does both as well:
+``value = yield from helper(…)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.urdf.packages import Packages
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator
+    from typing import TypeVar
+
+    from tfcompose.compiler.resolve.part import Joined
+    from tfcompose.compiler.resolve.presets import Library
+    from tfcompose.compiler.urdf.packages import Disk
+    from tfcompose.foundation.findings import Allow, Finding, Note, Span
+    from tfcompose.model.robot import Edge, Link, MountedSensor, Process, Robot
+    from tfcompose.spec.language import Validated
+    from tfcompose.spec.language.pose import EdgeKeys
+    from tfcompose.spec.language.robot import RobotSpec
+    from tfcompose.spec.load import Source
+
+    T = TypeVar("T")
+    Finds = Generator[Finding, None, T]
+    Pass = Callable[["Draft"], Iterator[Finding]]
+
+
+@dataclass(slots=True)
+class Collected:
+    """What is collected from all parts of a robot, and from their parts.
+
+    ``allows`` are the comments in their files that silence findings. ``notes`` holds, for each
+    file that is a part, a note for each use that says as which part; ``sources`` are what the
+    robot files among them were resolved from.
+    """
+
+    count: int = 0
+    allows: list[Allow] = field(default_factory=list)
+    notes: dict[str, list[Note]] = field(default_factory=dict)
+    sources: list[Source] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Draft:
+    """One robot while it is resolved; ``holder`` is the robot that it is a part of.
+
+    ``read`` gives the text of a file; without ``disk`` no mesh and no package is looked for.
+    """
+
+    validated: Validated
+    library: Library
+    read: Callable[[str], str] | None
+    disk: Disk | None
+    #: What the robot that holds all others collects from its parts, and from theirs.
+    collected: Collected
+    holder: Draft | None = None
+    #: Where its files find packages.
+    packages: Packages = field(init=False)
+    #: The entries (section, name) that were refused, and names that parts would have brought.
+    broken: set[tuple[str, str]] = field(init=False)
+    #: Those that this file brings; those of parts are theirs.
+    processes: list[Process] = field(default_factory=list)
+    joined: list[Joined] = field(default_factory=list)
+    frames: dict[str, Span] = field(default_factory=dict)
+    joints: dict[str, Span] = field(default_factory=dict)
+    #: Their poses are those that are written until ``solve_poses`` has run.
+    edges: list[Edge] = field(default_factory=list)
+    #: The keys of the edges that this file writes, by index.
+    keys: dict[int, EdgeKeys] = field(default_factory=dict)
+    links: dict[str, Link] = field(default_factory=dict)
+    sensors: list[MountedSensor] = field(default_factory=list)
+    #: There is one once ``assemble`` has run.
+    robot: Robot = field(init=False)
+
+    def __post_init__(self) -> None:
+        spec = self.spec
+        places = {
+            name: (folder, spec.at(("packages", name))) for name, folder in spec.packages.items()
+        }
+        self.packages = Packages(self.disk, places)
+        self.broken = set(self.validated.broken)
+
+    @property
+    def spec(self) -> RobotSpec:
+        """What the user wrote, with the places of it."""
+        return self.validated.spec
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The robot file, after those that it is a part of."""
+        above = self.holder.files if self.holder else ()
+        return (*above, self.spec.spans.file)
+
+    @property
+    def all_processes(self) -> list[Process]:
+        """The processes of the robot and of its parts."""
+        of_parts = (process for part in self.joined for process in part.robot.processes)
+        return [*self.processes, *of_parts]
+
+    @property
+    def process_names(self) -> frozenset[str]:
+        """The names of all processes."""
+        return frozenset(process.name for process in self.all_processes)

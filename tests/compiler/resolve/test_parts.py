@@ -96,6 +96,23 @@ def only(result: Compiled, code: str) -> Any:
     return next(one for one in result.found if one.code == code)
 
 
+def test_a_component_of_a_part_is_in_the_container_of_the_part() -> None:
+    eye = """
+tfcompose: 1
+robot: arm
+links: {base: {}}
+containers: {loader: {}}
+processes:
+  eye: {component: lens/Eye, container: loader}
+"""
+    robot = sound(CELL.replace(", EXTRA", ""), arm_yaml=eye)
+    processes = {process.name: process for process in robot.processes}
+    component = processes["left/eye"].component
+    assert component
+    assert component.container == "left/loader"
+    assert component.container in processes
+
+
 def test_two_robots_from_one_file_share_a_map_and_nothing_else() -> None:
     robot = sound(FLEET)
     assert robot.roots() == ["map"]

@@ -83,7 +83,7 @@ def component_process(process: Process, declared: Started, spec: RobotSpec) -> P
 
 def check_components(draft: Draft) -> Iterator[Finding]:
     """Yield what is wrong with components: no such container, and what they cannot have."""
-    for process in draft.robot.processes:
+    for process in draft.robot.processes[: len(draft.processes)]:  # without those of parts
         if process.component:
             yield from _check_component(process, process.component, draft)
 

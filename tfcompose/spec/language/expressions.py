@@ -1,28 +1,26 @@
 """``${…}`` in strings: arithmetic and conditions with quantities, vars, args and pi.
 
-No Python is run, and of the environment only what ``env`` names is read. The grammar::
+The syntax is Python's, for ``and or not if else``, comparisons, ``+ - * /``, brackets and calls.
+An operand is one of these::
 
-    choice     = either ["if" either "else" choice]
-    either     = both {"or" both}
-    both       = negation {"and" negation}
-    negation   = "not" negation | comparison
-    comparison = sum [("==" | "!=" | "<" | "<=" | ">" | ">=") sum]
-    sum        = product {("+" | "-") product}
-    product    = sign {("*" | "/") sign}
-    sign       = ["+" | "-"] value
-    value      = NUMBER [UNIT] | NAME | TEXT | "true" | "false" | NAME "(" choice ")"
-               | "(" choice ")" | "env" "(" NAME ["," DEFAULT] ")"
+    NUMBER [UNIT] | NAME | TEXT | "true" | "false" | "env" "(" NAME ["," DEFAULT] ")"
 
-TEXT is in single or double quotes. DEFAULT is a text up to the bracket, as it stands there. The
-items of a loop are a list, or one ``range(sum [, sum])``.
+TEXT is in single or double quotes, without escapes. DEFAULT is a text up to the bracket, as it
+stands there. The items of a loop are a list, or one ``range(first, end)``. No Python is run, and
+of the environment only what ``env`` names is read.
 """
 
 from __future__ import annotations
 
+import ast
 import math
 import operator
 import re
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import did_you_mean
 from tfcompose.foundation.units import (
@@ -38,18 +36,25 @@ from tfcompose.foundation.units import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Mapping, Sequence
 
 Value = Quantity | str | bool
 
 LONGEST_QUOTED = 60
 DEEPEST = 20
 
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)"
-    r"|(?P<env>env\s*\([^()]*\))"
-    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*)"
-    r"|(?P<text>'[^']*'|\"[^\"]*\")|(?P<sign>[=!<>]=|[-+*/()<>,]))"
+_NAME = r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*"
+_CONNECTIVES = r"(?:and|or|not|if|else)(?![\w.])"
+#: The units of two words, with spaces where people put them.
+_FRACTIONS = "|".join(rf"{unit.replace('/', ' */ *')}\b" for unit in UNITS if unit.count("/") == 1)
+_QUANTITY = re.compile(
+    r"(?P<number>(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)"
+    rf"(?:\s*(?P<unit>(?!{_CONNECTIVES})(?:{_FRACTIONS}|{_NAME})))?"
+)
+_SYMBOL = re.compile(
+    rf"\s*(?:(?P<operand>{_QUANTITY.pattern}|env\s*\([^()]*\)|'[^']*'|\"[^\"]*\""
+    rf"|(?!{_CONNECTIVES}){_NAME})"
+    rf"|(?P<sign>{_CONNECTIVES}|[=!<>]=|[-+*/()<>,]))"
 )
 _ENV = re.compile(
     r"env\s*\(\s*(?P<name>[A-Za-z_][A-Za-z0-9_]*)\s*(?:,\s*(?P<default>.*?)\s*)?\)", re.DOTALL
@@ -82,7 +87,6 @@ RESERVED = {
 }
 #: What may be meant by a path that only a process knows.
 A_FILE = "${file(PATH)} is the path of a file beside this one"
-_CONNECTIVES = ("and", "or", "not", "if", "else")
 
 
 class ExpressionError(ValueError):
@@ -169,14 +173,17 @@ def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
     Raises:
         ExpressionError: if it is malformed, too long or not computable.
     """
-    if len(text) > LONGEST_EXPRESSION:
-        raise ExpressionError(
-            f"an expression of {len(text)} characters; at most {LONGEST_EXPRESSION} are read"
-        )
+    expression = parse(text)
     try:
-        return Arithmetic(text, lookup).parse()
+        value = _Evaluation(expression, lookup).value(expression.body)
+        is_finite = not isinstance(value, Quantity) or math.isfinite(value.value)
     except OverflowError:  # from whole numbers, which Python does not bound
-        raise ExpressionError(f"${{{text[:LONGEST_QUOTED]}}} is not finite") from None
+        is_finite = False
+    except RecursionError:
+        raise ExpressionError(f"{expression} is too deep") from None
+    if not is_finite:
+        raise ExpressionError(f"{expression} is not finite")
+    return value
 
 
 def items(text: str, lookup: Callable[[str], Value]) -> list[Value]:
@@ -258,247 +265,197 @@ _EXACT = 2**53
 """Up to here every whole number is a float."""
 
 
-class Arithmetic:
-    """One expression, read from left to right; ``parse`` is its value."""
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """An expression as Python's syntax tree, in which a name stands for each operand.
 
-    def __init__(self, text: str, lookup: Callable[[str], Value]) -> None:
-        self.text = text
-        self.quoted = text if len(text) < LONGEST_QUOTED else f"{text[:LONGEST_QUOTED]}…"
-        self.lookup = lookup
-        self.depth = 0
-        self.tokens = self._tokens()
-        self.index = 0
+    The same expression has the same tree whatever its units, texts and names are.
+    """
 
-    def _tokens(self) -> list[tuple[str, str]]:
-        tokens, at = [], 0
-        while self.text[at:].strip():
-            match = _TOKEN.match(self.text, at)
-            if not match or not match.lastgroup:
-                raise ExpressionError(
-                    f"{self.text[at:].strip()[0]!r} has no meaning in ${{{self.quoted}}}"
-                )
-            tokens.append((match.lastgroup, match[match.lastgroup]))
-            at = match.end()
-        return tokens
+    text: str
+    body: ast.expr
+    operands: Mapping[str, str]
 
-    def parse(self) -> Value:
-        """Return the value.
+    def __str__(self) -> str:
+        return _quoted(self.text)
 
-        Raises:
-            ExpressionError: if it is malformed or not computable.
-            OverflowError: if a whole number is too large to be a float.
-        """
-        if not self.tokens:
-            raise ExpressionError("an empty expression", "name a variable: ${name}")
-        value = self._choice()
-        if self.index < len(self.tokens):
-            self._unexpected()
-        if isinstance(value, Quantity) and not math.isfinite(value.value):
-            raise ExpressionError(f"${{{self.quoted}}} is not finite")
-        return value
+    def operand(self, node: ast.expr) -> str:
+        """Return the number with its unit, text or name that a node is, or an empty string."""
+        return self.operands[node.id] if isinstance(node, ast.Name) else ""
 
-    def _peek(self) -> str:
-        return self.tokens[self.index][1] if self.index < len(self.tokens) else ""
+    def first(self, node: ast.expr) -> str:
+        """Return the first operand, or function, below a node."""
+        names = [below for below in ast.walk(node) if isinstance(below, ast.Name)]
+        return self.operands[min(names, key=lambda name: name.col_offset).id]
 
-    def _next(self) -> tuple[str, str]:
-        if self.index >= len(self.tokens):
-            raise ExpressionError(f"${{{self.quoted}}} ends too early")
-        self.index += 1
-        return self.tokens[self.index - 1]
 
-    def _unexpected(self) -> NoReturn:
-        raise ExpressionError(f"{self._peek()!r} is not expected in ${{{self.quoted}}}")
+@lru_cache(maxsize=1024)
+def parse(text: str) -> Expression:
+    """Return the syntax tree of an expression, which is not computed.
 
-    def _choice(self) -> Value:
-        value = self._either()
-        if self._peek() != "if":
+    Raises:
+        ExpressionError: if it is malformed or too long.
+    """
+    if len(text) > LONGEST_EXPRESSION:
+        raise ExpressionError(
+            f"an expression of {len(text)} characters; at most {LONGEST_EXPRESSION} are read"
+        )
+    symbols, operands = _with_names(text)
+    depths = accumulate({"(": 1, ")": -1}.get(symbol, 0) for symbol in symbols)
+    if max(depths, default=0) > DEEPEST:
+        raise ExpressionError(f"more than {DEEPEST} brackets inside each other")
+    python = " ".join(symbols)
+    try:
+        return Expression(text, ast.parse(python, mode="eval").body, operands)
+    except SyntaxError as error:
+        symbol = python[(error.offset or 1) - 1 :].split(" ")[0]
+        is_open = bool(symbols) and symbols[-1] not in {*operands, ")"}
+        raise _refusal(text, symbols, "" if is_open else operands.get(symbol, symbol)) from None
+    except (MemoryError, RecursionError):
+        raise ExpressionError(f"{_quoted(text)} is too deep") from None
+
+
+def _with_names(text: str) -> tuple[list[str], dict[str, str]]:
+    """Return the symbols of an expression with a name for each operand, and the operands."""
+    symbols: list[str] = []
+    operands: dict[str, str] = {}
+    end = 0
+    while text[end:].strip():
+        match = _SYMBOL.match(text, end)
+        if not match:
+            sign = text[end:].strip()[0]
+            raise ExpressionError(f"{sign!r} has no meaning in {_quoted(text)}")
+        symbol = match["sign"] or f"_{len(operands)}"
+        if match["operand"]:
+            operands[symbol] = match["operand"]
+        symbols.append(symbol)
+        end = match.end()
+    return symbols, operands
+
+
+def _refusal(text: str, symbols: Sequence[str], symbol: str) -> ExpressionError:
+    """Return why Python stops at a symbol, or, where that is empty, at the end."""
+    quoted = _quoted(text)
+    if not symbols:
+        return ExpressionError("an empty expression", "name a variable: ${name}")
+    if not symbol:
+        return ExpressionError(f"{quoted} ends too early")
+    if symbols.count("(") > symbols.count(")"):
+        return ExpressionError(f"a bracket is not closed in {quoted}")
+    if symbols.count("if") > symbols.count("else"):
+        return ExpressionError(f"if without else in {quoted}", "${A if CONDITION else B}")
+    return ExpressionError(f"{symbol!r} is not expected in {quoted}")
+
+
+def _quoted(text: str) -> str:
+    if len(text) >= LONGEST_QUOTED:
+        text = f"{text[:LONGEST_QUOTED]}…"
+    return f"${{{text}}}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Evaluation:
+    """Computes the nodes of one expression."""
+
+    expression: Expression
+    lookup: Callable[[str], Value]
+
+    def value(self, node: ast.expr) -> Value:
+        """Return the value of a node; all below it is computed, in order."""
+        match node:
+            case ast.IfExp():
+                value, is_chosen = self.value(node.body), self.condition(node.test)
+                other = self.value(node.orelse)
+                return value if is_chosen else other
+            case ast.BoolOp():
+                conditions = [self.condition(condition) for condition in node.values]
+                return all(conditions) if isinstance(node.op, ast.And) else any(conditions)
+            case ast.UnaryOp(op=ast.Not()):
+                return not self.condition(node.operand)
+            case ast.UnaryOp():
+                number = self.number(node.operand)
+                if isinstance(node.op, ast.USub):
+                    return Quantity(-number.value, number.dimension)
+                return number
+            case ast.Compare(ops=[operator], comparators=[right]):
+                return self._compare(node.left, _COMPARISONS[type(operator)], right)
+            case ast.BinOp():
+                return self._compute(node.op, self.number(node.left), self.number(node.right))
+            case ast.Call(func=ast.Name(), args=[argument]):
+                return self._call(self.expression.operand(node.func), argument)
+            case ast.Name():
+                return self._operand(self.expression.operand(node))
+        raise ExpressionError(f"{self.expression} cannot be computed")
+
+    def condition(self, node: ast.expr) -> bool:
+        """Return the value of a node that has to be true or false."""
+        value = _spoken(self.value(node))
+        if isinstance(value, bool):
             return value
-        self.index += 1
-        start = self.index
-        is_chosen = self._condition(self._either(), start)
-        if self._peek() != "else":
-            raise ExpressionError(
-                f"if without else in ${{{self.quoted}}}", "${A if CONDITION else B}"
-            )
-        self.index += 1
-        other = self._choice()
-        return value if is_chosen else other
+        raise self._refusal(node, value, "true or false")
 
-    def _either(self) -> Value:
-        start = self.index
-        value = self._both()
-        while self._peek() == "or":
-            self.index += 1
-            after = self.index
-            other = self._condition(self._both(), after)
-            value = self._condition(value, start) or other
-        return value
+    def number(self, node: ast.expr) -> Quantity:
+        """Return the value of a node that has to be a number."""
+        return self._as_number(node, _spoken(self.value(node)))
 
-    def _both(self) -> Value:
-        start = self.index
-        value = self._negation()
-        while self._peek() == "and":
-            self.index += 1
-            after = self.index
-            other = self._condition(self._negation(), after)
-            value = self._condition(value, start) and other
-        return value
+    def _as_number(self, node: ast.expr, value: Value) -> Quantity:
+        if isinstance(value, Quantity):
+            return value
+        raise self._refusal(node, value, "a number")
 
-    def _negation(self) -> Value:
-        negations = 0
-        while self._peek() == "not":
-            self.index += 1
-            negations += 1
-        start = self.index
-        value = self._comparison()
-        return value if not negations else self._condition(value, start) != bool(negations % 2)
+    def _refusal(self, node: ast.expr, value: Value, needed: str) -> ExpressionError:
+        first = self.expression.first(node)
+        return ExpressionError(f"{first} is {_kind(value)}, and {self.expression} needs {needed}")
 
-    def _comparison(self) -> Value:
-        start = self.index
-        left = self._sum()
-        if self._peek() not in _COMPARISONS:
-            return left
-        sign = self._next()[1]
-        right = self._sum()
-        left = left.value if isinstance(left, EnvironmentText) else left
-        right = right.value if isinstance(right, EnvironmentText) else right
-        if sign in {"==", "!="} and not (
-            isinstance(left, Quantity) and isinstance(right, Quantity)
-        ):
-            self._same_kind(left, right)
-            return (left == right) == (sign == "==")
-        a, b = self._operand(left, start), self._operand(right, self.index - 1)
-        self._same_dimension(a, b, "compared")
-        return _COMPARISONS[sign](a.value, b.value)
-
-    def _same_kind(self, left: Value, right: Value) -> None:
-        kinds = [_kind(left), _kind(right)]
-        if kinds[0] != kinds[1]:
-            raise ExpressionError(
-                f"{kinds[0]} and {kinds[1]} cannot be compared in ${{{self.quoted}}}"
-            )
+    def _compare(self, left: ast.expr, sign: _Comparison, right: ast.expr) -> bool:
+        a, b = _spoken(self.value(left)), _spoken(self.value(right))
+        is_equality = sign in {operator.eq, operator.ne}
+        if is_equality and not (isinstance(a, Quantity) and isinstance(b, Quantity)):
+            if _kind(a) != _kind(b):
+                kinds = f"{_kind(a)} and {_kind(b)}"
+                raise ExpressionError(f"{kinds} cannot be compared in {self.expression}")
+            return sign(a, b)
+        x, y = self._as_number(left, a), self._as_number(right, b)
+        self._same_dimension(x, y, "compared")
+        return sign(x.value, y.value)
 
     def _same_dimension(self, a: Quantity, b: Quantity, what: str) -> None:
         if NUMBER not in {a.dimension, b.dimension} and a.dimension != b.dimension:
             names = f"{dimension_name(a.dimension)} and {dimension_name(b.dimension)}"
-            raise ExpressionError(f"{names} cannot be {what} in ${{{self.quoted}}}")
+            raise ExpressionError(f"{names} cannot be {what} in {self.expression}")
 
-    def _condition(self, value: Value, start: int) -> bool:
-        """Return the value that begins at a token, which has to be true or false."""
-        value = value.value if isinstance(value, EnvironmentText) else value
-        if isinstance(value, bool):
-            return value
-        raise ExpressionError(
-            f"{self.tokens[start][1]} is {_kind(value)}, and ${{{self.quoted}}} needs true or"
-            " false"
-        )
+    def _compute(self, sign: ast.operator, a: Quantity, b: Quantity) -> Quantity:
+        if isinstance(sign, (ast.Mult, ast.Div)):
+            return self._multiply(a, b, 1 if isinstance(sign, ast.Mult) else -1)
+        self._same_dimension(a, b, "added")
+        value = a.value + b.value if isinstance(sign, ast.Add) else a.value - b.value
+        return Quantity(value, a.dimension if a.dimension != NUMBER else b.dimension)
 
-    def _operand(self, value: Value, start: int) -> Quantity:
-        """Return the value that begins at a token, which has to be a number."""
-        value = value.value if isinstance(value, EnvironmentText) else value
-        if isinstance(value, Quantity):
-            return value
-        raise ExpressionError(
-            f"{self.tokens[start][1]} is {_kind(value)}, and ${{{self.quoted}}} needs a number"
-        )
+    def _multiply(self, a: Quantity, b: Quantity, power: int) -> Quantity:
+        if power < 0 and b.value == 0:
+            raise ExpressionError(f"{self.expression} divides by zero")
+        value = a.value * b.value if power > 0 else a.value / b.value
+        m, kg, s, rad = (x + power * y for x, y in zip(a.dimension, b.dimension, strict=True))
+        return Quantity(value, (m, kg, s, rad))
 
-    def _sum(self) -> Value:
-        start = self.index
-        value = self._product()
-        while self._peek() in {"+", "-"}:
-            sign = 1 if self._next()[1] == "+" else -1
-            after = self.index
-            a, b = self._operand(value, start), self._operand(self._product(), after)
-            self._same_dimension(a, b, "added")
-            dimension = a.dimension if a.dimension != NUMBER else b.dimension
-            value = Quantity(a.value + sign * b.value, dimension)
-        return value
-
-    def _product(self) -> Value:
-        start = self.index
-        value = self._sign()
-        while self._peek() in {"*", "/"}:
-            sign = 1 if self._next()[1] == "*" else -1
-            after = self.index
-            left, right = self._operand(value, start), self._operand(self._sign(), after)
-            if sign < 0 and right.value == 0:
-                raise ExpressionError(f"${{{self.quoted}}} divides by zero")
-            a, b = left.dimension, right.dimension
-            dimension = (
-                a[0] + sign * b[0],
-                a[1] + sign * b[1],
-                a[2] + sign * b[2],
-                a[3] + sign * b[3],
+    def _operand(self, operand: str) -> Value:
+        if match := _QUANTITY.fullmatch(operand):
+            value, unit = _number(match["number"]), match["unit"]
+            try:
+                return in_unit(value, "".join(unit.split())) if unit else Quantity(value)
+            except UnitError as error:
+                raise ExpressionError(str(error), error.advice) from None
+        if operand[0] in "'\"":
+            return operand[1:-1]
+        if operand in {"true", "false"}:
+            return operand == "true"
+        if operand.endswith(")") and environment_in(operand) is None:
+            raise ExpressionError(
+                f"{operand} does not name a variable", "for example ${env(ROBOT, rover)}"
             )
-            value = Quantity(
-                left.value * right.value if sign > 0 else left.value / right.value, dimension
-            )
-        return value
+        return Quantity(math.pi) if operand == "pi" else self.lookup(operand)
 
-    def _sign(self) -> Value:
-        signs = []
-        while self._peek() in {"+", "-"}:
-            signs.append(self._next()[1])
-        start = self.index
-        value = self._value()
-        if not signs:
-            return value
-        number = self._operand(value, start)
-        return Quantity(-number.value, number.dimension) if signs.count("-") % 2 else number
-
-    def _value(self) -> Value:
-        kind, word = self._next()
-        if kind == "number":
-            return self._number(int(word) if word.isdigit() else float(word))
-        if kind == "text":
-            return word[1:-1]
-        if kind == "env":
-            if environment_in(word) is None:
-                raise ExpressionError(
-                    f"{word} does not name a variable", "for example ${env(ROBOT, rover)}"
-                )
-            return self.lookup(word)
-        if kind == "name" and word in {"true", "false"}:
-            return word == "true"
-        if kind == "name" and word not in _CONNECTIVES:
-            return self._call(word) if self._peek() == "(" else self._variable(word)
-        if word != "(":
-            self.index -= 1
-            self._unexpected()
-        return self._in_brackets()
-
-    def _in_brackets(self) -> Value:
-        self.depth += 1
-        if self.depth > DEEPEST:
-            raise ExpressionError(f"more than {DEEPEST} brackets inside each other")
-        value = self._choice()
-        if self._peek() != ")":
-            raise ExpressionError(f"a bracket is not closed in ${{{self.quoted}}}")
-        self.index += 1
-        self.depth -= 1
-        return value
-
-    def _number(self, number: float) -> Quantity:
-        if (
-            self.index >= len(self.tokens)
-            or self.tokens[self.index][0] != "name"
-            or self._peek() in _CONNECTIVES
-        ):
-            return Quantity(number)
-        unit = self._next()[1]
-        following = "".join(word for _, word in self.tokens[self.index : self.index + 2])
-        if unit + following in UNITS:
-            unit += following
-            self.index += 2
-        try:
-            return in_unit(number, unit)
-        except UnitError as error:
-            raise ExpressionError(str(error), error.advice) from None
-
-    def _variable(self, name: str) -> Value:
-        return Quantity(math.pi) if name == "pi" else self.lookup(name)
-
-    def _call(self, name: str) -> Quantity:
+    def _call(self, name: str, node: ast.expr) -> Quantity:
         if name in RESERVED:
             raise ExpressionError(f"{name} is {RESERVED[name]}", A_FILE)
         if name not in _FUNCTIONS:
@@ -506,9 +463,7 @@ class Arithmetic:
             raise ExpressionError(
                 f"unknown function {name}", did_you_mean(name, _FUNCTIONS, f"there is {known}")
             )
-        self.index += 1
-        start = self.index
-        argument = self._operand(self._in_brackets(), start)
+        argument = self.number(node)
         accepted, compute, gives = _FUNCTIONS[name]
         if name == "sqrt" and all(power % 2 == 0 for power in argument.dimension):
             m, kg, s, rad = argument.dimension
@@ -521,6 +476,23 @@ class Arithmetic:
             raise ExpressionError(f"{name}({argument.value!r}) is not defined") from None
 
 
+def constant(operand: str) -> str | None:
+    """Return what a command line gives for a literal, or None for names and units."""
+    if operand[:1] in {"'", '"'}:
+        return operand[1:-1]
+    if (match := _QUANTITY.fullmatch(operand)) and not match["unit"]:
+        return str(_number(match["number"]))
+    return operand if operand in {"true", "false"} else None
+
+
+def _number(text: str) -> float:
+    return int(text) if text.isdigit() else float(text)
+
+
+def _spoken(value: Value) -> Value:
+    return value.value if isinstance(value, EnvironmentText) else value
+
+
 def _kind(value: Value) -> str:
     return (
         "true or false"
@@ -531,13 +503,14 @@ def _kind(value: Value) -> str:
     )
 
 
-_COMPARISONS: dict[str, Callable[[float, float], bool]] = {
-    "==": operator.eq,
-    "!=": operator.ne,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
+_Comparison = Callable[[Any, Any], bool]
+_COMPARISONS: dict[type[ast.cmpop], _Comparison] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
 }
 _FUNCTIONS: dict[str, tuple[tuple[Dimension, ...], Callable[[float], float], Dimension]] = {
     "sin": ((NUMBER, ANGLE), math.sin, NUMBER),

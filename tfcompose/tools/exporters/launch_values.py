@@ -13,12 +13,14 @@ from dataclasses import dataclass, field
 from functools import reduce
 from typing import TYPE_CHECKING
 
+from tfcompose.spec.language.expressions import constant, parse
 from tfcompose.tools.exporters.code import Code, call, items
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.model.plan import PlanProcess
+    from tfcompose.spec.language.expressions import Expression
 
 #: launch's substitutions for the signs of expressions; others are left to Python.
 _EQUALITY = {ast.Eq: "EqualsSubstitution", ast.NotEq: "NotEqualsSubstitution"}
@@ -129,62 +131,41 @@ def condition_code(expression: str, kinds: Mapping[str, str]) -> Code:
     Raises:
         ValueError: if launch has none.
     """
-    try:
-        node = ast.parse(expression.strip(), mode="eval").body
-    except SyntaxError:
-        raise ValueError(expression) from None
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-        return call("UnlessCondition", _truth(node.operand, kinds))
-    return call("IfCondition", _truth(node, kinds))
+    parsed = parse(expression)
+    match parsed.body:
+        case ast.UnaryOp(op=ast.Not(), operand=inner):
+            return call("UnlessCondition", _truth(inner, parsed, kinds))
+    return call("IfCondition", _truth(parsed.body, parsed, kinds))
 
 
-def _truth(node: ast.expr, kinds: Mapping[str, str]) -> Code | str:
+def _truth(node: ast.expr, expression: Expression, kinds: Mapping[str, str]) -> Code | str:
     match node:
         case ast.BoolOp(op=op, values=values):
             name = "AndSubstitution" if isinstance(op, ast.And) else "OrSubstitution"
-            return reduce(
-                lambda left, right: call(name, left, right), [_truth(one, kinds) for one in values]
-            )
+            conditions = [_truth(value, expression, kinds) for value in values]
+            return reduce(lambda left, right: call(name, left, right), conditions)
         case ast.UnaryOp(op=ast.Not(), operand=inner):
-            return call("NotSubstitution", _truth(inner, kinds))
-        case ast.Name(id=word) if word in _TRUTHS:
-            return repr(word)
+            return call("NotSubstitution", _truth(inner, expression, kinds))
         case ast.Compare(left=left, ops=[op], comparators=[right]):
-            return _comparison(left, op, right, kinds)
-    name = _argument(node)
-    if kinds.get(name) != "bool":
-        raise ValueError(ast.unparse(node))
+            return _comparison(expression.operand(left), op, expression.operand(right), kinds)
+    operand = expression.operand(node)
+    if operand in _TRUTHS:
+        return repr(operand)
+    name = operand.removeprefix("args.")
+    if kinds.get(name) != "bool" or name == operand:
+        raise ValueError(expression.text)
     return call("LaunchConfiguration", repr(name))
 
 
-def _comparison(left: ast.expr, op: ast.cmpop, right: ast.expr, kinds: Mapping[str, str]) -> Code:
-    if not _argument(left):
+def _comparison(left: str, op: ast.cmpop, right: str, kinds: Mapping[str, str]) -> Code:
+    if not left.startswith("args."):
         left, right, op = right, left, _FLIPPED.get(type(op), type(op))()
-    name, value = _argument(left), _constant(right)
-    if name not in kinds or value is None:
-        raise ValueError(ast.unparse(left))
-    given = call("LaunchConfiguration", repr(name))
+    name, value = left.removeprefix("args."), constant(right)
+    if name not in kinds or name == left or value is None:
+        raise ValueError(left)
+    configuration = call("LaunchConfiguration", repr(name))
     if type(op) in _EQUALITY:
-        return call(_EQUALITY[type(op)], given, repr(value))
+        return call(_EQUALITY[type(op)], configuration, repr(value))
     if type(op) not in _ORDER or kinds[name] not in {"int", "float"}:
-        raise ValueError(ast.unparse(left))
-    return call("PythonExpression", items([given, repr(f" {_ORDER[type(op)]} {value}")]))
-
-
-def _argument(node: ast.expr) -> str:
-    """Return the argument that an expression is, or nothing."""
-    match node:
-        case ast.Attribute(value=ast.Name(id="args"), attr=name):
-            return name
-    return ""
-
-
-def _constant(node: ast.expr) -> str | None:
-    match node:
-        case ast.Name(id=word) if word in _TRUTHS:
-            return word
-        case ast.Constant(value=str(value)):
-            return value
-        case ast.Constant(value=int(value) | float(value)) if not isinstance(value, bool):
-            return ast.unparse(node)
-    return None
+        raise ValueError(left)
+    return call("PythonExpression", items([configuration, repr(f" {_ORDER[type(op)]} {value}")]))

@@ -140,13 +140,13 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 MOST_STATEMENTS = {
     "foundation": 1_714,
     "model": 2_128,
-    "spec": 4_717,
+    "spec": 4_753,
     "compiler": 9_275,
     "tf": 5_264,
     "guard": 4_041,
     "launcher": 3_810,
-    "cli": 5_353,
-    "tools": 11_222,
+    "cli": 5_318,
+    "tools": 11_188,
 }
 
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.support.cli import tfcompose
-from tfcompose.cli.combinations import MOST, combinations, merged
+from tfcompose.cli.linting import merged
 from tfcompose.foundation.findings import Span, finding
+from tfcompose.spec.language.arguments import MOST, combinations
 
 if TYPE_CHECKING:
     from pathlib import Path

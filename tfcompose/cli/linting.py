@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
+from itertools import combinations as subsets
 from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.cli.terminal import warn
+from tfcompose.foundation.findings import Note
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve import Disk, Library
     from tfcompose.foundation.findings import Finding, Span
     from tfcompose.spec.language import Given
+    from tfcompose.spec.language.arguments import Combination
     from tfcompose.spec.load import Source
 
 #: For how long a file is judged in combinations of its arguments, in seconds; the first is always
@@ -123,9 +126,9 @@ class _Variants:
         if not self.source.has(("args",)) and not self.overlays:
             alone = self._compile(self.given, profiles)
             return list(alone.found), [alone]
-        from tfcompose.cli.combinations import combinations, merged
         from tfcompose.foundation.findings import RejectedError, Span
-        from tfcompose.spec.language import GivenArg, alternatives_of, composed
+        from tfcompose.spec.language import GivenArg, composed
+        from tfcompose.spec.language.arguments import alternatives_of, combinations
 
         try:
             laid_over = composed(self.source, profiles, self.overlays, self.given)
@@ -154,7 +157,6 @@ class _Variants:
     ) -> list[Finding]:
         """Return what each profile alone adds to the findings, and comments that allow nothing."""
         from tfcompose.compiler.check import unused_allows
-        from tfcompose.foundation.findings import Note
         from tfcompose.spec.language import profiles_in
 
         known = {_identity(finding) for finding in findings}
@@ -184,6 +186,45 @@ class _Variants:
         )
 
 
-def _identity(finding: Finding) -> tuple[str, str, Span | None]:
-    """Return what makes findings of several variants the same one."""
+def merged(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Finding]:
+    """Return each finding once, with a note if only some combinations have it."""
+    where: dict[_Identity, list[int]] = {}
+    firsts: dict[_Identity, Finding] = {}
+    for index, (_, findings) in enumerate(judged):
+        for finding in findings:
+            key = _identity(finding)
+            firsts.setdefault(key, finding)
+            if where.setdefault(key, [])[-1:] != [index]:
+                where[key].append(index)
+    every = [combination for combination, _ in judged]
+    for key, indices in where.items():
+        if len(indices) < len(judged):
+            note = Note(_named(every, indices))
+            firsts[key] = replace(firsts[key], notes=(*firsts[key].notes, note))
+    return list(firsts.values())
+
+
+def _named(every: Sequence[Combination], where: Sequence[int]) -> str:
+    """Return in which combinations something is, by the fewest arguments that say so."""
+    inside = set(where)
+    first = every[where[0]]
+    best, covered = dict(first), 1
+    for size in (2, 1):
+        for names in subsets(first, size):
+            matching = {
+                i for i, one in enumerate(every) if all(one[name] == first[name] for name in names)
+            }
+            if matching <= inside and len(matching) >= covered:
+                best, covered = {name: first[name] for name in names}, len(matching)
+    words = " ".join(f"{name}:={value}" for name, value in best.items())
+    others = len(inside) - covered
+    more = f", and in {others} other combination{'s' * (others > 1)} of args" if others else ""
+    return f"with {words}{more}"
+
+
+#: What makes findings of several variants the same one: code, message and place.
+_Identity = tuple[str, str, "Span | None"]
+
+
+def _identity(finding: Finding) -> _Identity:
     return finding.code, finding.message, finding.span

@@ -24,7 +24,6 @@ from tfcompose.spec.language.validate import (
     validate_file,
     validate_preset,
 )
-from tfcompose.spec.language.variables import alternatives_of
 
 __all__ = [
     "DIRECTIONS",
@@ -32,7 +31,6 @@ __all__ = [
     "Given",
     "GivenArg",
     "Validated",
-    "alternatives_of",
     "as_part",
     "composed",
     "is_recognized",

@@ -22,7 +22,6 @@ from tfcompose.spec.language.expressions import (
     Value,
     environment_in,
     fill,
-    inserted,
     names_in,
 )
 from tfcompose.spec.language.reading import Refusal
@@ -45,39 +44,6 @@ def unused(data: dict[str, Any], aside: Any = None) -> tuple[tuple[str, str], ..
         )
     used = set(_names(data)) | set(_names(aside)) if declared else set()
     return tuple(path for name, path in declared.items() if name not in used)
-
-
-def alternatives_of(
-    source: Source, given: Given, aside: Source
-) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Return the possible values of used arguments that are not given.
-
-    Both are by name, as the command line gives them. ``aside`` is the file with its profiles,
-    which may use them too.
-    """
-    idle = {
-        name
-        for section, name in unused(source.data, aside.data.get("profiles"))
-        if section == "args"
-    }
-    variables = Variables(source, given)
-    alternatives: dict[str, tuple[str, ...]] = {}
-    for name, raw in source.mapping("args").items():
-        if raw is None or name in idle or name in given.args:
-            continue
-        try:
-            alternatives[name] = ArgSpec.model_validate(full(raw)).alternatives
-        except ValidationError:
-            continue  # it is refused where the whole is read
-    several = {name: words for name, words in alternatives.items() if words}
-    return several, {name: _first(variables.args[name], words) for name, words in several.items()}
-
-
-def _first(value: Value | None, words: tuple[str, ...]) -> str:
-    """Return the word that says the value, or the first of all."""
-    return next(
-        (word for word in words if value is not None and word == inserted(value)), words[0]
-    )
 
 
 def _names(value: Any) -> Iterator[str]:

@@ -11,10 +11,8 @@ import os
 import re
 from collections import defaultdict
 from dataclasses import dataclass, field
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.combinations import MOST
 from tfcompose.cli.compiling import disk_of, given_by, library, overlays_of
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import destination
@@ -25,7 +23,8 @@ from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import OWN_KINDS
 from tfcompose.spec.language import Given, GivenArg, composed, profiles_in, validate, with_includes
 from tfcompose.spec.language.args import as_given
-from tfcompose.spec.language.expressions import environment_in, evaluate, names_in
+from tfcompose.spec.language.arguments import values_that_satisfy
+from tfcompose.spec.language.expressions import environment_in, names_in
 from tfcompose.spec.language.values import plain
 from tfcompose.spec.load import load
 from tfcompose.tools.exporters.launch_values import (
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
 
 _HOLE = re.compile(r"\$\{([^{}]*)\}")
 _ARGUMENT = re.compile(r"\s*args\.([A-Za-z_][A-Za-z0-9_]*)\s*")
-_CONSTANT = re.compile(r"'([^']*)'|\"([^\"]*)\"|(?<![\w.])(-?\d+(?:\.\d+)?)")
 #: What of a process launch can compute, by the key.
 _PLACES = ("env", "params", "remap")
 
@@ -292,7 +290,7 @@ class _Combinations:
 
         It cannot where the robot has errors or another tree then, or launch would need its plan.
         """
-        for values in self._where(expression):
+        for values in values_that_satisfy(expression, self.specs, self.values):
             plan, files = self._build(values) or (self.plan, ())
             found = next((process for process in plan.managed if process.name == name), None)
             if (
@@ -303,39 +301,6 @@ class _Combinations:
                 needed = tuple(file for file in files if file.path == found.params_file)
                 return found, needed
         return None
-
-    def _where(self, expression: str) -> Iterator[dict[str, str]]:
-        """Yield values with which an expression is true, of the arguments that it names."""
-        names = [
-            name.removeprefix("args.") for name in dict.fromkeys(names_in(f"${{{expression}}}"))
-        ]
-        names = [name for name in names if name in self.specs]
-        constants = [next(filter(None, found), "") for found in _CONSTANT.findall(expression)]
-        several = [
-            dict.fromkeys([self.values[name], *self._values(name, constants)]) for name in names
-        ]
-        for index, row in enumerate(product(*several)):
-            if index >= MOST:
-                return
-            given = dict(zip(names, row, strict=True))
-            try:
-                known = {
-                    f"args.{name}": self.specs[name].value(word) for name, word in given.items()
-                }
-                holds = evaluate(expression, lambda name, known=known: known[name])  # type: ignore[misc]
-            except ValueError:
-                continue
-            if holds is True:
-                yield given
-
-    def _values(self, name: str, constants: list[str]) -> Iterator[str]:
-        spec = self.specs[name]
-        yield from spec.alternatives
-        if not spec.choices:
-            yield from constants
-        if spec.kind == "int":
-            numbers = [int(word) for word in constants if word.lstrip("-").isdigit()]
-            yield from (str(number + step) for number in numbers for step in (1, -1))
 
     def _build(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
         key = tuple(sorted(values.items()))

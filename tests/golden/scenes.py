@@ -66,7 +66,7 @@ from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.files import Target
-from tfcompose.model.messages import Alive, Clear, FindingShown, GateShut, Live, ProcessRequest
+from tfcompose.model.messages import Alive, Clear, FindingShown, GateState, Live, ProcessRequest
 from tfcompose.model.plan import (
     Driven,
     EdgePattern,
@@ -570,11 +570,11 @@ def _machines() -> Iterator[Any]:
         gate: Any = Ready(kind, text, timeout_s=3.0)  # type: ignore[arg-type]
         yield (
             begin(GUARD, replace(lidar, ready=gate))
-            .feed(Clear(), GateShut("lidar", "topics /tf"))
+            .feed(Clear(), GateState("lidar", "topics /tf", is_open=False))
             .wait(3)
         )
     gate = Ready("edges", timeout_s=3.0)
-    shut = GateShut("slam", "/tf is published by nobody")
+    shut = GateState("slam", "/tf is published by nobody", is_open=False)
     yield begin(GUARD, STATIC, replace(SLAM, ready=gate)).feed(Clear(), shut).wait(3)
     after = run_process("b", after={"lidar": "ready"})
     yield begin(GUARD, STATIC, replace(lidar, ready=Ready("topic", "/scan")), after).feed(

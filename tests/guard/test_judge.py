@@ -8,7 +8,14 @@ from hypothesis import strategies as st
 
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import FIXED, SETTLE_S, TICK_S, History, Publisher
-from tfcompose.model.messages import Clear, Complete, FindingShown, Live, OwnerReady, Recovered
+from tfcompose.model.messages import (
+    Clear,
+    FindingShown,
+    Live,
+    OwnerReady,
+    RecoveredShown,
+    TreeComplete,
+)
 from tfcompose.model.plan import EdgePattern, GuardPolicy
 
 
@@ -28,7 +35,7 @@ def test_owners_are_live_and_nothing_is_found(running: History) -> None:
     assert running.all(OwnerReady) == [
         OwnerReady(name) for name in ("static", "joints", "slam", "drive")
     ]
-    assert running.all(Complete) == [Complete(5)]
+    assert running.all(TreeComplete) == [TreeComplete(5)]
     assert running.reports() == []
 
 
@@ -123,8 +130,8 @@ def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(
     rogue = running.joins("/rogue")
     running.repeat(rogue, "map odom", 10, every=5)
     assert len(running.found()) == 1
-    assert running.all(Recovered) == []
-    assert len(running.wait(31).all(Recovered)) == 1
+    assert running.all(RecoveredShown) == []
+    assert len(running.wait(31).all(RecoveredShown)) == 1
 
 
 def test_a_foreign_publisher_that_pauses_for_long_is_reported_again_when_it_goes_on(
@@ -132,15 +139,15 @@ def test_a_foreign_publisher_that_pauses_for_long_is_reported_again_when_it_goes
 ) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "map odom", 5).wait(40).repeat(rogue, "map odom", 5)
-    assert (len(running.found()), len(running.all(Recovered))) == (2, 1)
+    assert (len(running.found()), len(running.all(RecoveredShown))) == (2, 1)
 
 
 def test_a_latched_offence_lasts_while_its_publisher_does(running: History) -> None:
     rogue = running.joins("/rogue", static=True)
     running.send(rogue, "base lidar").wait(120)
-    assert (len(running.found()), running.all(Recovered)) == (1, [])
+    assert (len(running.found()), running.all(RecoveredShown)) == (1, [])
     running.leaves(rogue)
-    assert len(running.wait(4).all(Recovered)) == 1
+    assert len(running.wait(4).all(RecoveredShown)) == 1
 
 
 def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_message_of_its_own(

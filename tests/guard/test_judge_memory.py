@@ -10,7 +10,7 @@ from tests.support.findings import expect
 from tests.support.guard_history import EDGES, FIXED, History, edge, wall
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.diagnostics import statuses
-from tfcompose.model.messages import Clear, FindingShown, Live, Recovered
+from tfcompose.model.messages import Clear, FindingShown, Live, RecoveredShown
 from tfcompose.model.plan import (
     EdgePattern,
     GuardPolicy,
@@ -151,7 +151,7 @@ def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: H
     running.leaves(rogue)
     running.leaves(volatile)
     running.repeat(slam, "map odom", 50)
-    assert [type(event) for event in running.events[1:]] == [Recovered, Recovered]
+    assert [type(event) for event in running.events[1:]] == [RecoveredShown, RecoveredShown]
     running.repeat(running.joins("/other"), "map odom", 5)
     expect(running.only(), "TF801", "map → odom", "/other", "slam (/slam)")
 
@@ -190,7 +190,7 @@ def test_an_owner_that_was_silent_is_not_reported_to_be_again_and_is_back_when_i
     running.repeat(slam, "map odom", 5)
     assert (
         [event for event in running.events if not isinstance(event, Clear)]
-        == running.all(Recovered)
+        == running.all(RecoveredShown)
         != []
     )
 

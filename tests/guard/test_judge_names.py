@@ -13,7 +13,7 @@ from tests.support.guard_history import Publisher as Publishes
 from tfcompose.foundation.findings import Finding
 from tfcompose.guard.judge import Judge
 from tfcompose.guard.verdict.publishers import unfenced
-from tfcompose.model.messages import Clear, FindingShown, Live, Recovered, Taken, Unfenced
+from tfcompose.model.messages import Clear, FindingShown, Live, RecoveredShown, Taken, Unfenced
 from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import OtherRun, Publisher
 from tfcompose.tf.live.state import NAMELESS, NO_NODE
@@ -58,7 +58,7 @@ def test_a_publisher_that_gets_its_name_late_is_named_once_and_has_not_ended(
     first, second = running.found()
     expect(first, "TF801", NAMELESS)
     expect(second, "TF801", "/rogue;")
-    assert running.all(Recovered) == []
+    assert running.all(RecoveredShown) == []
 
 
 def test_a_publisher_that_never_gets_a_name_is_reported_at_last(running: History) -> None:
@@ -107,9 +107,9 @@ def test_a_second_static_process_is_reported_while_both_are_there_and_over_when_
     expect(
         running.only(), "TF801", "base → lidar and 1 more", "another /static", "static (/static)"
     )
-    assert running.all(Recovered) == []
+    assert running.all(RecoveredShown) == []
     running.leaves(second)
-    assert len(running.wait(4).all(Recovered)) == 2
+    assert len(running.wait(4).all(RecoveredShown)) == 2
 
 
 def test_a_static_process_in_the_place_of_one_that_has_left_is_right(running: History) -> None:
@@ -158,7 +158,7 @@ def test_ids_that_do_not_say_whose_they_are_distinguish_two_that_alternate() -> 
     expect(running.only(), "TF801", "map → odom", "one of /rogue, /slam;", "slam (/slam)")
     running.leaves(rogue)
     running.repeat(slam, "map odom", 400)
-    assert len(running.all(Recovered)) == 1
+    assert len(running.all(RecoveredShown)) == 1
 
 
 def test_without_ids_a_newcomer_is_one_of_those_that_may_have_sent_it() -> None:

@@ -15,12 +15,12 @@ from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.liveness import Liveness
 from tfcompose.model.messages import (
     GUARD_EVENTS,
-    Complete,
     FindingShown,
     GuardEvent,
     Live,
     OwnerReady,
-    Recovered,
+    RecoveredShown,
+    TreeComplete,
 )
 from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 
@@ -79,7 +79,7 @@ class History:
         return found
 
     def over(self) -> list[str]:
-        return [event.message for event in self.events if isinstance(event, Recovered)]
+        return [event.text for event in self.events if isinstance(event, RecoveredShown)]
 
 
 @pytest.fixture
@@ -121,7 +121,9 @@ def test_edges_owners_and_the_tree_are_each_announced_once(watch: Callable[..., 
         "slam",
         "drive",
     ]
-    assert [event for event in history.events if isinstance(event, Complete)] == [Complete(3)]
+    assert [event for event in history.events if isinstance(event, TreeComplete)] == [
+        TreeComplete(3)
+    ]
 
 
 @pytest.mark.parametrize("hertz", [10, 50])
@@ -295,8 +297,8 @@ def test_a_latching_owner_that_leaves_is_reported_once_and_when_it_is_back(
     expect(found.found, "TF804", "static (/static)", "base → lidar, base → imu")
     assert live.static_writers([]) == []
     (back,) = live.static_writers(["/static"])
-    assert isinstance(back, Recovered)
-    assert back.message.startswith("static (/static) ")
+    assert isinstance(back, RecoveredShown)
+    assert back.text.startswith("static (/static) ")
 
 
 def test_edges_may_come_together_apart_and_in_other_company(watch: Callable[..., History]) -> None:

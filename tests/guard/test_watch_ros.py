@@ -6,7 +6,7 @@ What each of them is given, and what is said of all together.
 from collections.abc import Callable
 
 from tfcompose.guard.process import plans_by_topics, together
-from tfcompose.model.messages import Clear, Complete, GuardEvent, OwnerReady
+from tfcompose.model.messages import Clear, GuardEvent, OwnerReady, TreeComplete
 from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings
 
 OWN = {"/tf": "/one/tf", "/tf_static": "/one/tf_static"}
@@ -46,9 +46,9 @@ def test_all_is_clear_and_complete_once_the_last_judge_says_so(
     reports: list[GuardEvent] = []
     one, two, none = plan(edge("a b")), plan(edge("c d"), edge("c e")), plan()
     tell = together(reports.append, [one, two, none])
-    for event in (Clear(), Clear(), OwnerReady("static"), Complete(0), Complete(1)):
+    for event in (Clear(), Clear(), OwnerReady("static"), TreeComplete(0), TreeComplete(1)):
         tell(event)
     assert reports == [OwnerReady("static")]
     tell(Clear())
-    tell(Complete(2))
-    assert reports == [OwnerReady("static"), Clear(), Complete(3)]
+    tell(TreeComplete(2))
+    assert reports == [OwnerReady("static"), Clear(), TreeComplete(3)]

@@ -11,27 +11,26 @@ from tests.support.machine_history import GUARD, History, begin, run_process
 from tfcompose.launcher.components import writer_of
 from tfcompose.launcher.events import (
     Exited,
-    LoadComponent,
     NewPlan,
     Order,
     Start,
     Started,
     Tick,
-    UnloadComponent,
 )
 from tfcompose.launcher.machine import step
 from tfcompose.launcher.readiness import waits_for
 from tfcompose.model.messages import (
     Absent,
     Clear,
+    ComponentOrder,
+    ComponentState,
     DownRequest,
-    GateOpen,
+    GateState,
     Live,
     OwnerReady,
     Present,
     ProcessRequest,
     Remember,
-    Unloaded,
 )
 from tfcompose.model.plan import Component, PlanProcess, Ready
 
@@ -54,7 +53,7 @@ def component(name: str, **more: Any) -> PlanProcess:
 
 def loaded(*components: PlanProcess, box: PlanProcess = BOX) -> History:
     """Return a history in which the container has loaded all of them."""
-    history = begin(GUARD, box, *components).feed(Clear(), GateOpen("box", "there"))
+    history = begin(GUARD, box, *components).feed(Clear(), GateState("box", "there", is_open=True))
     return history.answer(*(one.name for one in components))
 
 
@@ -62,7 +61,7 @@ def test_components_are_loaded_in_the_plans_order_once_their_container_is_ready(
     history = begin(GUARD, component("b"), component("a"), BOX).feed(Clear())
     assert history.started == ["guard", "box"]
     assert history.loads() == []
-    history.feed(GateOpen("box", "there"))
+    history.feed(GateState("box", "there", is_open=True))
     assert history.loads() == ["b", "a"]
     assert history.started == ["guard", "box"], (
         "no process of the operating system is started for them"
@@ -74,14 +73,16 @@ def test_components_are_loaded_in_the_plans_order_once_their_container_is_ready(
 def test_what_waits_for_a_component_follows_it_and_its_edges_make_it_ready() -> None:
     owner = component("odo", owns=(("odom", "base_link"),))
     history = begin(GUARD, BOX, owner, run_process("nav", after={"odo": "ready"})).feed(Clear())
-    history.feed(GateOpen("box", "there")).answer("odo")
+    history.feed(GateState("box", "there", is_open=True)).answer("odo")
     assert history.started == ["guard", "box"]
     history.feed(Live("odo", ("base_link",)), OwnerReady("odo"))
     assert history.started == ["guard", "box", "nav"]
 
 
 def test_a_component_that_fails_to_load_ends_everything_with_the_containers_words() -> None:
-    history = begin(GUARD, BOX, component("a")).feed(Clear(), GateOpen("box", "there"))
+    history = begin(GUARD, BOX, component("a")).feed(
+        Clear(), GateState("box", "there", is_open=True)
+    )
     history.answer("a", why="/box did not load demo/demo::a: no such class")
     expect(history.only(), "TF808", "a", "/box", "no such class")
     assert [name for name, _ in history.killed] == ["box"]
@@ -90,7 +91,7 @@ def test_a_component_that_fails_to_load_ends_everything_with_the_containers_word
 
 def test_an_optional_component_that_fails_leaves_the_rest_running() -> None:
     history = begin(GUARD, BOX, component("a", required=False), component("b")).feed(
-        Clear(), GateOpen("box", "there")
+        Clear(), GateState("box", "there", is_open=True)
     )
     history.answer("a", why="no device").answer("b")
     assert history.only().severity == "warning"
@@ -101,7 +102,7 @@ def test_an_optional_component_that_fails_leaves_the_rest_running() -> None:
 @pytest.mark.parametrize("policy", ["on-failure", "always"])
 def test_a_component_is_loaded_again_after_a_while_as_its_policy_says(policy: Any) -> None:
     history = begin(GUARD, BOX, component("a", restart=policy, max_restarts=1)).feed(
-        Clear(), GateOpen("box", "there")
+        Clear(), GateState("box", "there", is_open=True)
     )
     history.answer("a", why="no device")
     assert history.states("a")[-1] == "backoff"
@@ -119,7 +120,7 @@ def test_a_container_that_dies_comes_back_with_its_components_in_order() -> None
     assert Absent("b") in history.orders, "its silence is nobody's fault"
     history.wait(1.0)
     assert history.loads() == ["b", "a"], "not before the container is ready again"
-    history.feed(GateOpen("box", "there"))
+    history.feed(GateState("box", "there", is_open=True))
     assert history.loads() == ["b", "a", "b", "a"]
     assert history.orders.count(Present("b")) == 1
     history.answer("b", "a")
@@ -129,11 +130,13 @@ def test_a_container_that_dies_comes_back_with_its_components_in_order() -> None
 
 def test_an_answer_of_the_container_before_says_nothing_about_the_one_after() -> None:
     box = replace(BOX, restart="on-failure")
-    history = begin(GUARD, box, component("a")).feed(Clear(), GateOpen("box", "there"))
+    history = begin(GUARD, box, component("a")).feed(
+        Clear(), GateState("box", "there", is_open=True)
+    )
     before = history.requested[-1]
     history.feed(Exited("box", -SIGKILL))
     assert history.orders[-1] == Absent("a"), "the guard forgets what it was ordered"
-    history.wait(1.0).feed(GateOpen("box", "there"))
+    history.wait(1.0).feed(GateState("box", "there", is_open=True))
     assert history.requested[-1].number != before.number
     history.requested.append(before)
     history.answer("a", why="went away")
@@ -152,7 +155,7 @@ def test_a_component_is_stopped_started_and_restarted_alone() -> None:
     history = loaded(component("a"), component("b"))
     number = history.requested[-1].number
     history.feed(ProcessRequest("stop", "b"))
-    assert history.requested[-1] == UnloadComponent("b", number)
+    assert history.requested[-1] == ComponentOrder("b", number, "unload")
     assert history.answer("b").states("b")[-2:] == ["stopping", "stopped"]
     history.wait(60).feed(ProcessRequest("start", "b")).answer("b")
     assert history.states("b")[-1] == "running"
@@ -164,9 +167,9 @@ def test_a_component_is_stopped_started_and_restarted_alone() -> None:
 
 def test_a_component_that_is_stopped_while_it_is_loaded_is_unloaded() -> None:
     history = begin(GUARD, BOX, component("a")).feed(
-        Clear(), GateOpen("box", "there"), ProcessRequest("stop", "a")
+        Clear(), GateState("box", "there", is_open=True), ProcessRequest("stop", "a")
     )
-    assert isinstance(history.requested[-1], UnloadComponent)
+    assert history.requested[-1].do == "unload"
     assert history.answer("a").state.tracked["a"].state == "stopped"
 
 
@@ -175,18 +178,18 @@ def test_a_container_is_restarted_with_its_components_but_not_with_one_that_was_
     history.feed(ProcessRequest("restart", "box"))
     assert history.killed == [("box", SIGINT)]
     assert history.states("a")[-1] == "stopped"
-    history.feed(Exited("box", 0), GateOpen("box", "there")).answer("a")
+    history.feed(Exited("box", 0), GateState("box", "there", is_open=True)).answer("a")
     assert history.loads() == ["a", "b", "a"]
     assert history.state.tracked["b"].state == "stopped"
 
 
 def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() -> None:
     history = loaded(component("a"), component("b", after={"a": "ready"})).feed(
-        GateOpen("box", "there")
+        GateState("box", "there", is_open=True)
     )
     history.answer("b")
     history.feed(DownRequest())
-    assert not any(isinstance(one, UnloadComponent) for one in history.requested)
+    assert not any(one.do == "unload" for one in history.requested)
     assert history.killed == [("box", SIGINT)]
     assert history.feed(Exited("box", 0), Exited("guard", 0)).exit_code == 0
 
@@ -194,7 +197,7 @@ def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() ->
 def test_a_stop_of_everything_waits_for_no_answer_of_a_container() -> None:
     history = (
         begin(GUARD, BOX, component("a"), component("b"))
-        .feed(Clear(), GateOpen("box", "there"))
+        .feed(Clear(), GateState("box", "there", is_open=True))
         .answer("b")
     )
     history.feed(ProcessRequest("stop", "b"), DownRequest())
@@ -205,7 +208,7 @@ def test_a_stop_of_everything_waits_for_no_answer_of_a_container() -> None:
 def test_components_of_a_container_that_is_external_are_unloaded_at_the_end() -> None:
     box = replace(BOX, kind="external", argv=())
     history = loaded(component("a"), box=box).feed(DownRequest())
-    assert history.requested[-1] == UnloadComponent("a", history.requested[0].number)
+    assert history.requested[-1] == ComponentOrder("a", history.requested[0].number, "unload")
     assert history.killed == []
     history.answer("a")
     assert history.feed(Exited("guard", 0)).exit_code == 0
@@ -214,13 +217,13 @@ def test_components_of_a_container_that_is_external_are_unloaded_at_the_end() ->
 def test_a_guard_that_follows_another_is_given_what_is_not_answered_yet() -> None:
     history = (
         begin(GUARD, BOX, component("a"), component("b"))
-        .feed(Clear(), GateOpen("box", "there"))
+        .feed(Clear(), GateState("box", "there", is_open=True))
         .answer("b")
     )
     first, second = history.requested
     history.feed(Exited("guard", 1)).wait(1.0)
     again = [
-        LoadComponent(name, number, again=True)
+        ComponentOrder(name, number, "load", again=True)
         for name, number in (("a", first.number), ("b", second.number))
     ]
     assert history.requested[2:] == again
@@ -229,7 +232,9 @@ def test_a_guard_that_follows_another_is_given_what_is_not_answered_yet() -> Non
 
 
 def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -> None:
-    history = begin(GUARD, BOX, component("a")).feed(Clear(), GateOpen("box", "there"))
+    history = begin(GUARD, BOX, component("a")).feed(
+        Clear(), GateState("box", "there", is_open=True)
+    )
     history.wait(31).wait(31)
     (found,) = history.late
     expect(found, "TF817", "a", "box")
@@ -242,9 +247,9 @@ def test_a_changed_component_is_unloaded_and_loaded_and_one_that_vanished_is_unl
         history.plan, processes=tuple(one for one in history.plan.processes if one.name != "b")
     )
     history.feed(NewPlan(plan, frozenset({"a"})))
-    assert [(type(one), one.name) for one in history.requested[2:]] == [
-        (UnloadComponent, "b"),
-        (UnloadComponent, "a"),
+    assert [(one.do, one.process) for one in history.requested[2:]] == [
+        ("unload", "b"),
+        ("unload", "a"),
     ]
     history.answer("b", "a")
     assert "b" not in history.state.tracked
@@ -274,7 +279,7 @@ def test_a_line_of_a_container_is_of_the_component_whose_logger_wrote_it() -> No
 
 def gone(history: History, name: str) -> History:
     number = history.state.tracked[name].order
-    return history.feed(Unloaded(name, number, f"/box has no /{name} any more"))
+    return history.feed(ComponentState(name, number, "unloaded", f"/box has no /{name} any more"))
 
 
 def test_a_component_that_somebody_unloads_has_ended_and_is_loaded_again_as_its_policy_says() -> (
@@ -292,7 +297,7 @@ def test_a_component_that_somebody_unloads_has_ended_and_is_loaded_again_as_its_
 
 def test_a_load_that_fails_slowly_is_given_up_as_one_that_fails_at_once() -> None:
     history = begin(GUARD, BOX, component("a", restart="on-failure", max_restarts=1))
-    history.feed(Clear(), GateOpen("box", "there"))
+    history.feed(Clear(), GateState("box", "there", is_open=True))
     for _ in range(2):
         history.wait(25).answer("a", why="no device").wait(1.0)
     assert history.state.tracked["a"].state == "fatal"
@@ -302,12 +307,12 @@ def test_a_guard_that_follows_another_hears_of_an_owner_before_it_is_to_load_it(
     history = begin(GUARD, BOX, component("a", owns=(("odom", "base"),))).feed(
         Clear(), Remember({"x": 1})
     )
-    history.feed(GateOpen("box", "there"), Exited("guard", 1))
+    history.feed(GateState("box", "there", is_open=True), Exited("guard", 1))
     actions = step(history.wait(0.9).state, Tick(), history.now + 0.1)[1]
     again = step(
         step(history.state, Tick(), history.now + 0.1)[0], Started("guard", 9), history.now + 0.1
     )[1]
     assert Start("guard") in actions
     orders = [one.order if isinstance(one, Order) else one for one in again]
-    load = next(one for one in orders if isinstance(one, LoadComponent))
+    load = next(one for one in orders if isinstance(one, ComponentOrder))
     assert orders.index(load) > orders.index(Present("a")) > orders.index(Absent("a"))

@@ -26,7 +26,6 @@ from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import initial
 from tfcompose.model.messages import (
     Clear,
-    Complete,
     Ended,
     FindingShown,
     Live,
@@ -34,7 +33,6 @@ from tfcompose.model.messages import (
     OwnerLive,
     OwnerReady,
     ProcessRequest,
-    Recovered,
     RecoveredShown,
     Stopping,
     Taken,
@@ -90,7 +88,7 @@ def test_a_guard_that_is_off_is_not_waited_for_and_still_says_what_is_live_and_r
     history = begin(SLAM, GUARD, waits, guard=off)
     assert history.started == ["guard", "slam"]
     assert history.wait(60).found() == []
-    history.feed(Live("slam", ("odom",)), OwnerReady("slam"), Complete(1))
+    history.feed(Live("slam", ("odom",)), OwnerReady("slam"), TreeComplete(1))
     assert history.started == ["guard", "slam", "b"]
     assert (
         history.feed(TimeUp(), Exited("b", 0), Exited("slam", 0), Exited("guard", 0)).exit_code
@@ -296,7 +294,7 @@ def test_a_process_that_waits_for_its_restart_is_not_started_once_everything_sto
 def test_what_the_guard_finds_is_reported_with_the_seconds_since_the_start() -> None:
     history = begin(GUARD, STATIC).wait(1.5).feed(Clear()).wait(0.5)
     live = Live("static", ("laser",))
-    history.feed(live, OwnerReady("static"), Complete(1), Recovered("it is back"))
+    history.feed(live, OwnerReady("static"), TreeComplete(1), RecoveredShown("it is back"))
     assert history.all(OwnerLive) == [OwnerLive("static", "/static", ("base_link → laser",), 2.0)]
     assert history.all(TreeComplete) == [TreeComplete(1, 2.0)]
     assert history.all(RecoveredShown) == [RecoveredShown("it is back", 2.0)]
@@ -391,12 +389,12 @@ def test_missing_edges_are_named_after_5_s_and_again_only_when_there_are_others(
     assert len(history.all(Waiting)) == 1
     history.feed(Live("static", ("laser",)))
     assert history.all(Waiting)[1:] == [Waiting((Missing("slam", "/slam", ("map → odom",), 1),))]
-    history.feed(Live("slam", ("odom",)), Complete(2)).wait(60)
+    history.feed(Live("slam", ("odom",)), TreeComplete(2)).wait(60)
     assert len(history.all(Waiting)) == 2
 
 
 def test_a_tree_that_the_guard_calls_complete_misses_nothing() -> None:
-    assert begin(GUARD, STATIC).feed(Clear(), Complete(1)).wait(60).all(Waiting) == []
+    assert begin(GUARD, STATIC).feed(Clear(), TreeComplete(1)).wait(60).all(Waiting) == []
 
 
 def test_two_notices_of_missing_edges_are_5_s_apart() -> None:
@@ -460,7 +458,7 @@ def test_the_first_ctrl_c_while_a_failure_ends_everything_changes_nothing() -> N
 def test_what_the_guard_says_while_everything_stops_is_not_shown() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), Signalled(SIGINT))
     notices = len(history.notices)
-    history.feed(FindingShown(ERROR), Taken(ERROR), Complete(1), Live("static", ("laser",)))
+    history.feed(FindingShown(ERROR), Taken(ERROR), TreeComplete(1), Live("static", ("laser",)))
     assert history.notices[notices:] == []
     assert history.feed(Exited("static", 1), Exited("guard", 1)).exit_code == 0
     assert history.found() == []
@@ -492,12 +490,12 @@ def test_output_that_nobody_reads_any_more_ends_everything_with_exit_141() -> No
 
 
 def test_time_is_up_ends_with_0_when_the_tree_was_complete() -> None:
-    history = begin(GUARD, STATIC).feed(Clear(), Complete(1), FindingShown(WARNING), TimeUp())
+    history = begin(GUARD, STATIC).feed(Clear(), TreeComplete(1), FindingShown(WARNING), TimeUp())
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 0
 
 
 def test_time_is_up_ends_with_1_when_an_error_was_shown() -> None:
-    history = begin(GUARD, STATIC).feed(Clear(), Complete(1), FindingShown(ERROR), TimeUp())
+    history = begin(GUARD, STATIC).feed(Clear(), TreeComplete(1), FindingShown(ERROR), TimeUp())
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
 
 
@@ -511,7 +509,7 @@ def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_observed() -
 def test_a_process_that_was_stopped_is_not_reported_to_have_never_published() -> None:
     slam = replace(SLAM, argv=("slam",))
     history = begin(GUARD, STATIC, slam).feed(
-        Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), Complete(2)
+        Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), TreeComplete(2)
     )
     history.feed(ProcessRequest("stop", "slam"), Exited("slam", -SIGINT), TimeUp())
     expect(history.only(), "TF811", "map → odom", "slam is stopped", "SIGINT")

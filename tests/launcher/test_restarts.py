@@ -20,11 +20,9 @@ from tfcompose.model.messages import (
     AllReady,
     AllStarted,
     Clear,
-    Complete,
     DownRequest,
     Gate,
-    GateOpen,
-    GateShut,
+    GateState,
     Live,
     OwnerReady,
     Present,
@@ -34,6 +32,7 @@ from tfcompose.model.messages import (
     Remember,
     Replanned,
     Silent,
+    TreeComplete,
     Verb,
 )
 from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
@@ -67,21 +66,21 @@ def test_the_guard_checks_a_gate_and_what_waits_is_started_when_it_opens(
     history = begin(GUARD, gated(kind=kind, text=text), AFTER).feed(Clear())
     assert history.orders == [gate]
     assert history.started == ["guard", "lidar"]
-    history.wait(2).feed(GateOpen("lidar", "/scan"))
+    history.wait(2).feed(GateState("lidar", "/scan", is_open=True))
     assert history.started == ["guard", "lidar", "b"]
     assert history.all(ProcessReady) == [ProcessReady("lidar", "/scan", 2.0)]
 
 
 def test_a_gate_that_stays_shut_is_reported_once_and_may_still_open() -> None:
     history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(
-        Clear(), GateShut("lidar", "topics /tf, /scan_raw")
+        Clear(), GateState("lidar", "topics /tf, /scan_raw", is_open=False)
     )
     assert history.sleep_until_due() == pytest.approx(3)
     (found,) = history.late
     expect(found, "TF817", "lidar", " 3 s", "/scan", "topics /tf, /scan_raw")
     assert len(history.wait(60).late) == 1
     assert history.started == ["guard", "lidar"]
-    history.feed(GateOpen("lidar", "/scan"))
+    history.feed(GateState("lidar", "/scan", is_open=True))
     assert history.started[-1] == "b"
 
 
@@ -115,7 +114,9 @@ def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
 
 def test_who_sends_on_tf_is_observed_while_an_edges_gate_is_shut_and_no_longer() -> None:
     slam = replace(SLAM, ready=Ready("edges", timeout_s=3.0))
-    history = begin(GUARD, STATIC, slam).feed(Clear(), GateShut("slam", "/tf: nobody"))
+    history = begin(GUARD, STATIC, slam).feed(
+        Clear(), GateState("slam", "/tf: nobody", is_open=False)
+    )
     assert history.orders == [Gate("slam", writers=("/tf", "/tf_static"))]
     history.wait(3)
     (late,) = history.late
@@ -145,15 +146,15 @@ def test_lifecycle_nodes_are_driven_and_ready_means_that_they_are_there() -> Non
     history = begin(GUARD, slam, AFTER).feed(Clear(), OwnerReady("lidar"))
     assert history.orders == [Gate("lidar", nodes={"/slam": "active"}, drive=True)]
     assert history.started == ["guard", "lidar"]
-    assert history.feed(GateOpen("lidar", "/slam is active")).started[-1] == "b"
+    assert history.feed(GateState("lidar", "/slam is active", is_open=True)).started[-1] == "b"
 
 
 def test_all_ready_is_reported_once_with_when_each_was_started_and_ready() -> None:
     history = begin(GUARD, STATIC, gated()).wait(1).feed(Clear()).wait(1)
     assert [notice.waiting for notice in history.all(AllStarted)] == [()]
-    history.feed(Live("static", ("laser",)), OwnerReady("static"), Complete(1)).wait(1)
+    history.feed(Live("static", ("laser",)), OwnerReady("static"), TreeComplete(1)).wait(1)
     assert history.all(AllReady) == []
-    history.feed(GateOpen("lidar", "x"))
+    history.feed(GateState("lidar", "x", is_open=True))
     (notices,) = history.all(AllReady)
     assert {row.process: (row.started, row.ready) for row in notices.rows} == {
         "guard": (0.0, 0.0),
@@ -321,7 +322,7 @@ def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_agai
         return answer.complete, answer.silent, answer.processes[1].live
 
     history = begin(GUARD, STATIC).feed(
-        Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1)
+        Clear(), Live("static", ("laser",)), OwnerReady("static"), TreeComplete(1)
     )
     assert counted() == (True, (), 1)
     history.feed(Silent(("laser",), over=False))
@@ -398,7 +399,7 @@ def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is
 def test_a_tree_stays_complete_where_another_plan_changes_nothing_of_it() -> None:
     a = run_process("a")
     history = begin(GUARD, STATIC, a).feed(
-        Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1)
+        Clear(), Live("static", ("laser",)), OwnerReady("static"), TreeComplete(1)
     )
     history.feed(
         NewPlan(plan_of(GUARD, STATIC, replace(a, argv=("other",))), frozenset({"a"})),

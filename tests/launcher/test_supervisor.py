@@ -24,7 +24,6 @@ from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import (
     GUARD_EVENTS,
     Clear,
-    Complete,
     Ended,
     FindingShown,
     Live,
@@ -34,6 +33,7 @@ from tfcompose.model.messages import (
     ProcessState,
     Remember,
     Stopping,
+    TreeComplete,
 )
 from tfcompose.model.plan import Plan, PlanProcess, Ready, RosSettings
 
@@ -325,7 +325,7 @@ def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(
     tmp_path: Path,
 ) -> None:
     observed = Live("a", ("laser",))
-    events = guard(Clear(), "rubbish\n", observed, OwnerReady("a"), Complete(1))
+    events = guard(Clear(), "rubbish\n", observed, OwnerReady("a"), TreeComplete(1))
     a, b = (
         program("a", SLEEPER, owns=(("base_link", "laser"),)),
         program("b", SLEEPER, after={"a": "ready"}),

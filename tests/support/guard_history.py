@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
-from tfcompose.model.messages import Clear, FindingShown, GuardEvent, Recovered, Taken, Unfenced
+from tfcompose.model.messages import (
+    Clear,
+    FindingShown,
+    GuardEvent,
+    RecoveredShown,
+    Taken,
+    Unfenced,
+)
 from tfcompose.model.plan import (
     GuardPolicy,
     Plan,
@@ -237,7 +244,7 @@ class History:
 
     def over(self) -> list[str]:
         """Return what is said to have ended."""
-        return [event.message for event in self.events if isinstance(event, Recovered)]
+        return [event.text for event in self.events if isinstance(event, RecoveredShown)]
 
     def only(self) -> Finding:
         """Return what was found, which is one thing."""

@@ -12,24 +12,21 @@ from tfcompose.launcher.events import (
     Event,
     Finish,
     Kill,
-    LoadComponent,
     Notify,
     NotifyLate,
     Order,
     Start,
     Started,
     Tick,
-    UnloadComponent,
 )
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import State, initial
 from tfcompose.model.messages import (
+    ComponentOrder,
+    ComponentState,
     FindingShown,
-    Loaded,
     Notice,
-    NotLoaded,
     ProcessState,
-    Unloaded,
 )
 from tfcompose.model.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 
@@ -80,7 +77,7 @@ class History:
     killed: list[tuple[str, int]] = field(default_factory=list)
     notices: list[Any] = field(default_factory=list)
     orders: list[GuardOrder] = field(default_factory=list)
-    requested: list[LoadComponent | UnloadComponent] = field(default_factory=list)
+    requested: list[ComponentOrder] = field(default_factory=list)
     late: list[Finding] = field(default_factory=list)
     exit_code: int | None = None
     starts: bool = True
@@ -104,10 +101,10 @@ class History:
                     self.feed(Started(name, 1000 + len(self.started)))
             case Kill(name, number):
                 self.killed.append((name, number))
-            case LoadComponent() | UnloadComponent() as requested:
-                self.requested.append(requested)
             case Notify(notice):
                 self.notices.append(notice)
+            case Order(ComponentOrder() as order):
+                self.requested.append(order)
             case Order(order):
                 self.orders.append(order)
             case NotifyLate(_, found):
@@ -118,16 +115,18 @@ class History:
     def answer(self, *names: str, why: str = "") -> History:
         """Have containers answer what they were requested last about these components."""
         for name in names:
-            last = next(one for one in reversed(self.requested) if one.name == name)
-            if isinstance(last, UnloadComponent):
-                self.feed(Unloaded(name, last.number, why))
+            last = next(one for one in reversed(self.requested) if one.process == name)
+            if last.do == "unload":
+                self.feed(ComponentState(name, last.number, "unloaded", why))
+            elif why:
+                self.feed(ComponentState(name, last.number, "not loaded", why))
             else:
-                self.feed(NotLoaded(name, last.number, why) if why else Loaded(name, last.number))
+                self.feed(ComponentState(name, last.number, "loaded"))
         return self
 
     def loads(self) -> list[str]:
         """Return the components that containers were requested to load, in order."""
-        return [one.name for one in self.requested if isinstance(one, LoadComponent)]
+        return [one.process for one in self.requested if one.do == "load"]
 
     def wait(self, seconds: float) -> History:
         self.now += seconds

@@ -24,21 +24,17 @@ from tfcompose.model.messages import (
     Absent,
     Alive,
     Clear,
-    Complete,
+    ComponentOrder,
+    ComponentState,
     Gate,
-    GateOpen,
-    GateShut,
+    GateState,
     GuardEvent,
     Live,
-    Load,
-    Loaded,
-    NotLoaded,
     OwnerReady,
     Present,
     Remember,
     Silent,
-    Unload,
-    Unloaded,
+    TreeComplete,
 )
 from tfcompose.model.plan.codec import encode
 from tfcompose.model.variables import EVENTS_FD, MEMORY_FD, ORDERS_FD
@@ -58,14 +54,11 @@ _OBSERVATIONS = (
     Clear,
     Live,
     OwnerReady,
-    Complete,
-    GateOpen,
-    GateShut,
+    TreeComplete,
+    GateState,
     Remember,
     Silent,
-    Loaded,
-    NotLoaded,
-    Unloaded,
+    ComponentState,
 )
 #: How often the launcher hears that the guard looks, in seconds.
 ALIVE_EVERY_S = 1.0
@@ -101,7 +94,7 @@ class OrderReader:
                         judge.live.present(process)
                 case Gate() as gate:
                     self._gates.add(gate)
-                case Load() | Unload() as order:
+                case ComponentOrder() as order:
                     self._components.take(order)
         self._gates.check()
         self._components.check()

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.model.messages import Load, Loaded, NotLoaded, Unload, Unloaded
+from tfcompose.model.messages import ComponentOrder, ComponentState
 from tfcompose.model.plan.codec import decode
 from tfcompose.model.plan.components import LoadRequest, load_request
 from tfcompose.tf.process import say
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from tfcompose.model.messages import GuardEvent
+    from tfcompose.model.messages import GuardEvent, LoadState
     from tfcompose.tf.process import Own
     from tfcompose.tf.ros.composition import Container
 
@@ -50,7 +50,7 @@ class _Job:
     not there.
     """
 
-    order: Load | Unload
+    order: ComponentOrder
     request: LoadRequest
     step: str = ""
     since: float = 0.0
@@ -70,11 +70,11 @@ class Components:
         self._emit = emit
         self._containers: dict[str, Container] = {}
         self._jobs: dict[str, deque[_Job]] = {}
-        self._loaded: dict[str, tuple[Load, LoadRequest]] = {}
+        self._loaded: dict[str, tuple[ComponentOrder, LoadRequest]] = {}
         self._absent: dict[str, int] = {}
         self._due = 0.0
 
-    def take(self, order: Load | Unload) -> None:
+    def take(self, order: ComponentOrder) -> None:
         """Carry out an order of the launcher: it replaces one for the same component."""
         try:
             request = decode(LoadRequest, json.loads(Path(order.file).read_text(encoding="utf-8")))
@@ -83,7 +83,7 @@ class Components:
             return
         self.add(order, request)
 
-    def add(self, order: Load | Unload, request: LoadRequest) -> None:
+    def add(self, order: ComponentOrder, request: LoadRequest) -> None:
         """Carry out an order about a component; where nothing can be loaded at all, answer so."""
         try:
             self._container(request.container)
@@ -131,7 +131,12 @@ class Components:
             if self._absent[order.process] > ABSENT_AT_MOST:
                 del self._loaded[order.process]
                 self._emit(
-                    Unloaded(order.process, order.number, f"{name} has no {request.node} any more")
+                    ComponentState(
+                        order.process,
+                        order.number,
+                        "unloaded",
+                        f"{name} has no {request.node} any more",
+                    )
                 )
         if loaded and is_there:
             container.list.ask()
@@ -146,11 +151,13 @@ class Components:
 
     def _is_done(self, job: _Job, container: Container, now: float) -> bool:
         """Do what is due for an order; return whether it is answered."""
-        if isinstance(job.order, Load):
+        if job.order.do == "load":
             return self._is_loaded(job, job.order, container, now)
         return self._is_unloaded(job, job.order, container, now)
 
-    def _is_loaded(self, job: _Job, order: Load, container: Container, now: float) -> bool:
+    def _is_loaded(
+        self, job: _Job, order: ComponentOrder, container: Container, now: float
+    ) -> bool:
         if not container.load.is_there:
             if job.step:
                 self._answer(order, f"{container.name} went away")
@@ -199,7 +206,9 @@ class Components:
             return False
         return True
 
-    def _is_unloaded(self, job: _Job, order: Unload, container: Container, now: float) -> bool:
+    def _is_unloaded(
+        self, job: _Job, order: ComponentOrder, container: Container, now: float
+    ) -> bool:
         if now - job.since > ANSWER_S:
             self._answer(order, f"{container.name} does not answer")
             return True
@@ -221,22 +230,17 @@ class Components:
             return True
         return False
 
-    def _loaded_or_not(self, job: _Job, order: Load, why: str) -> None:
+    def _loaded_or_not(self, job: _Job, order: ComponentOrder, why: str) -> None:
         if not why:
             self._loaded[order.process] = order, job.request
             self._absent[order.process] = 0
         self._answer(order, why)
 
-    def _answer(self, order: Load | Unload, why: str) -> None:
-        if isinstance(order, Unload):
-            self._emit(Unloaded(order.process, order.number, why))
-        else:
-            done = (
-                NotLoaded(order.process, order.number, why)
-                if why
-                else Loaded(order.process, order.number)
-            )
-            self._emit(done)
+    def _answer(self, order: ComponentOrder, why: str) -> None:
+        state: LoadState = "unloaded"
+        if order.do == "load":
+            state = "not loaded" if why else "loaded"
+        self._emit(ComponentState(order.process, order.number, state, why))
 
 
 def _already(request: LoadRequest, there: Any) -> str:
@@ -274,14 +278,14 @@ class ComponentDriver:
             self._due = now + CHECK_EVERY_S
             for name, request in self._requests.items():
                 if not self._components.has(name):
-                    self._components.add(Load(name, 0, "", again=True), request)
+                    self._components.add(ComponentOrder(name, 0, "load", again=True), request)
         self._components.check()
 
     def _hear(self, event: GuardEvent) -> None:
         match event:
-            case Loaded(name):
+            case ComponentState(name, state="loaded"):
                 self._say(name, f"{name} is in {self._requests[name].container}")
-            case NotLoaded(name, _, why):
+            case ComponentState(name, state="not loaded", why=why):
                 self._say(name, why)
             case _:
                 pass

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.text import listed
 from tfcompose.guard.judge import FINDING_S
 from tfcompose.guard.verdict.drivers import not_taken
-from tfcompose.model.messages import FindingShown, Gate, GateOpen, GateShut
+from tfcompose.model.messages import FindingShown, Gate, GateState
 from tfcompose.tf.process import say
 from tfcompose.tf.ros.graph import is_offered, services, writers
 
@@ -80,10 +80,10 @@ class Gates:
             is_open, observed = self._at(gate, now)
             if is_open:
                 self.forget(process)
-                self._emit(GateOpen(process, observed))
+                self._emit(GateState(process, observed, is_open=True))
             elif self._reported.get(process) != observed:
                 self._reported[process] = observed
-                self._emit(GateShut(process, observed))
+                self._emit(GateState(process, observed, is_open=False))
 
     def _at(self, gate: Gate, now: float) -> tuple[bool, str]:
         states = [self._nodes[gate.process, name].check(now) for name in gate.nodes]

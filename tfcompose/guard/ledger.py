@@ -23,7 +23,7 @@ from tfcompose.guard.verdict.drivers import drives_of
 from tfcompose.guard.verdict.faults import Fault, fault_finding, group_of
 from tfcompose.guard.verdict.ownership import code_of
 from tfcompose.guard.verdict.stamps import StampHistory
-from tfcompose.model.messages import FindingShown, Recovered, Taken
+from tfcompose.model.messages import FindingShown, RecoveredShown, Taken
 from tfcompose.tf.live.publishers import NAMELESS_S, PARTICIPANT
 
 if TYPE_CHECKING:
@@ -401,7 +401,7 @@ class Ledger:
             self._compare(entry, by_group.get(self._group(entry), {}))
         due = [group for group in self._ended if self._is_due((group, True), now)]
         texts = [text for group in due for text in self._over_texts(group)]
-        return [*map(Recovered, texts), *self._report_remaining(now)]
+        return [*map(RecoveredShown, texts), *self._report_remaining(now)]
 
     def wrong(self) -> list[Finding]:
         """Return what was reported and is not over, for each edge and name, worst first."""

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.text import listed
 from tfcompose.guard.verdict.rates import left, silent, slow
 from tfcompose.model.messages import (
-    Complete,
     FindingShown,
     GuardEvent,
     Live,
     OwnerReady,
-    Recovered,
+    RecoveredShown,
+    TreeComplete,
 )
 from tfcompose.model.plan import SLOW_BELOW
 from tfcompose.tf.live.arrivals import Arrivals
@@ -311,7 +311,7 @@ class Liveness:
             events.append(OwnerReady(owner))
         if not self._complete and not any(self._waiting.values()):
             self._complete = True
-            events.append(Complete(len(self._order)))
+            events.append(TreeComplete(len(self._order)))
         return events
 
     def seconds_since(self, track: Track, now: float) -> tuple[float, float | None]:
@@ -405,7 +405,7 @@ class Liveness:
                 )
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
-                events.append(Recovered(f"{owner} ({edge.node}) is back"))
+                events.append(RecoveredShown(f"{owner} ({edge.node}) is back"))
         self.changes += len(events)
         return events
 
@@ -424,9 +424,9 @@ def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
             return FindingShown(slow(edges, min(track.rate() or 0.0 for track in tracks)))
         case "back":
             silence_s = now - min(track.silent_since for track in tracks)
-            return Recovered(f"{named} {are} back after {silence_s:.1f} s")
+            return RecoveredShown(f"{named} {are} back after {silence_s:.1f} s")
         case _:
-            return Recovered(
+            return RecoveredShown(
                 f"{named} {are} sent at {min(track.rate() or 0.0 for track in tracks):.3g} Hz"
                 " again"
             )

@@ -31,7 +31,7 @@ from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.ledger import MOST_UNDECLARED
 from tfcompose.guard.relay import Feedback, Relay
-from tfcompose.model.messages import Clear, Complete
+from tfcompose.model.messages import Clear, TreeComplete
 from tfcompose.model.plan.codec import decode
 from tfcompose.model.plan.middleware import IMPLEMENTATIONS
 from tfcompose.model.plan.topics import GLOBAL, parts_of, private_topics
@@ -287,13 +287,13 @@ def together(
 
     All clear and tree complete are reported once, when the last judge has reported them.
     """
-    waiting = {Clear: len(plans), Complete: sum(bool(plan.edges) for plan in plans)}
+    waiting = {Clear: len(plans), TreeComplete: sum(bool(plan.edges) for plan in plans)}
 
     def passed_on(event: GuardEvent) -> None:
-        if isinstance(event, Complete):
-            waiting[Complete] -= event.edges > 0
-            if waiting[Complete] == 0 and event.edges:
-                emit(Complete(sum(len(plan.edges) for plan in plans)))
+        if isinstance(event, TreeComplete):
+            waiting[TreeComplete] -= event.edges > 0
+            if waiting[TreeComplete] == 0 and event.edges:
+                emit(TreeComplete(sum(len(plan.edges) for plan in plans)))
             return
         if isinstance(event, Clear):
             waiting[Clear] -= 1

@@ -12,20 +12,20 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import finding
-from tfcompose.launcher.events import LoadComponent, UnloadComponent
+from tfcompose.launcher.events import Order
 from tfcompose.launcher.readiness import order_gate
 from tfcompose.launcher.stopping import left, lose_edges, schedule_restart
-from tfcompose.model.messages import Loaded, NotLoaded, Unloaded
+from tfcompose.model.messages import ComponentOrder, ComponentState
 
 if TYPE_CHECKING:
     from tfcompose.launcher.state import State, Tracked, Transition
 
 
-def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -> None:
+def component_answered(step: Transition, event: ComponentState) -> None:
     """Take what a container has answered to the last order about a component."""
-    one = step.state.tracked[event.process]
-    match event:
-        case Loaded() if one.state == "starting":
+    one, why = step.state.tracked[event.process], event.why
+    match event.state:
+        case "loaded" if one.state == "starting":
             container = (
                 one.process.component and step.state.tracked[one.process.component.container]
             )
@@ -33,18 +33,18 @@ def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -
                 event.process, "running", pid=container.pid if container else None, began=step.now
             )
             order_gate(step, step.state.tracked[event.process])
-        case NotLoaded(why=why) if one.state == "starting":
+        case "not loaded" if one.state == "starting":
             _ended(
                 step,
                 replace(one, since=step.now),
                 why,
                 f"{one.process.name} could not be started: {why}",
             )
-        case Unloaded(why=why) if one.state == "running":
+        case "unloaded" if one.state == "running":
             _ended(step, one, why, f"{one.process.name} has ended: {why}")
-        case Unloaded(why=why) if one.state == "stopping" and step.state.stop:
+        case "unloaded" if one.state == "stopping" and step.state.stop:
             step.enter(event.process, "stopped", why)
-        case Unloaded(why=why) if one.state == "stopping":
+        case "unloaded" if one.state == "stopping":
             left(step, one, why or "unloaded")
         case _:
             pass
@@ -80,9 +80,9 @@ def order_components(step: Transition) -> None:
             "starting",
             "running",
         ):  # it watches over those that run
-            step.actions.append(LoadComponent(name, one.order, again=True))
+            step.actions.append(Order(ComponentOrder(name, one.order, "load", again=True)))
         elif one.process.component and one.state == "stopping":
-            step.actions.append(UnloadComponent(name, one.order))
+            step.actions.append(Order(ComponentOrder(name, one.order, "unload")))
 
 
 #: What may be a logger's name: ROS writes it in brackets, in a line's beginning.

@@ -132,26 +132,6 @@ class Kill:
 
 
 @dataclass(frozen=True, slots=True)
-class LoadComponent:
-    """Have the guard load a component.
-
-    ``number`` is that of its start, ``again`` says that another was told before.
-    """
-
-    name: str
-    number: int
-    again: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class UnloadComponent:
-    """Have the guard unload a component; ``number`` is that of its start."""
-
-    name: str
-    number: int
-
-
-@dataclass(frozen=True, slots=True)
 class Notify:
     """Send a notice to the person, and to clients of the control socket."""
 
@@ -168,7 +148,7 @@ class NotifyLate:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Send the guard an order."""
+    """Send the guard an order; what a container is asked is written to the order's file."""
 
     order: GuardOrder
 
@@ -180,4 +160,4 @@ class Finish:
     exit_code: int
 
 
-Action = Start | Kill | LoadComponent | UnloadComponent | Notify | NotifyLate | Order | Finish
+Action = Start | Kill | Notify | NotifyLate | Order | Finish

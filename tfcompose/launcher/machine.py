@@ -55,26 +55,21 @@ from tfcompose.model.messages import (
     Absent,
     Alive,
     Clear,
-    Complete,
+    ComponentState,
     FindingShown,
-    GateOpen,
-    GateShut,
+    GateState,
     Live,
-    Loaded,
     Missing,
-    NotLoaded,
     OwnerLive,
     OwnerReady,
     Present,
     ProcessRequest,
-    Recovered,
     RecoveredShown,
     Remember,
     Silent,
     Taken,
     TreeComplete,
     Unfenced,
-    Unloaded,
     Waiting,
 )
 
@@ -127,7 +122,7 @@ def _react(step: Transition, event: Event) -> None:
             _not_started(step, name, why)
         case Exited():
             process_exited(step, event)
-        case Loaded(name, number) | NotLoaded(name, number) | Unloaded(name, number):
+        case ComponentState(name, number):
             if name in step.state.tracked and step.state.tracked[name].order == number:
                 component_answered(step, event)
         case Taken(found):
@@ -144,13 +139,13 @@ def _requested_or_reported(step: Transition, event: Event) -> None:
             process_requested(step, event)
         case NewPlan():
             follow_plan(step, event)
-        case GateOpen(process, observed) | LogMatched(process, observed) if (
+        case GateState(process, observed, is_open=False) if process in step.state.tracked:
+            step.track(process, replace(step.state.tracked[process], observed=observed))
+        case GateState(process, observed) | LogMatched(process, observed) if (
             process in step.state.tracked
         ):
             if gate_of(step.state.tracked[process].process) not in ("edges", "exit", "time"):
                 open_gate(step, process, observed)
-        case GateShut(process, observed) if process in step.state.tracked:
-            step.track(process, replace(step.state.tracked[process], observed=observed))
         case OwnerReady(process) if process in step.state.tracked:
             _owner_ready(step, process)
         case _:  # the guard's other events, and Tick
@@ -215,14 +210,14 @@ def _guard_reported(step: Transition, event: Event) -> None:
         case Silent(children, over):
             silent = step.state.silent
             step.update(silent=silent.difference(children) if over else silent.union(children))
-        case Complete(edges):
+        case TreeComplete(edges):
             _complete(step, edges)
         case FindingShown(found, process):
             _violation(step, found, process)
         case Unfenced(found, process, pid):
             _left_the_fence(step, found, process or _process_of(step.state, pid), pid)
-        case Recovered(message):
-            step.notify(RecoveredShown(message, step.since_begin))
+        case RecoveredShown(text):
+            step.notify(RecoveredShown(text, step.since_begin))
         case Remember(changed):
             step.update(memory=step.state.memory | changed)
         case _:

@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.launcher.events import Action, Finish, LoadComponent, Notify, Order, Start
+from tfcompose.launcher.events import Action, Finish, Notify, Order, Start
 from tfcompose.model.messages import (
+    ComponentOrder,
     Ended,
     FindingShown,
     Notice,
@@ -243,7 +244,10 @@ class Transition:
         )
         if again and before.process.owns and self.state.guard not in (None, name):
             self.actions.append(Order(Present(name)))
-        self.actions.append(LoadComponent(name, order) if component else Start(name))
+        if component:
+            self.actions.append(Order(ComponentOrder(name, order, "load")))
+        else:
+            self.actions.append(Start(name))
 
     def report(self, found: Finding) -> None:
         """Show the finding, and remember an error."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import did_you_mean
 from tfcompose.foundation.text import counted
-from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp, UnloadComponent
+from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp
 from tfcompose.launcher.failures import (
     ended_by_itself,
     guard_lost,
@@ -21,7 +21,7 @@ from tfcompose.launcher.failures import (
     signal_name,
 )
 from tfcompose.launcher.state import UNREAD, Stop, Tracked, by_owner
-from tfcompose.model.messages import Absent, DownRequest, Replanned
+from tfcompose.model.messages import Absent, ComponentOrder, DownRequest, Replanned
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -393,7 +393,7 @@ def _end_component(step: Transition, one: Tracked, level: int, container: str) -
     if level <= one.level or not step.state.tracked[name].alive:
         return
     lose_edges(step, one)
-    step.actions.append(UnloadComponent(name, one.order))
+    step.actions.append(Order(ComponentOrder(name, one.order, "unload")))
     step.enter(name, "stopping", "unloaded", pid=one.pid, level=1)
 
 

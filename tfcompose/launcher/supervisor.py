@@ -31,7 +31,6 @@ from tfcompose.launcher.events import (
     Begin,
     Finish,
     Kill,
-    LoadComponent,
     Notify,
     NotifyLate,
     Order,
@@ -41,19 +40,17 @@ from tfcompose.launcher.events import (
     StartFailed,
     Tick,
     TimeUp,
-    UnloadComponent,
 )
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.output import Notifier
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.state import initial
 from tfcompose.model.messages import (
+    ComponentOrder,
+    ComponentState,
     Ended,
     FilesRestored,
     FindingShown,
-    Load,
-    NotLoaded,
-    Unload,
     UpdateRequest,
 )
 from tfcompose.model.plan.codec import encode
@@ -280,12 +277,10 @@ class _Supervisor:
                 self._start(name)
             case Kill(name, number):
                 self._children.kill(name, number)
-            case LoadComponent(name, number, again):
-                self._load(name, number, again=again)
-            case UnloadComponent(name, number):
-                self._unload(name, number)
             case Notify(notice):
                 self._notify(notice)
+            case Order(ComponentOrder() as order):
+                self._order_component(order)
             case Order(order):
                 self._children.order(order)
             case NotifyLate(name, found):
@@ -337,22 +332,23 @@ class _Supervisor:
             self._children.start(state.tracked[name].process, self._commands[name], guard)
         )
 
-    def _load(self, name: str, number: int, *, again: bool) -> None:
+    def _order_component(self, order: ComponentOrder) -> None:
         """Write what the container is asked beside the plan, and have the guard ask it."""
-        text = json.dumps(encode(self._commands[name].load), ensure_ascii=False)
-        try:
-            file = self._write_request(name, text)
-        except OSError as error:
-            self._events.append(NotLoaded(name, number, str(error)))
-        else:
-            self._children.order(Load(name, number, str(file), again))
-
-    def _unload(self, name: str, number: int) -> None:
-        file, text = self._loads[name]
-        if not file.is_file():
-            with contextlib.suppress(OSError):  # the guard says that it cannot read it
+        name = order.process
+        if order.do == "load":
+            text = json.dumps(encode(self._commands[name].load), ensure_ascii=False)
+            try:
                 file = self._write_request(name, text)
-        self._children.order(Unload(name, number, str(file)))
+            except OSError as error:
+                failed = ComponentState(name, order.number, "not loaded", str(error))
+                self._events.append(failed)
+                return
+        else:
+            file, text = self._loads[name]
+            if not file.is_file():
+                with contextlib.suppress(OSError):  # the guard says that it cannot read it
+                    file = self._write_request(name, text)
+        self._children.order(replace(order, file=str(file)))
 
     def _write_request(self, name: str, text: str) -> Path:
         self._restore_files()

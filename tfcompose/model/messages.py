@@ -57,10 +57,14 @@ class OwnerReady:
 
 
 @dataclass(frozen=True, slots=True)
-class Complete:
-    """Every edge of the plan is live."""
+class TreeComplete:
+    """Every edge of the plan is live: a notice too.
+
+    ``seconds`` is how long after the start; the guard, which does not know it, leaves it at 0.
+    """
 
     edges: int
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +76,17 @@ class FindingShown:
 
     found: Finding
     process: str = field(default="", metadata=OMITTED)
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveredShown:
+    """A case that was reported is over; the text says which. A notice too.
+
+    ``seconds`` is how long after the start, as in ``TreeComplete``.
+    """
+
+    text: str
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,26 +104,15 @@ class Unfenced:
 
 
 @dataclass(frozen=True, slots=True)
-class Recovered:
-    """A case that was reported is over; the sentence says which."""
+class GateState:
+    """A process's gate, looked at: whether what it waits for is there.
 
-    message: str
-
-
-@dataclass(frozen=True, slots=True)
-class GateOpen:
-    """What a process's gate waits for is there; ``seen`` says what."""
+    ``seen`` says what is there, or what is there instead.
+    """
 
     process: str
     seen: str
-
-
-@dataclass(frozen=True, slots=True)
-class GateShut:
-    """What a process's gate waits for is not there yet; ``seen`` says what is there instead."""
-
-    process: str
-    seen: str
+    is_open: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,32 +125,20 @@ class Remember:
     changed: dict[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
-class Loaded:
-    """A container has loaded a component; ``number`` is that of the order."""
-
-    process: str
-    number: int
+LoadState = Literal["loaded", "not loaded", "unloaded"]
 
 
 @dataclass(frozen=True, slots=True)
-class NotLoaded:
-    """A container has not loaded a component, for this reason; ``number`` is that of the order."""
+class ComponentState:
+    """What has become of a component; ``number`` is that of the order that is answered.
 
-    process: str
-    number: int
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
-class Unloaded:
-    """A component is not in its container any more, or the container does not answer.
-
-    Then ``why`` says so.
+    It is unloaded, too, where its container has it no more or does not answer. ``why`` says why it
+    is not loaded.
     """
 
     process: str
     number: int
+    state: LoadState
     why: str = ""
 
 
@@ -162,16 +154,13 @@ GuardEvent = (
     | Live
     | Silent
     | OwnerReady
-    | Complete
+    | TreeComplete
     | FindingShown
     | Unfenced
-    | Recovered
-    | GateOpen
-    | GateShut
+    | RecoveredShown
+    | GateState
     | Remember
-    | Loaded
-    | NotLoaded
-    | Unloaded
+    | ComponentState
 )
 
 GUARD_EVENTS = TaggedUnion[GuardEvent]("event", get_args(GuardEvent))
@@ -213,34 +202,21 @@ class Gate:
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
-    """Have a container load a component, as the file says.
+class ComponentOrder:
+    """Have a container load or unload a component, as the file says.
 
-    It is answered by ``Loaded`` or ``NotLoaded``.
-
-    The answer has the order's ``number``. ``again`` says that a guard before this one may have had
-    it loaded.
+    A ``ComponentState`` with the order's ``number`` answers it. ``again`` says that a guard before
+    this one may have had it loaded.
     """
 
     process: str
     number: int
-    file: str
+    do: Literal["load", "unload"]
     again: bool = False
+    file: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Unload:
-    """Have a container unload a component, as the file says.
-
-    It is answered by ``Unloaded``, with ``number``.
-    """
-
-    process: str
-    number: int
-    file: str
-
-
-GuardOrder = Absent | Present | Gate | Load | Unload
+GuardOrder = Absent | Present | Gate | ComponentOrder
 
 GUARD_ORDERS = TaggedUnion[GuardOrder]("order", get_args(GuardOrder))
 
@@ -348,14 +324,6 @@ class Replanned:
 
 
 @dataclass(frozen=True, slots=True)
-class TreeComplete:
-    """Every edge of the plan is live, ``seconds`` after the start."""
-
-    edges: int
-    seconds: float
-
-
-@dataclass(frozen=True, slots=True)
 class Missing:
     """The unpublished edges of one owner, in the plan's order, of ``owned`` ones."""
 
@@ -370,14 +338,6 @@ class Waiting:
     """Edges that nobody has published yet, by owner."""
 
     missing: tuple[Missing, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class RecoveredShown:
-    """A case that was shown is over, ``seconds`` after the start."""
-
-    text: str
-    seconds: float
 
 
 @dataclass(frozen=True, slots=True)

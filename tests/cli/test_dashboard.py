@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.cli.dashboard import KEPT_LINES, Dashboard
-from tfcompose.cli.screen import Keys
+from tfcompose.cli.screen import KeyDecoder
 from tfcompose.foundation.findings import Note, finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.messages import (
@@ -294,7 +294,7 @@ def test_no_keys_break_the_view(keys: list[str], count: int, size: tuple[int, in
 
 
 def test_keys_are_known_in_pieces_and_in_the_forms_that_terminals_send() -> None:
-    keys = Keys()
+    keys = KeyDecoder()
     assert keys.feed(b"q\033[A\033OB\033[5~\r") == ["q", "up", "down", "pgup", "enter"]
     assert keys.feed(b"\033[") == []
     assert keys.waits

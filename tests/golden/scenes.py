@@ -90,7 +90,14 @@ from tfcompose.spec.language.tool_keys import problems_with
 from tfcompose.spec.load import Source, load
 from tfcompose.tf.bags import BagError
 from tfcompose.tf.live.publishers import Message, OtherRun, Publisher, Senders
-from tfcompose.tf.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, Topic, TreeState
+from tfcompose.tf.live.state import (
+    NO_NODE,
+    MovingJoint,
+    RosProcess,
+    StampedData,
+    TopicState,
+    TreeState,
+)
 from tfcompose.tf.process import read_own
 from tfcompose.tf.ros import environment
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
@@ -98,7 +105,7 @@ from tfcompose.tools.deploy.connection import LostError, Settings, connected
 from tfcompose.tools.deploy.rollout import Rollout, target_of
 from tfcompose.tools.fleet import command as fleet
 from tfcompose.tools.fleet.check import check_fleet
-from tfcompose.tools.fleet.observe import EdgeStatus, LinkState, RobotStatus, problems_of
+from tfcompose.tools.fleet.observe import EdgeStatus, FleetRobotStatus, LinkState, problems_of
 from tfcompose.tools.fleet.spec import validate_fleet
 from tfcompose.tools.importers.draft import Draft
 from tfcompose.tools.importers.shell import add_script
@@ -178,7 +185,7 @@ def _stamps() -> Iterator[TreeState]:
     yield simulated.observed(clock_ns=5 * SECOND_NS, clock_moves=True)
     yield sound_tree().observed(skews_s={b"d": 3.2})
     yield sound_tree().observed(skews_s={b"d": -0.4})
-    clock = Topic("/clock", CLOCK, ("/gazebo",), ("/nav",))
+    clock = TopicState("/clock", CLOCK, ("/gazebo",), ("/nav",))
     yield sound_tree().observed(graph=(clock,))
     yield sound_tree().observed(graph=(clock,), clock_ns=5 * SECOND_NS)
     yield sound_tree().observed(graph=(replace(clock, publishers=()),))
@@ -198,18 +205,18 @@ def _graphs() -> Iterator[TreeState]:
     )
     yield sound_tree().observed(volatile_readers=("/rviz",))
     yield sound_tree().observed(volatile_readers=("/rviz", "/viewer"))
-    yield sound_tree().observed(graph=(Topic("/tf", "std_msgs/msg/String", ("/old",)),))
+    yield sound_tree().observed(graph=(TopicState("/tf", "std_msgs/msg/String", ("/old",)),))
     yield sound_tree().observed(malformed={b"d": 3, None: 1})
     both = (
-        Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),
-        Topic("/tf", TF_MESSAGE, ("/robot1/ekf",)),
+        TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),
+        TopicState("/tf", TF_MESSAGE, ("/robot1/ekf",)),
     )
     yield sound_tree().observed(graph=both)
     yield sound_tree().observed(
         publishers=tuple(Publisher(bytes([n]), f"/n{n}", static=True) for n in range(101))
     )
     joints = (MovingJoint("shoulder", "base_link", "arm"),)
-    states = Topic("/joint_states", JOINT_STATE, ("/broadcaster",), ())
+    states = TopicState("/joint_states", JOINT_STATE, ("/broadcaster",), ())
     yield sound_tree().observed(graph=(states,))
     yield sound_tree().observed(graph=(states,), moving_joints=joints)
     yield sound_tree().observed(
@@ -250,7 +257,7 @@ def _setups() -> Iterator[TreeState]:
     yield replace(nothing, nodes=("/talker",))
     yield replace(nothing, nodes=("/listener", "/talker"), plan=sound_plan())
     yield replace(nothing, plan=sound_plan())
-    yield replace(nothing, graph=(Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),))
+    yield replace(nothing, graph=(TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),))
     other = {"ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"}
     yield replace(nothing, processes=(RosProcess(9, "nav", other),))
     yield replace(nothing, processes=tuple(RosProcess(pid, "nav", other) for pid in range(5)))
@@ -743,7 +750,9 @@ def fleets() -> Iterator[Finding]:
         yield from _refused(fleet.refuse_without_zenoh)
     for state, age in states:
         for delay_s in (0.0, 1.0):
-            yield from problems_of(RobotStatus("r1", "tcp/a:7447", state, age, edges, delay_s))
+            yield from problems_of(
+                FleetRobotStatus("r1", "tcp/a:7447", state, age, edges, delay_s)
+            )
 
 
 def _check_fleet(source: Source) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.support.waiting import TIMEOUT_S
-from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Command, Lines, Pipe, spawn
+from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, ChildCommand, Lines, Pipe, spawn
 from tfcompose.launcher.children import Reaper
 from tfcompose.launcher.program import HERE
 from tfcompose.launcher.supervisor import Signals
@@ -112,7 +112,7 @@ def test_an_own_process_that_is_ordered_to_end_while_it_starts_ends_by_its_own_r
     number: int, seconds: float, tmp_path: Path
 ) -> None:
     argv = (*HERE, "static", str(tmp_path / "plan.json"), "static")
-    popen = spawn(Command(argv, dict(os.environ), tmp_path, own=True), ())
+    popen = spawn(ChildCommand(argv, dict(os.environ), tmp_path, own=True), ())
     time.sleep(seconds)
     popen.send_signal(number)
     _, errors = popen.communicate(timeout=60)
@@ -131,7 +131,7 @@ def test_a_child_holder_stays_that_is_ordered_to_end_in_its_first_moment(number:
 
 def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_path: Path) -> None:
     popen = spawn(
-        Command(
+        ChildCommand(
             (sys.executable, "-c", "import time; time.sleep(180)"), dict(os.environ), tmp_path
         ),
         (),
@@ -151,7 +151,7 @@ def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last
         "os._exit(3)  # nothing is flushed: a terminal has its lines already\n"
     )
     popen = spawn(
-        Command(
+        ChildCommand(
             (sys.executable, "-I", "-c", code), dict(os.environ), tmp_path, process=ON_A_TERMINAL
         ),
         (),
@@ -169,5 +169,5 @@ def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last
 def test_a_program_that_cannot_be_started_leaves_no_pseudo_terminal_open(tmp_path: Path) -> None:
     before = sorted(Path("/proc/self/fd").iterdir())
     with pytest.raises(OSError, match="nowhere"):
-        spawn(Command(("/nowhere/program",), {}, tmp_path, process=ON_A_TERMINAL), ())
+        spawn(ChildCommand(("/nowhere/program",), {}, tmp_path, process=ON_A_TERMINAL), ())
     assert sorted(Path("/proc/self/fd").iterdir()) == before

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from tests.support.findings import expect
 from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.geometry import Pose
-from tfcompose.launcher.child import Command
+from tfcompose.launcher.child import ChildCommand
 from tfcompose.launcher.preflight import LAUNCH, commands_of
 from tfcompose.model.plan import (
     PROGRAM,
@@ -61,13 +61,13 @@ def plan_of(*processes: PlanProcess, fence: FenceWay = "auto") -> Plan:
 
 def inspect(
     tmp_path: Path, *processes: PlanProcess, fence: FenceWay = "auto", **env: str
-) -> tuple[dict[str, Command], list[Finding]]:
+) -> tuple[dict[str, ChildCommand], list[Finding]]:
     base = {"PATH": os.environ["PATH"]} | env
     plan = plan_of(*processes, fence=fence)
     return commands_of(plan, list(processes), tmp_path / "plan.json", base, child_environment)
 
 
-def partitions(command: Command) -> dict[tuple[str, str], str]:
+def partitions(command: ChildCommand) -> dict[tuple[str, str], str]:
     """Return the partitions that a command's fence gives readers or writers of a topic."""
     assert command.fence
     root = ET.fromstring(command.fence[1])  # noqa: S314 (made here)
@@ -81,7 +81,7 @@ def partitions(command: Command) -> dict[tuple[str, str], str]:
     }
 
 
-def moved(command: Command) -> dict[str, str]:
+def moved(command: ChildCommand) -> dict[str, str]:
     """Return what the command's ROS arguments remap, by the first rule that fits, as ROS does."""
     rules = [
         word.split(":=")

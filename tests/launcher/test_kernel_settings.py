@@ -29,7 +29,7 @@ from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
-    from tfcompose.launcher.child import Command
+    from tfcompose.launcher.child import ChildCommand
     from tfcompose.model.plan import SchedulingPolicy
 
 #: What the cases ask the kernel by.
@@ -111,7 +111,7 @@ def process_with(key: str, case: Case) -> PlanProcess:
     return plan_of(robot).process("p")
 
 
-def commands(folder: Path, process: PlanProcess) -> tuple[dict[str, Command], list[Finding]]:
+def commands(folder: Path, process: PlanProcess) -> tuple[dict[str, ChildCommand], list[Finding]]:
     plan = Plan("r", "", None, RosSettings(), (), (process,))
     return commands_of(plan, [process], folder / "plan.json", os.environ, child_environment)
 

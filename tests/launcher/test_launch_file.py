@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.findings import expect
 from tfcompose.foundation.findings import Finding
-from tfcompose.launcher.child import Command
+from tfcompose.launcher.child import ChildCommand
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import LogLine, Notice
@@ -58,7 +58,7 @@ def env(tmp_path: Path) -> dict[str, str]:
 
 def inspect(
     tmp_path: Path, env: dict[str, str], process: PlanProcess = NAV2
-) -> tuple[dict[str, Command], Finding | None]:
+) -> tuple[dict[str, ChildCommand], Finding | None]:
     plan = Plan("rover", "", None, RosSettings(), (), (process,))
     commands, found = commands_of(plan, [process], tmp_path / "plan.json", env, child_environment)
     return commands, found[0] if found else None

@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.findings import expect
 from tfcompose.foundation.findings import Finding
-from tfcompose.launcher.child import Command
+from tfcompose.launcher.child import ChildCommand
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.plan import Plan, PlanProcess, RosSettings
 from tfcompose.model.plan.fleet import SHARE_COMMAND
@@ -32,7 +32,7 @@ def inspect(
     *processes: PlanProcess,
     env: Mapping[str, str] | None = None,
     ros: RosSettings | None = None,
-) -> tuple[dict[str, Command], list[Finding]]:
+) -> tuple[dict[str, ChildCommand], list[Finding]]:
     plan = Plan("rover", "", None, ros or RosSettings(), (), processes)
     base = {"PATH": os.environ["PATH"]} | dict(env or {})
     return commands_of(plan, list(processes), tmp_path / "plan.json", base, child_environment)

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tfcompose.foundation.geometry import Pose
-from tfcompose.launcher.answers import Change, change
+from tfcompose.launcher.answers import PlanDifference, change
 from tfcompose.model.plan import (
     EdgeKind,
     GuardPolicy,
@@ -36,7 +36,7 @@ PLAN = Plan(
 
 def changed(
     tmp_path: Path, plan: Plan, params: str = "a: 1", description: str = "<robot/>"
-) -> Change:
+) -> PlanDifference:
     for name, slam, robot in (("old", "a: 1", "<robot/>"), ("new", params, description)):
         (tmp_path / name / "params").mkdir(parents=True)
         (tmp_path / name / "params" / "slam.yaml").write_text(slam)
@@ -48,20 +48,20 @@ def test_a_line_that_moved_in_the_file_changes_nothing(tmp_path: Path) -> None:
     moved = replace(
         PLAN, edges=(edge("laser", line=9), edge("odom", "slam", line=3)), spec_digest="other"
     )
-    assert changed(tmp_path, moved) == Change(frozenset(), ())
+    assert changed(tmp_path, moved) == PlanDifference(frozenset(), ())
 
 
 def test_an_edge_concerns_its_owner_and_the_guard(tmp_path: Path) -> None:
     moved = replace(PLAN, edges=(edge("laser", x=0.1), edge("odom", "slam")))
-    assert changed(tmp_path, moved) == Change(frozenset({"static", "guard"}), ())
+    assert changed(tmp_path, moved) == PlanDifference(frozenset({"static", "guard"}), ())
 
 
 def test_a_parameter_concerns_its_process_only(tmp_path: Path) -> None:
-    assert changed(tmp_path, PLAN, params="a: 2") == Change(frozenset({"slam"}), ())
+    assert changed(tmp_path, PLAN, params="a: 2") == PlanDifference(frozenset({"slam"}), ())
 
 
 def test_the_description_concerns_whoever_sends_it(tmp_path: Path) -> None:
-    assert changed(tmp_path, PLAN, description="<robot name='r'/>") == Change(
+    assert changed(tmp_path, PLAN, description="<robot name='r'/>") == PlanDifference(
         frozenset({"static"}), ()
     )
 

@@ -15,7 +15,7 @@ from typing_extensions import Self
 from tests.support.zenoh_peers import free_port, session
 from tfcompose.spec.load import load
 from tfcompose.tf.ros.tf_codec import Transform, encode
-from tfcompose.tools.fleet.share import Sender
+from tfcompose.tools.fleet.share import EdgeSender
 from tfcompose.tools.fleet.spec import validate_fleet
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class SimulatedRobot:
     def __init__(self, fleet: FleetSpec, name: str, x: float, rate_hz: float = 50.0) -> None:
         self._x = x
         self._period_s = 1 / rate_hz
-        self.sender = Sender(fleet, name, lambda _: None)
+        self.sender = EdgeSender(fleet, name, lambda _: None)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=name)
         self._thread.start()

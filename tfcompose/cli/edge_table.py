@@ -14,7 +14,7 @@ from tfcompose.foundation.text import counted, listed
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.tf.live.chain import Chain
+    from tfcompose.tf.live.chain import FrameChain
     from tfcompose.tf.live.edges import EdgeState, TreeObserver
 
 #: A stamp that is farther off is taken to be of another clock.
@@ -118,7 +118,7 @@ def duration(seconds: float | None) -> str:
     return f"{seconds * 1e3:.1f} ms" if abs(seconds) < 1 else f"{seconds:.2f} s"
 
 
-def chain_line(chain: Chain | str, a: str, b: str) -> str:
+def chain_line(chain: FrameChain | str, a: str, b: str) -> str:
     """Return the number of edges between two frames and the newest pose's age.
 
     Or why there is no chain.
@@ -139,7 +139,7 @@ def objects_of(
     edges: Sequence[EdgeState],
     observer: TreeObserver,
     now_ns: int,
-    chain: Chain | str | None = None,
+    chain: FrameChain | str | None = None,
 ) -> str:
     """Return one line of JSON: what was counted, and a list of edges.
 

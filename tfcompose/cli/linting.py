@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 JUDGE_FOR_S = 60.0
 
 
-class _Files(NamedTuple):
+class _LintFiles(NamedTuple):
     """Files that a robot file may read, and the variables that its arguments may."""
 
     read: Callable[[str], str]
@@ -91,19 +91,19 @@ class Linter:
         packages = Packages(files, advice="source the workspace's setup file")
         return lint_urdf(file, packages, self.arguments.given)
 
-    def _files_of(self, file: str, read: Callable[[str], str]) -> _Files:
+    def _files_of(self, file: str, read: Callable[[str], str]) -> _LintFiles:
         """Return all files of this machine; with --untrusted those of the robot's tree."""
         if not self.arguments.untrusted:
             from tfcompose.cli.compiling import disk
 
             files = disk(trusts_files=self.arguments.trust, sources=[file])
-            return _Files(read, self.presets, lambda _: files, lambda _: os.environ)
+            return _LintFiles(read, self.presets, lambda _: files, lambda _: os.environ)
         from tfcompose.cli.untrusted import UntrustedFiles, declared_environment
 
         untrusted = UntrustedFiles(file, read)
         for overlay in self.arguments.overlays:
             untrusted.reach.add_tree(overlay)
-        return _Files(
+        return _LintFiles(
             untrusted.read,
             untrusted.library(),
             untrusted.disk_for,
@@ -118,7 +118,7 @@ class _Variants:
     source: Source
     overlays: Sequence[Source]
     given: Given
-    files: _Files
+    files: _LintFiles
     disk: Disk
 
     def in_combinations(self, profiles: Sequence[str]) -> tuple[list[Finding], list[Compiled]]:

@@ -92,7 +92,9 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
         )
         from tfcompose.cli.screen import Screen
 
-        view = _View(place, Dashboard(place.name, plan, built_with, warnings), launcher, signals)
+        view = _LiveView(
+            place, Dashboard(place.name, plan, built_with, warnings), launcher, signals
+        )
         output = NonBlockingOutput(sys.stdout.fileno())
         with Screen(sys.stdin.fileno(), output) as screen:
             code = view.run(screen)
@@ -101,7 +103,7 @@ def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
     return code
 
 
-class _Connection:
+class _LauncherConnection:
     """A connection to the launcher that is read line by line, without waiting."""
 
     def __init__(self, place: RuntimeDir) -> None:
@@ -140,20 +142,20 @@ class _Connection:
         self._socket.close()
 
 
-class _View:
+class _LiveView:
     def __init__(
         self, place: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals
     ) -> None:
-        from tfcompose.cli.screen import Keys
+        from tfcompose.cli.screen import KeyDecoder
 
         self._place = place
         self._dashboard = dashboard
         self._launcher = launcher
         self._signals = signals
-        self._keys = Keys()
+        self._keys = KeyDecoder()
         self._meter = UsageMeter()
-        self._events: _Connection | None = None
-        self._states: _Connection | None = None
+        self._events: _LauncherConnection | None = None
+        self._states: _LauncherConnection | None = None
         self._requested = self._stale = self._owing = False
         self._follower: Follower | None = None
         self._last: list[Notice] = []
@@ -216,14 +218,14 @@ class _View:
         self._connect_at = time.monotonic() + STATUS_EVERY_S
         with contextlib.suppress(OSError):
             if self._events is None:
-                self._events = _Connection(self._place)
+                self._events = _LauncherConnection(self._place)
                 self._selector.register(self._events, selectors.EVENT_READ, self._take_events)
                 self._dashboard.forget()
                 self._last.clear()
                 self._left_out = 0
                 self._events.send(EventsRequest())
             if self._states is None:
-                self._states = _Connection(self._place)
+                self._states = _LauncherConnection(self._place)
                 self._requested = False
                 self._selector.register(self._states, selectors.EVENT_READ, self._take_status)
 
@@ -258,7 +260,7 @@ class _View:
             self._dashboard.status = decode(RobotStatus, json.loads(line))
             self._requested, self._stale = False, True
 
-    def _drop(self, connection: _Connection | None) -> None:
+    def _drop(self, connection: _LauncherConnection | None) -> None:
         if connection:
             self._selector.unregister(connection)
             connection.close()

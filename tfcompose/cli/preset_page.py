@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tfcompose.compiler.resolve import Library
-    from tfcompose.spec.language.bodies import Shape
+    from tfcompose.spec.language.bodies import ShapeSpec
     from tfcompose.spec.language.node_preset import ClaimSpec
     from tfcompose.spec.language.preset import (
         Option,
@@ -191,7 +191,7 @@ def _body(preset: PresetSpec) -> dict[str, Any] | None:
     return fields | ({"mass": body.mass} if body.mass else {})
 
 
-def _shape(shape: Shape) -> dict[str, Any]:
+def _shape(shape: ShapeSpec) -> dict[str, Any]:
     if shape.cylinder:
         return {"cylinder": {"radius": shape.cylinder.radius, "length": shape.cylinder.length}}
     return (

@@ -13,7 +13,7 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, wait_for_data, warn
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.text import listed
-from tfcompose.launcher.control import RefusedError, ask, connect
+from tfcompose.launcher.control import RequestRefusedError, ask, connect
 from tfcompose.launcher.procfs import environment_of, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
 from tfcompose.model.messages import (
@@ -123,7 +123,7 @@ def request(place: RuntimeDir, question: Request, answer: type[A]) -> A | None:
     """Return the launcher's answer, or None after saying why there is none, or that it refuses."""
     try:
         return ask(place, question, answer)
-    except RefusedError as error:
+    except RequestRefusedError as error:
         warn(str(error))
     except OSError as error:
         warn(f"{place.name} does not answer: {error}")

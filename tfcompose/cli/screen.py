@@ -51,7 +51,7 @@ _KEY = re.compile(r"\033[\[O]([0-9;]*[~A-Za-z])|([^\033]|\033)", re.DOTALL)
 _BEGUN = re.compile(r"\033(?:[\[O][0-9;]*)?\Z")
 
 
-class Keys:
+class KeyDecoder:
     """Bytes of a terminal into the names of keys."""
 
     def __init__(self) -> None:

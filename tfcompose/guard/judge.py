@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tfcompose.guard.before_start import Start
+from tfcompose.guard.before_start import StartTime
 from tfcompose.guard.ledger import JudgedMessage, Ledger
 from tfcompose.guard.liveness import EdgeHealth, Liveness, LivenessMemory
 from tfcompose.guard.reports import PublisherReports
@@ -39,7 +39,7 @@ class JudgeMemory:
     The launcher keeps it, part by part. Ids of publishers are in hexadecimal.
     """
 
-    start: Start
+    start: StartTime
     #: By frame who sent it, the newest sender last.
     owners: dict[str, tuple[str, ...]]
     #: By publisher.
@@ -69,7 +69,7 @@ class Judge:
     live: Liveness = field(init=False)
     clocks: Clocks = field(init=False)
     ledger: Ledger = field(init=False)
-    _start: Start = field(init=False)
+    _start: StartTime = field(init=False)
     _senders: Senders = field(init=False)
     _publishers: PublisherReports = field(init=False)
     _sent: SentPoses = field(init=False)
@@ -81,7 +81,7 @@ class Judge:
     def __post_init__(self) -> None:
         self.live = Liveness(self.plan)
         self.clocks = Clocks(self.plan.ros.clock == "sim")
-        self._start = Start(self.begun, self.begun_ns)
+        self._start = StartTime(self.begun, self.begun_ns)
         self._senders = Senders(says_who=self.says_who)
         self.ledger = Ledger(self.plan, self._senders, self._start)
         self._publishers = PublisherReports(self.plan)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.guard.before_start import Start
+    from tfcompose.guard.before_start import StartTime
     from tfcompose.model.messages import GuardEvent
     from tfcompose.model.plan import Plan, PlanEdge
     from tfcompose.tf.live.publishers import Message, Senders
@@ -116,7 +116,7 @@ class JudgedMessage:
 class Ledger:
     """Edges that came, by publisher, under a plan; ``epoch`` changes with all that it knows."""
 
-    def __init__(self, plan: Plan, senders: Senders, start: Start) -> None:
+    def __init__(self, plan: Plan, senders: Senders, start: StartTime) -> None:
         self.epoch = 0
         self.planned: dict[str, PlanEdge] = {edge.child: edge for edge in plan.edges}
         self.frames = Frames(plan)

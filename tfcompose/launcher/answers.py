@@ -29,7 +29,7 @@ from tfcompose.model.plan.file import read_plan
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.launcher.child import Command
+    from tfcompose.launcher.child import ChildCommand
     from tfcompose.launcher.events import Event
     from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.state import State, Tracked
@@ -42,7 +42,7 @@ MOST_PLAN_BYTES = 64_000_000
 
 Answer = RobotStatus | Done | PlanChange | Refusal
 #: The answer, what it means for the machine, and another plan's file and commands.
-Outcome = tuple[Answer, "Event | None", "tuple[Path, dict[str, Command]] | None"]
+Outcome = tuple[Answer, "Event | None", "tuple[Path, dict[str, ChildCommand]] | None"]
 
 
 def status(state: State, now: float) -> RobotStatus:
@@ -174,14 +174,14 @@ def _plain_file(file: Path) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class PlanDifference:
     """The processes that differ between two plans, and fixed frames that listeners keep."""
 
     changed: frozenset[str]
     held: tuple[str, ...]
 
 
-def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> Change:
+def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDifference:
     """Return what differs; the folders hold the files that belong to the plans."""
     described = _bytes(old_folder, old.description) != _bytes(new_folder, new.description)
     before = {process.name: process for process in old.processes}
@@ -195,7 +195,7 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> Change:
         )
         if not same or (described and process.kind in ("static", "joints")):
             changed.add(process.name)
-    return Change(frozenset(changed), _held(old, new))
+    return PlanDifference(frozenset(changed), _held(old, new))
 
 
 def _bytes(folder: Path, name: str | None) -> bytes | None:

@@ -61,7 +61,7 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class ChildCommand:
     """Program and arguments, environment, and folder.
 
     ``process`` is that of the plan, whose settings hold for it; ``own`` says that it is one of
@@ -232,7 +232,7 @@ class Child:
         return (*self.last_out, *self.last_err)[-LAST_LINES:]
 
 
-def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
+def spawn(command: ChildCommand, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
     """Start the command as the leader of a new session, with its output in pipes.
 
     One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it
@@ -272,7 +272,7 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
 
 
 def _on_terminals(
-    command: Command, before_the_program: Callable[[], None], pass_fds: tuple[int, ...]
+    command: ChildCommand, before_the_program: Callable[[], None], pass_fds: tuple[int, ...]
 ) -> subprocess.Popen[bytes]:
     """Start the command with pseudo-terminals for output and errors.
 

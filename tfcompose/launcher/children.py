@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from selectors import BaseSelector
 
-    from tfcompose.launcher.child import Command
+    from tfcompose.launcher.child import ChildCommand
     from tfcompose.launcher.events import Event
     from tfcompose.model.messages import GuardOrder, Notice, Stream
     from tfcompose.model.plan import PlanProcess
@@ -94,7 +94,7 @@ class Children:
         self._left: set[str] = set()
 
     def start(
-        self, process: PlanProcess, command: Command, guard: GuardPipes | None = None
+        self, process: PlanProcess, command: ChildCommand, guard: GuardPipes | None = None
     ) -> Event:
         """Start the process, with pipes if it is a guard, and return what came of it."""
         if process.name in self._held:
@@ -124,7 +124,7 @@ class Children:
             )
         return Started(process.name, child.popen.pid)
 
-    def prepare(self, process: PlanProcess, command: Command) -> None:
+    def prepare(self, process: PlanProcess, command: ChildCommand) -> None:
         """Have one of tfcompose's own load what it needs.
 
         It joins ROS when it is started, without that delay.
@@ -221,7 +221,7 @@ class Children:
     def _spawn(
         self,
         process: PlanProcess,
-        command: Command,
+        command: ChildCommand,
         guard: GuardPipes | None,
         pass_fds: tuple[int, ...] = (),
     ) -> Child:

@@ -38,7 +38,7 @@ KEPT_LINES = 500
 ANSWER_S = 20.0
 
 
-class RefusedError(Exception):
+class RequestRefusedError(Exception):
     """Raised where the launcher refuses a request; the message is its reason."""
 
 
@@ -125,7 +125,7 @@ def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
     try:
         data = json.loads(line)
         if "error" in data:
-            raise RefusedError(decode(Refusal, data).error)
+            raise RequestRefusedError(decode(Refusal, data).error)
         return decode(answer, data)
     except (ValueError, TypeError) as error:
         raise ConnectionError(

@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.launcher.child import Command
+    from tfcompose.launcher.child import ChildCommand
 
 _ARGUMENTS = 2
 
 
-def command_of(argv: Sequence[str], base: Mapping[str, str]) -> Command | int:
+def command_of(argv: Sequence[str], base: Mapping[str, str]) -> ChildCommand | int:
     """Return what is executed, or an exit code after saying why nothing is."""
     if len(argv) != _ARGUMENTS:
         return _fail("usage: tfcompose exec PLAN_FILE NAME", 2)

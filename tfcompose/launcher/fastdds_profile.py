@@ -71,7 +71,7 @@ def _below(parent: ET.Element, name: str) -> ET.Element:
 
 def _read(file: Path | None) -> ET.Element:
     if file is None:
-        return _Reader().read(_EMPTY)
+        return _ProfileReader().read(_EMPTY)
     try:
         if not file.is_file():
             raise RosError("it is no plain file" if file.exists() else "it is not there")
@@ -82,12 +82,12 @@ def _read(file: Path | None) -> ET.Element:
     if len(data) > MOST_BYTES:
         raise RosError(f"it is longer than {MOST_BYTES >> 20} MiB")
     try:
-        return _Reader().read(data)
+        return _ProfileReader().read(data)
     except (expat.ExpatError, ValueError, LookupError) as error:
         raise RosError(f"it cannot be read: {error}") from None
 
 
-class _Reader:
+class _ProfileReader:
     """Reads XML as Fast DDS does: names stand for themselves, whatever namespace they are in.
 
     Raises:

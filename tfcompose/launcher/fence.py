@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Literal
 
-    from tfcompose.launcher.child import Command
+    from tfcompose.launcher.child import ChildCommand
     from tfcompose.model.plan import Plan, PlanProcess
 
     Way = Literal["", "partition", "remap"]
@@ -100,11 +100,11 @@ def not_remapped(plan: Plan) -> list[Finding]:
 
 
 def by_partition(
-    plan: Plan, commands: Mapping[str, Command], folder: Path
-) -> tuple[dict[str, Command], list[Finding]]:
+    plan: Plan, commands: Mapping[str, ChildCommand], folder: Path
+) -> tuple[dict[str, ChildCommand], list[Finding]]:
     """Return the commands with profiles that partition their TF, and why that fails."""
     judged = judged_topics(plan)
-    fenced: dict[str, Command] = {}
+    fenced: dict[str, ChildCommand] = {}
     wrong: dict[tuple[str, str], list[str]] = {}
     for name, command in commands.items():
         process = plan.process(name)
@@ -142,7 +142,7 @@ class _CannotFenceError(Exception):
         self.advice = advice
 
 
-def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) -> str:
+def _profile(plan: Plan, command: ChildCommand, topics: list[str], *, reads: bool) -> str:
     env = command.env
     moved = [topic for topic in topics if not topic.startswith("/")]
     if moved:
@@ -168,7 +168,7 @@ def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) ->
         ) from None
 
 
-def _refuse_own_profile(process: PlanProcess, command: Command) -> None:
+def _refuse_own_profile(process: PlanProcess, command: ChildCommand) -> None:
     """Refuse an owner whose command names another profile file by itself.
 
     It would leave the fence.

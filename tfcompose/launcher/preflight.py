@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
-from tfcompose.launcher.child import Command
+from tfcompose.launcher.child import ChildCommand
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
 from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.launcher.program import HERE, without_current_folder
@@ -64,7 +64,7 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     base: Mapping[str, str],
     environment: Environment,
     built_in: Path | None = None,
-) -> tuple[dict[str, Command], list[Finding]]:
+) -> tuple[dict[str, ChildCommand], list[Finding]]:
     """Return each process's command, and what is wrong.
 
     With anything wrong, nothing should be started.
@@ -73,7 +73,7 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     """
     folder = built_in or plan_file.absolute().parent
     found = _never_started(plan)
-    commands: dict[str, Command] = {}
+    commands: dict[str, ChildCommand] = {}
     missing = []
     way = way_of(plan, base)
     if way == "remap":
@@ -84,7 +84,7 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
         if process.component:
             fill = partial(_filled, process=process, plan_file=plan_file, build_dir=folder)
             request = load_request(plan, process, fill, private=way == "remap")
-            commands[process.name] = Command((), {}, folder, load=request)
+            commands[process.name] = ChildCommand((), {}, folder, load=request)
             continue
         command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
         if isinstance(command, Finding):
@@ -112,7 +112,7 @@ def _command_of(
     files: tuple[Path, Path],
     base: Mapping[str, str],
     environment: Environment,
-) -> Command | NotFound | Finding:
+) -> ChildCommand | NotFound | Finding:
     trouble = missing_zenoh(process)
     if trouble:
         return trouble
@@ -128,13 +128,15 @@ def _command_of(
         lost = f"the folder {folder} that {process.name} runs in does not exist"
         optional = process.required is False
         return (
-            Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)
+            ChildCommand(argv, env, folder, missing=lost)
+            if optional
+            else finding("TF810", lost, None)
         )
-    command: Command | NotFound | Finding
+    command: ChildCommand | NotFound | Finding
     if _is_launch(argv[0]):
         launched = _launch_command(process, ros, argv, env)
         command = (
-            Command(launched[0], env | launched[1], folder)
+            ChildCommand(launched[0], env | launched[1], folder)
             if isinstance(launched, tuple)
             else launched
         )
@@ -143,20 +145,20 @@ def _command_of(
         command = (
             program
             if isinstance(program, NotFound)
-            else Command((program, *argv[1:]), env, folder, own)
+            else ChildCommand((program, *argv[1:]), env, folder, own)
         )
-    if isinstance(command, Command):
+    if isinstance(command, ChildCommand):
         command = replace(command, process=process)
-    if isinstance(command, Command) and process.prefix:
+    if isinstance(command, ChildCommand) and process.prefix:
         runner = executable_of(process, process.prefix[0], folder, env)
         words = (runner, *process.prefix[1:], *command.argv) if isinstance(runner, str) else ()
         command = replace(command, argv=words) if isinstance(runner, str) else runner
     if isinstance(command, NotFound) and process.required is False:
-        return Command(argv, env, folder, missing=not_found([command]).message)
+        return ChildCommand(argv, env, folder, missing=not_found([command]).message)
     return command
 
 
-def _with_remapping_mark(plan: Plan, name: str, command: Command) -> Command:
+def _with_remapping_mark(plan: Plan, name: str, command: ChildCommand) -> ChildCommand:
     if plan.process(name).kind != "guard":
         return command
     return replace(command, env=command.env | {REMAPPED: "1"})

@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.answers import Answer
-    from tfcompose.launcher.child import Command
+    from tfcompose.launcher.child import ChildCommand
     from tfcompose.launcher.events import Action, Event
     from tfcompose.launcher.output import NonBlockingOutput
     from tfcompose.launcher.preflight import Environment
@@ -157,7 +157,7 @@ class _Supervisor:
     def __init__(  # noqa: PLR0913, PLR0917 (made in one place)
         self,
         state: State,
-        commands: dict[str, Command],
+        commands: dict[str, ChildCommand],
         report: Callable[[Notice], None],
         session: Session,
         known: _Known,

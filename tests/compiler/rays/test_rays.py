@@ -16,7 +16,7 @@ from tests.support.texts import robot_in
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.reading import read_text
 from tfcompose.compiler.compile import compile_robot
-from tfcompose.compiler.rays import Body, View, cast, contains, directions, view_of
+from tfcompose.compiler.rays import PosedShape, View, cast, contains, directions, view_of
 from tfcompose.foundation.findings import Span
 from tfcompose.foundation.geometry import Pose, matrix_from_quat, normalised, quat_from_rpy
 from tfcompose.model.robot import Asset, Optics, Robot, Shape
@@ -74,7 +74,7 @@ def test_a_ray_ends_where_trimesh_says(
     mesh = MESHES[kind].copy()
     mesh.apply_transform(transform(pose))
     into = directions(SCAN)[::7] + directions(CAMERA)[::11]
-    view = cast("s", SCAN, into, [Body("b", Shape(kind, SIZES[kind], pose), pose)])
+    view = cast("s", SCAN, into, [PosedShape("b", Shape(kind, SIZES[kind], pose), pose)])
     if mesh.contains([[0, 0, 0]])[0]:
         near: Any = trimesh.proximity
         assert view.inside or abs(near.signed_distance(mesh, [[0, 0, 0]])[0]) < 1e-3
@@ -93,7 +93,7 @@ def test_a_ray_ends_where_trimesh_says(
 
 
 def test_a_body_around_the_origin_says_how_deep_that_is() -> None:
-    box = Body("b", Shape("box", (1.0, 2.0, 3.0), Pose()), Pose((0.2, 0.0, 0.0)))
+    box = PosedShape("b", Shape("box", (1.0, 2.0, 3.0), Pose()), Pose((0.2, 0.0, 0.0)))
     view = cast("s", SCAN, directions(SCAN), [box])
     assert view.inside == {"b": pytest.approx(0.3)}
     assert view.blocked == 0
@@ -103,7 +103,7 @@ def test_a_body_around_the_origin_says_how_deep_that_is() -> None:
 def test_a_body_that_a_sensor_is_mounted_flush_on_blocks_nothing(kind: ShapeKind) -> None:
     size = SIZES[kind]
     surface = size[0] / 2 if kind == "box" else size[0]
-    flush = Body("b", Shape(kind, size, Pose()), Pose((-surface, 0.0, 0.0)))
+    flush = PosedShape("b", Shape(kind, size, Pose()), Pose((-surface, 0.0, 0.0)))
     assert cast("s", SCAN, directions(SCAN), [flush]).blocked == 0
 
 
@@ -168,13 +168,13 @@ def test_a_mesh_is_hit_where_the_same_primitive_is(tmp_path: Path) -> None:
     MESHES["sphere"].export(file)
     pose = Pose((1.0, 0.2, 0.1), normalised((0.1, 0.2, 0.3, 0.9)))
     shape = Shape("mesh", (2.0, 2.0, 2.0), pose, mesh=Asset("ball.stl", path=str(file)))
-    by_mesh = cast("s", SCAN, directions(CAMERA), [Body("b", shape, pose)])
+    by_mesh = cast("s", SCAN, directions(CAMERA), [PosedShape("b", shape, pose)])
     by_shape = cast(
-        "s", SCAN, directions(CAMERA), [Body("b", Shape("sphere", (0.6,), pose), pose)]
+        "s", SCAN, directions(CAMERA), [PosedShape("b", Shape("sphere", (0.6,), pose), pose)]
     )
     assert by_mesh.inside == by_shape.inside == {}
     turned = [Pose((0.9, 0.2, 0.1)), Pose((0.1, 0.0, 0.0))]
-    assert cast("s", SCAN, (), [Body("b", shape, turned[1])]).inside["b"] == pytest.approx(
+    assert cast("s", SCAN, (), [PosedShape("b", shape, turned[1])]).inside["b"] == pytest.approx(
         0.5, abs=0.01
     )
     for one, other in zip(by_mesh.rays, by_shape.rays, strict=True):
@@ -192,7 +192,7 @@ def test_a_collada_file_is_in_its_own_unit_here_and_in_the_view(tmp_path: Path) 
         text.replace("<asset>", '<asset><unit name="centimeter" meter="0.01"/>'), "utf-8"
     )
     shape = Shape("mesh", (10.0, 10.0, 10.0), Pose(), mesh=Asset("box.dae", path=str(file)))
-    found = cast("s", SCAN, ((1.0, 0.0, 0.0),), [Body("b", shape, Pose((1.0, 0.0, 0.0)))])
+    found = cast("s", SCAN, ((1.0, 0.0, 0.0),), [PosedShape("b", shape, Pose((1.0, 0.0, 0.0)))])
     assert found.rays[0].distance == pytest.approx(0.9)
     assert mesh_of(shape).extents == pytest.approx([0.2, 0.2, 0.2])
 
@@ -201,7 +201,7 @@ def test_a_mesh_that_cannot_be_read_blocks_nothing_and_is_named(tmp_path: Path) 
     shape = Shape(
         "mesh", (1.0, 1.0, 1.0), Pose(), mesh=Asset("none.stl", path=str(tmp_path / "none.stl"))
     )
-    found = cast("s", SCAN, directions(SCAN), [Body("b", shape, Pose((1.0, 0, 0)))])
+    found = cast("s", SCAN, directions(SCAN), [PosedShape("b", shape, Pose((1.0, 0, 0)))])
     assert (found.blocked, found.left_out) == (0, ("b",))
 
 

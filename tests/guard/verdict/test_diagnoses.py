@@ -25,7 +25,7 @@ from tfcompose.foundation.text import duration
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.setup import settings_apart
 from tfcompose.model.plan import EdgePattern, GuardPolicy, PlanProcess
-from tfcompose.tf.live.state import RosProcess, StampedData, Topic, TreeState
+from tfcompose.tf.live.state import RosProcess, StampedData, TopicState, TreeState
 from tfcompose.tf.ros.environment import RANGE
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
@@ -178,7 +178,7 @@ CASES: dict[str, tuple[TreeState, set[str]]] = {
         set(),
     ),
     "a namespace without topics of its own": (
-        sound_tree().observed(graph=(Topic("/tf", TF_MESSAGE, ("/robot1/ekf", "/drive")),)),
+        sound_tree().observed(graph=(TopicState("/tf", TF_MESSAGE, ("/robot1/ekf", "/drive")),)),
         set(),
     ),
     "never seen": (TreeHistory().moving("odom base_link").observed(plan=sound_plan()), {"TF811"}),
@@ -279,8 +279,8 @@ NAMED: dict[str, tuple[TreeState, str, list[str]]] = {
     "a leak": (
         sound_tree().observed(
             graph=(
-                Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),
-                Topic("/tf", TF_MESSAGE, ("/robot1/ekf", "/drive")),
+                TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),
+                TopicState("/tf", TF_MESSAGE, ("/robot1/ekf", "/drive")),
             )
         ),
         "TF827",
@@ -376,7 +376,7 @@ def test_stamps_that_stand_with_the_clock_are_reported_of_the_clock_alone() -> N
         .moving("odom base_link", stamp=lambda _: 106 * SECOND_NS)
         .fixed("base_link laser")
     )
-    clock = Topic("/clock", "rosgraph_msgs/msg/Clock", ("/gazebo",), ("/nav",))
+    clock = TopicState("/clock", "rosgraph_msgs/msg/Clock", ("/gazebo",), ("/nav",))
     stands = history.observed(clock_ns=106 * SECOND_NS, clock_moves=False, graph=(clock,))
     assert codes(stands) == {"TF836"}
     assert "TF823" in codes(replace(stands, clock_moves=True))
@@ -419,7 +419,7 @@ def test_processes_with_other_settings_are_searched_where_there_is_no_tf_below_a
 ):
     observed = TreeState(SECONDS, processes=(RosProcess(9, "nav", {"ROS_DOMAIN_ID": "8"}),))
     assert codes(observed) == {"TF845", "TF908"}
-    below = (Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),)
+    below = (TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),)
     assert codes(replace(observed, graph=below)) == {"TF845"}
 
 
@@ -473,16 +473,18 @@ def test_times_are_shown_in_the_unit_that_people_use() -> None:
 
 
 def test_joint_states_of_a_neighbour_robot_are_not_this_ones() -> None:
-    heard = Topic("/robot1/joint_states", JOINT_STATE, ("/robot1/wheels",), ("/robot1/joints",))
+    heard = TopicState(
+        "/robot1/joint_states", JOINT_STATE, ("/robot1/wheels",), ("/robot1/joints",)
+    )
     neighbours = (
-        Topic("/tf", TF_MESSAGE, ("/drive",)),
-        Topic("/robot1/tf", TF_MESSAGE, ("/robot1/joints",)),
+        TopicState("/tf", TF_MESSAGE, ("/drive",)),
+        TopicState("/robot1/tf", TF_MESSAGE, ("/robot1/joints",)),
         heard,
     )
     history = TreeHistory().moving("odom base_link")
     assert "TF842" not in codes(history.observed(graph=neighbours))
     alone = (
-        Topic("/tf", TF_MESSAGE, ("/drive",)),
+        TopicState("/tf", TF_MESSAGE, ("/drive",)),
         heard,
     )  # nobody below /robot1 publishes TF: they are for this tree
     assert "TF842" in codes(history.observed(graph=alone))

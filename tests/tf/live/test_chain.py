@@ -3,7 +3,7 @@
 import pytest
 
 from tfcompose.cli.edge_table import chain_line
-from tfcompose.tf.live.chain import Chain, chain_between
+from tfcompose.tf.live.chain import FrameChain, chain_between
 from tfcompose.tf.live.edges import TreeObserver
 from tfcompose.tf.live.publishers import Publisher
 
@@ -36,9 +36,9 @@ def add(  # noqa: PLR0913 (a stream has that many parts)
         observer.take(rows, static=static, gid=gid, received_ns=at_ms * MS)  # type: ignore[arg-type]
 
 
-def between(observer: TreeObserver, a: str, b: str) -> Chain:
+def between(observer: TreeObserver, a: str, b: str) -> FrameChain:
     found = chain_between(observer.edges(4 * SECOND), a, b)
-    assert isinstance(found, Chain), found
+    assert isinstance(found, FrameChain), found
     return found
 
 

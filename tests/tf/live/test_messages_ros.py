@@ -9,7 +9,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from tfcompose.tf.live.publishers import MessageReader
 from tfcompose.tf.live.snapshot import joints_of
 from tfcompose.tf.ros.node import Received
-from tfcompose.tf.ros.tf_codec import Layout, Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import MessageLayout, Transform, decode, encode
 
 NAMES = st.sampled_from(["a", "b", "odom", "base_link", "käse", "", "x" * 9])
 TRANSFORMS = st.lists(
@@ -77,8 +77,8 @@ def test_names_of_any_bytes_are_those_that_rclpy_takes(name: bytes) -> None:
         one.child
         == deserialize_message(stamped.replace(b"odom\0", name), TransformStamped).child_frame_id
     )
-    assert Layout(data).exact
-    assert not Layout(data.replace(b"odom\0", name)).exact
+    assert MessageLayout(data).exact
+    assert not MessageLayout(data.replace(b"odom\0", name)).exact
 
 
 def test_names_are_those_that_tf2_takes_and_can_be_shown() -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.tf.ros.joint_codec import Names, encode_names, fill, read_names
+from tfcompose.tf.ros.joint_codec import JointNames, encode_names, fill, read_names
 
 names = st.lists(
     st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=9),
@@ -103,7 +103,7 @@ def test_a_message_that_claims_a_lot_is_refused_at_once(at: int) -> None:
     tracemalloc.stop()
 
 
-def _read(data: bytes) -> Names:
+def _read(data: bytes) -> JointNames:
     found = read_names(data)
     found.positions(data)
     found.stamp_ns(data)

@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from tfcompose.tools.deploy.all_hosts import _Printer
+from tfcompose.tools.deploy.all_hosts import _HostPrinter
 
 
 def test_events_have_their_host_and_a_line_that_is_none_is_printed(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    printer = _Printer("events", is_json=True)
+    printer = _HostPrinter("events", is_json=True)
     printer.take("brain", '{"event": "started"}')
     printer.take("rear", "Welcome to rear")
     first, second = capsys.readouterr().out.splitlines()
@@ -19,7 +19,7 @@ def test_events_have_their_host_and_a_line_that_is_none_is_printed(
 
 
 def test_robots_are_one_list_without_what_is_none(capsys: pytest.CaptureFixture[str]) -> None:
-    printer = _Printer("ps", is_json=True)
+    printer = _HostPrinter("ps", is_json=True)
     printer.take("brain", '[{"robot": "rover.brain"}]')
     printer.take("rear", "Welcome to rear")
     printer.end(["brain", "rear", "arm"])

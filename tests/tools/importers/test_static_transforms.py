@@ -6,7 +6,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tfcompose.foundation.geometry import angle_between, normalised
-from tfcompose.tools.importers.static_transforms import RefusedError, reader_of, static_transform
+from tfcompose.tools.importers.static_transforms import (
+    ArgumentsRefusedError,
+    reader_of,
+    static_transform,
+)
 
 #: Arguments, who reads them, and what tf2's setRPY (fixed axes) and the program make of them:
 #: ends, xyz, roll, pitch, yaw in rad.
@@ -92,7 +96,7 @@ REFUSED = [
     ("words", "reader"), REFUSED, ids=[f"{reader}: {words}" for words, reader in REFUSED]
 )
 def test_arguments_that_the_program_refuses_are_refused(words: str, reader: str) -> None:
-    with pytest.raises(RefusedError):
+    with pytest.raises(ArgumentsRefusedError):
         static_transform(words.split(), reader)  # type: ignore[arg-type]
 
 

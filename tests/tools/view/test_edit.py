@@ -26,7 +26,7 @@ from tfcompose.foundation.geometry import (
 )
 from tfcompose.model.robot import Robot
 from tfcompose.spec.load import load
-from tfcompose.tools.view.edit import Change, Elsewhere, ImmovableError, change_of
+from tfcompose.tools.view.edit import Elsewhere, ImmovableError, MountEdits, change_of
 
 ROBOTS = Path(__file__).parents[3] / "robots"
 PRESETS = library()
@@ -57,7 +57,7 @@ def moved(text: str, child: str, pose: Pose, profiles: tuple[str, ...] = ()) -> 
     done = compiled(text, profiles=profiles)
     assert done.robot
     change = change_of(done.robot, done.sources[0], {"r.yaml": text}, child, pose)
-    assert isinstance(change, Change), change
+    assert isinstance(change, MountEdits), change
     new = edited(text, change.edits)
     assert new is not None
     off = offset_of(pose, pose_in(robot_of(new, profiles=profiles), child))

@@ -19,7 +19,7 @@ from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.model.robot import Robot
 from tfcompose.tf.live.edges import TreeObserver
 from tfcompose.tf.live.publishers import Publisher
-from tfcompose.tools.view.forest import Forest, pose_of, row_of
+from tfcompose.tools.view.forest import FrameForest, pose_of, row_of
 from tfcompose.tools.view.live import FOUND_S, LiveTree
 
 TEXT = """
@@ -293,7 +293,7 @@ def test_poses_in_roots_are_those_of_the_tree_walked_edge_by_edge() -> None:
         frame: Pose((number(), number(), number()), quat_from_rpy(number(), number(), 3))
         for frame in frames
     }
-    forest = Forest(frames, parents)
+    forest = FrameForest(frames, parents)
     found = forest.in_roots(np.array([row_of(poses[frame]) for frame in frames]))
     for frame, row in zip(frames, found.tolist(), strict=True):
         expected, at = Pose(), frame

@@ -22,7 +22,7 @@ from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan.file import write_plan
 from tfcompose.tools.view.live_view import Following, observers_of
 from tfcompose.tools.view.panel import Panel
-from tfcompose.tools.view.reload import Files, ReloadedPanel
+from tfcompose.tools.view.reload import ReloadedPanel, WatchedFiles
 from tfcompose.tools.view.server import start_server, stop_server
 from tfcompose.tools.view.session import Session
 
@@ -58,7 +58,7 @@ joints: {w: {type: continuous, parent: base_link, child: wheel, xyz: [0, 0.2, 0]
 @contextmanager
 def following(session: Session, *, joints: bool = False) -> Iterator[View]:
     """Show the robot that runs in the test's domain."""
-    files, changed = Files(lambda one: Path(one).read_text("utf-8")), threading.Event()
+    files, changed = WatchedFiles(lambda one: Path(one).read_text("utf-8")), threading.Event()
     for file in session.texts:
         files(file)
     server, ending = start_server("127.0.0.1", 0, "test", TOKEN), Stop()

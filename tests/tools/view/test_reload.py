@@ -12,7 +12,7 @@ from tests.support.waiting import until
 from tfcompose.cli.parser import parser_of
 from tfcompose.cli.reading import read_text
 from tfcompose.foundation.geometry import Pose
-from tfcompose.tools.view.reload import Files, ReloadedPanel, Watcher
+from tfcompose.tools.view.reload import ReloadedPanel, WatchedFiles, Watcher
 from tfcompose.tools.view.server import start_server, stop_server
 from tfcompose.tools.view.view_session import session_of
 
@@ -37,7 +37,7 @@ def shown(tmp_path: Path) -> Iterator[ReloadedPanel]:
     (tmp_path / "more.yaml").write_text(
         "frames: {mast: {parent: base_link, xyz: [0, 0, 2]}}\n", "utf-8"
     )
-    files = Files(read_text)
+    files = WatchedFiles(read_text)
     session = session_of(
         str(tmp_path / "r.yaml"), parser_of("view").parse_args([str(tmp_path / "r.yaml")]), files
     )
@@ -197,7 +197,7 @@ def test_a_robot_that_was_wrong_from_the_begin_is_shown_again_while_it_is_wrong(
     wrong = TEXT.replace("parent: arm,", "parent: amr,").replace("include: [more.yaml]\n", "")
     file = tmp_path / "r.yaml"
     file.write_text(wrong, "utf-8")
-    files = Files(read_text)
+    files = WatchedFiles(read_text)
     session = session_of(str(file), parser_of("view").parse_args([str(file)]), files)
     server = start_server("127.0.0.1", 0, "test", TOKEN)
     try:

@@ -15,7 +15,7 @@ from tfcompose.cli.parser import parser_of
 from tfcompose.cli.reading import read_text
 from tfcompose.foundation.geometry import Pose
 from tfcompose.tools.view.panel import Panel
-from tfcompose.tools.view.reload import Files
+from tfcompose.tools.view.reload import WatchedFiles
 from tfcompose.tools.view.view_session import session_of
 from tfcompose.tools.view.windows import Windows
 
@@ -34,7 +34,7 @@ frames:
 @pytest.fixture
 def windows(tmp_path: Path, server: viser.ViserServer) -> Windows:
     (tmp_path / "r.yaml").write_text(TEXT, "utf-8")
-    files = Files(read_text)
+    files = WatchedFiles(read_text)
     arguments = parser_of("view").parse_args([str(tmp_path / "r.yaml")])
     session = session_of(str(tmp_path / "r.yaml"), arguments, files)
     return Windows(server, session, files, edit=True, joints=True)

@@ -58,7 +58,7 @@ def run(arguments: Namespace) -> int:
             fail(f"{place.name} has no log of {name}; {advice}")
     names = arguments.name or known
     follower = Follower(place.logs, names)
-    printer = _Printer(known, times=arguments.times)
+    printer = _LogPrinter(known, times=arguments.times)
     lines = read_logs(place.logs, names)
     printer.print(lines if arguments.lines is None else deque(lines, maxlen=arguments.lines))
     while arguments.follow:
@@ -90,7 +90,7 @@ def _place(robot: str | None, command: str) -> RuntimeDir:
     return chosen_run(robot, command, among=lambda: running or there)
 
 
-class _Printer:
+class _LogPrinter:
     def __init__(self, names: list[str], *, times: bool) -> None:
         from tfcompose.cli.console import COLOURS, prefix_of, prefix_width
 

@@ -4,12 +4,12 @@ Pure functions of a ``Robot``; boxes, cylinders, spheres and capsules need no li
 are hit where trimesh is installed.
 """
 
-from tfcompose.compiler.rays.bodies import Body, bodies_around, fixed_to, sphere_around
+from tfcompose.compiler.rays.bodies import PosedShape, bodies_around, fixed_to, sphere_around
 from tfcompose.compiler.rays.cast import Ray, View, cast, view_of
 from tfcompose.compiler.rays.directions import contains, different_streams, directions, is_plane
 
 __all__ = [
-    "Body",
+    "PosedShape",
     "Ray",
     "View",
     "bodies_around",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class PosedShape:
     """A shape of a link. ``pose`` is the shape's, in the frame from which it is seen."""
 
     link: str
@@ -70,7 +70,7 @@ def sphere_around(shape: Shape) -> tuple[Vector, float] | None:
 
 def bodies_around(
     robot: Robot, sensor: MountedSensor, poses: Mapping[str, Pose]
-) -> Iterator[Body]:
+) -> Iterator[PosedShape]:
     """Yield the shapes of the links at ``poses`` that are not the sensor's own.
 
     For collision, else those seen.
@@ -85,4 +85,4 @@ def bodies_around(
         link = robot.links.get(name)
         if link and name not in own:
             for shape in link.collisions or link.visuals:
-                yield Body(name, shape, pose @ shape.pose)
+                yield PosedShape(name, shape, pose @ shape.pose)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.rays.bodies import Body, bodies_around, fixed_to
+from tfcompose.compiler.rays.bodies import PosedShape, bodies_around, fixed_to
 from tfcompose.compiler.rays.directions import directions
 from tfcompose.compiler.rays.shapes import depth_in, distance
 from tfcompose.foundation.geometry import rotate
@@ -80,7 +80,9 @@ def view_of(
     return cast(sensor.name, optics, directions(optics), bodies)
 
 
-def cast(sensor: str, optics: Optics, into: Sequence[Vector], bodies: Sequence[Body]) -> View:
+def cast(
+    sensor: str, optics: Optics, into: Sequence[Vector], bodies: Sequence[PosedShape]
+) -> View:
     """Return the rays into these directions, unit vectors in the frame in which the bodies are."""
     found: list[tuple[float, str | None]] = [(math.inf, None)] * len(into)
     reach = min(optics.far or _FAR_M, _FAR_M)
@@ -107,7 +109,7 @@ def cast(sensor: str, optics: Optics, into: Sequence[Vector], bodies: Sequence[B
 Hits = list[tuple[int, float]]
 
 
-def _read_hits(body: Body, into: Sequence[Vector]) -> tuple[float | None, Hits]:
+def _read_hits(body: PosedShape, into: Sequence[Vector]) -> tuple[float | None, Hits]:
     """Return how deep the origin is in the body, and where rays hit it.
 
     The depth is None if its mesh cannot be read.
@@ -130,7 +132,7 @@ def _read_hits(body: Body, into: Sequence[Vector]) -> tuple[float | None, Hits]:
     return depth, [(index, one) for index, one in enumerate(far) if math.isfinite(one)]
 
 
-def _hits(body: Body, to_shape: Pose, into: Sequence[Vector]) -> Hits:
+def _hits(body: PosedShape, to_shape: Pose, into: Sequence[Vector]) -> Hits:
     """Return the rays that hit a primitive, and where."""
     (x, y, z), radius = body.pose.xyz, body.shape.radius
     miss = x * x + y * y + z * z - radius * radius

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.compiler.urdf.blocks import faults_of, read_block, unexpanded, unknown_joints
 from tfcompose.foundation.findings import Finding, RejectedError, Span
-from tfcompose.model.robot.hardware import Block, Component, Hardware, Interface
+from tfcompose.model.robot.hardware import Block, Hardware, HardwareComponent, Interface
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -88,11 +88,11 @@ def _hardware(name: str, declared: HardwareSpec, spec: RobotSpec) -> Hardware:
     )
 
 
-def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component:
+def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> HardwareComponent:
     command, state = (
         [Interface(i, params) for i, params in one.items()] for one in (spec.command, spec.state)
     )
-    return Component(
+    return HardwareComponent(
         kind, name, at, command=tuple(command), state=tuple(state), params=spec.params
     )
 

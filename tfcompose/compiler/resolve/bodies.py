@@ -71,7 +71,7 @@ class Bodies:
             inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))
         return visuals, collisions, inertial
 
-    def shape(self, shape: specs.Shape, at: Path) -> Shape:
+    def shape(self, shape: specs.ShapeSpec, at: Path) -> Shape:
         """Return the shape, which must have a form."""
         material = None
         if shape.material:
@@ -98,7 +98,7 @@ class Bodies:
             return Shape("mesh", shape.mesh.scale, pose, material, mesh)
         raise ValueError("a shape without a form")
 
-    def _shapes(self, shapes: tuple[specs.Shape, ...], at: Path) -> tuple[Shape, ...]:
+    def _shapes(self, shapes: tuple[specs.ShapeSpec, ...], at: Path) -> tuple[Shape, ...]:
         made = []
         for index, shape in enumerate(shapes):
             if any(getattr(shape, form) for form in FORMS):
@@ -106,7 +106,7 @@ class Bodies:
                 made.append(self.shape(shape, in_list if self.spec.spans.has(in_list) else at))
         return tuple(made)
 
-    def _material(self, given: specs.Material, at: Path) -> Material:
+    def _material(self, given: specs.MaterialSpec, at: Path) -> Material:
         """Return the colour with its name.
 
         One without is named after its parts, so that URDF keeps them apart.
@@ -124,7 +124,7 @@ class Bodies:
 
     def _inertial(
         self,
-        given: specs.Inertial,
+        given: specs.InertialSpec,
         visuals: tuple[Shape, ...],
         collisions: tuple[Shape, ...],
         at: Path,

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
 
     from tfcompose.compiler.resolve.draft import Draft
-    from tfcompose.spec.language.calibration import Entry
+    from tfcompose.spec.language.calibration import CalibrationEntry
     from tfcompose.spec.load import Path
 
     Reader = Callable[[str], str]
@@ -84,7 +84,7 @@ class _Files:
 class _Match:
     """An entry that fits an edge; ``inverted``: its parent is the edge's child."""
 
-    entry: Entry
+    entry: CalibrationEntry
     inverted: bool
 
     @property
@@ -95,7 +95,7 @@ class _Match:
 
 
 def _matches(
-    entries: Sequence[Entry], parents: Collection[str], children: Collection[str]
+    entries: Sequence[CalibrationEntry], parents: Collection[str], children: Collection[str]
 ) -> list[_Match]:
     """Return the entries of a child in a parent.
 

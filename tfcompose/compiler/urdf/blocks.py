@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from tfcompose.compiler.urdf.read import read_xml
 from tfcompose.foundation.findings import Finding, Span, did_you_mean, finding, nearest
 from tfcompose.foundation.text import listed
-from tfcompose.model.robot.hardware import Component, Hardware, Interface
+from tfcompose.model.robot.hardware import Hardware, HardwareComponent, Interface
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -262,13 +262,13 @@ def _hardware(element: Element, block: Block) -> Hardware:
     )
 
 
-def _component(element: Element) -> Component:
+def _component(element: Element) -> HardwareComponent:
     attributes = _only(element, "name", tags=("param", *_INTERFACES))
     command, state = (tuple(_interface(one) for one in element.all(tag)) for tag in _INTERFACES)
     for interfaces in (command, state):
         if len({one.name for one in interfaces}) != len(interfaces):
             raise _UnsupportedError
-    return Component(
+    return HardwareComponent(
         element.tag,
         attributes.get("name", ""),
         element.at,

@@ -19,7 +19,7 @@ from tfcompose.compiler.urdf.schema import (
     JOINT_TYPES,
     MOMENTS,
     SIZES,
-    Values,
+    AttributeReader,
     unknown_words,
     version_of,
 )
@@ -101,7 +101,7 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
         raise RejectedError(
             [finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")]
         )
-    values = Values()
+    values = AttributeReader()
     values.has_quaternions = version_of(root, values) >= (1, 1)
     bodies = _Bodies(values, lambda address, at: find(address, at, file), root)
     name = values.text(root, "name", '<robot name="rover">')
@@ -169,7 +169,7 @@ def _value_place(element: Element, name: str, _index: int) -> Span:
 
 
 def _by_name(
-    elements: list[Element], values: Values, severity: Severity = "error"
+    elements: list[Element], values: AttributeReader, severity: Severity = "error"
 ) -> dict[str, Element]:
     """Return the elements by their names; a second one of a name is a finding."""
     known: dict[str, Element] = {}
@@ -214,7 +214,7 @@ def _with_namespaces(element: Element, root: Element) -> str:
     return raw[:begin] + more + raw[begin:]
 
 
-def _edge(element: Element, values: Values) -> Edge | None:
+def _edge(element: Element, values: AttributeReader) -> Edge | None:
     """Return the edge that a joint is, or None where it has no parent or no child."""
     name, kind = element.attributes.get("name", ""), values.text(element, "type", 'type="fixed"')
     if kind and kind not in JOINT_TYPES:
@@ -246,7 +246,7 @@ def _edge(element: Element, values: Values) -> Edge | None:
     )
 
 
-def _joint(name: str, kind: Any, element: Element, values: Values) -> Joint:
+def _joint(name: str, kind: Any, element: Element, values: AttributeReader) -> Joint:
     x, y, z = values.numbers(element.first("axis"), "xyz", (1.0, 0.0, 0.0))
     length = norm((x, y, z))
     if not 0 < length < math.inf:
@@ -272,7 +272,7 @@ def _joint(name: str, kind: Any, element: Element, values: Values) -> Joint:
     )
 
 
-def _limit(name: str, element: Element | None, values: Values) -> Limit | None:
+def _limit(name: str, element: Element | None, values: AttributeReader) -> Limit | None:
     for key in ("effort", "velocity"):
         if element is not None and key not in element.attributes:
             values.refuse(
@@ -281,14 +281,18 @@ def _limit(name: str, element: Element | None, values: Values) -> Limit | None:
     return _numbers(Limit, element, values)
 
 
-def _safety(name: str, element: Element | None, values: Values) -> SafetyController | None:
+def _safety(
+    name: str, element: Element | None, values: AttributeReader
+) -> SafetyController | None:
     if element is not None and "k_velocity" not in element.attributes:
         message = f"the safety_controller of {name} has no k_velocity"
         values.refuse(message, element.at, 'URDF requires it: k_velocity="10"')
     return _numbers(SafetyController, element, values, k_velocity=0.0)
 
 
-def _numbers(cls: type[T], element: Element | None, values: Values, **defaults: float) -> T | None:
+def _numbers(
+    cls: type[T], element: Element | None, values: AttributeReader, **defaults: float
+) -> T | None:
     """Return the object whose fields are the element's attributes.
 
     Those that are missing have their defaults.
@@ -304,7 +308,7 @@ def _numbers(cls: type[T], element: Element | None, values: Values, **defaults: 
 class _Bodies:
     """Reads the links of a document; ``found`` holds what is wrong with their files."""
 
-    values: Values
+    values: AttributeReader
     find: Callable[[str, Span], tuple[Asset, Finding | None]]
     root: Element
     found: list[Finding] = field(default_factory=list)

@@ -110,7 +110,7 @@ def expand(
     """
     sandbox = sandbox or Sandbox()
     given = {name: str(value) for name, value in arguments.items()}
-    files = _Files(file, packages, sandbox.reach, use)
+    files = _XacroFiles(file, packages, sandbox.reach, use)
     trusted = sandbox.reach.everything
     wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
@@ -169,7 +169,7 @@ def _is_made(answer: Any) -> bool:
     return min((number for place in places for number in place), default=0) >= 0
 
 
-class _Files:
+class _XacroFiles:
     """Answers what the process asks: only files that it may read, and remembers which."""
 
     def __init__(self, file: str, packages: Packages, reach: Reach, use: Use | None) -> None:
@@ -309,7 +309,7 @@ class _Stop:
     at: tuple[str, int, int] | None
 
     @classmethod
-    def of(cls, answer: Mapping[str, Any], files: _Files) -> _Stop:
+    def of(cls, answer: Mapping[str, Any], files: _XacroFiles) -> _Stop:
         """Return what the process says, as far as it is about files that it has read."""
 
         def mark(value: Any) -> tuple[str, int, int] | None:
@@ -329,7 +329,7 @@ class _Stop:
         )
 
 
-def _refused(stop: _Stop, files: _Files, packages: Packages, use: Use | None) -> Finding:
+def _refused(stop: _Stop, files: _XacroFiles, packages: Packages, use: Use | None) -> Finding:
     """Return what xacro did not like, or something that it called, and where."""
     file = files.file
     begins = [(stop.at[0], stop.at[1])] if stop.at else []
@@ -393,7 +393,7 @@ def _mark(file: str, line: int, column: int) -> Span:
     return Span(file, line, column + 1, line, column + 2)
 
 
-def _ended(outcome: Outcome, noted: str, files: _Files) -> Finding:
+def _ended(outcome: Outcome, noted: str, files: _XacroFiles) -> Finding:
     """Return the finding that the process was ended, and what it was evaluating then."""
     code, file = outcome.code, files.file
     if outcome.timed_out:

@@ -12,7 +12,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.urdf.write import Writer, block_lines, quoted
+from tfcompose.compiler.urdf.write import UrdfWriter, block_lines, quoted
 from tfcompose.compiler.urdf.xacro import NAMESPACE
 from tfcompose.model.files import AS_IN_SOURCE
 
@@ -79,7 +79,7 @@ def macro(robot: Robot, target: Target = AS_IN_SOURCE) -> str:
 """
 
 
-class _MacroWriter(Writer):
+class _MacroWriter(UrdfWriter):
     """Writes what the macro makes links, joints and hardware of."""
 
     def __init__(self, robot: Robot, target: Target) -> None:

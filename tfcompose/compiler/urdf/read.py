@@ -203,7 +203,7 @@ def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
         RejectedError: if the text is not XML, declares entities, or is too large or too deep.
     """
     refuse_unreadable(text, file, MOST_CHARACTERS)
-    reader = _Reader(text, file)
+    reader = _UrdfReader(text, file)
     if with_text:
         reader.parser.CharacterDataHandler = reader.add_text
     return reader.read()
@@ -218,7 +218,7 @@ def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) 
         RejectedError: as ``read_xml``.
     """
     refuse_unreadable(expansion.text, file, MOST_CHARACTERS)
-    reader = _Reader(expansion.text, file)
+    reader = _UrdfReader(expansion.text, file)
     texts = [_Text(read(name), name) for name in expansion.files]
     nowhere = _Origin(_Text("", file), 0)
     reader.origins = []
@@ -228,7 +228,7 @@ def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) 
     return reader.read()
 
 
-class _Reader:
+class _UrdfReader:
     def __init__(self, text: str, file: str) -> None:
         self.source = _Text(text, file)
         self.stack: list[Element] = []

@@ -142,7 +142,7 @@ HUGE = 1e30
 
 
 @dataclass(slots=True)
-class Values:
+class AttributeReader:
     """Reads attributes; ``found`` collects faults, ``has_quaternions`` allows quat_xyzw.
 
     ``refused`` counts what is no value; what is a warning only leaves a value as it is.
@@ -257,7 +257,7 @@ class Values:
         return turned
 
 
-def version_of(root: Element, values: Values) -> tuple[int, ...]:
+def version_of(root: Element, values: AttributeReader) -> tuple[int, ...]:
     """Return the version of URDF that the document declares.
 
     A finding where parsers of ROS 2 Jazzy reject it.

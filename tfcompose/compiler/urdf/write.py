@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         Robot,
         Shape,
     )
-    from tfcompose.model.robot.hardware import Block, Component, Hardware, Interface
+    from tfcompose.model.robot.hardware import Block, Hardware, HardwareComponent, Interface
 
 _IDENTITY = Pose()
 #: The value of an attribute, in quotes. Names repeat, in one file and from file to file.
@@ -49,7 +49,7 @@ def urdf(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[str, str]:
     edges of other owners are floating joints, which that node leaves alone. ``target`` says how
     files are addressed.
     """
-    writer = Writer(target)
+    writer = UrdfWriter(target)
     head = ('<?xml version="1.0"?>', f"<robot name={quoted(robot.name)}>")
     tail = (*writer.hardware(robot), *block_lines(robot.blocks), "</robot>", "")
     full, stock = ("\n".join([*head, *lines, *tail]) for lines in writer.body(robot))
@@ -61,7 +61,7 @@ def block_lines(blocks: Iterable[Block]) -> list[str]:
     return [indent(dedent(block.text).strip("\n"), "  ") for block in blocks]
 
 
-class Writer:
+class UrdfWriter:
     """Writes links, joints and hardware as lines.
 
     How names and values are spelt is for subclasses to change.
@@ -239,7 +239,7 @@ class Writer:
             "  </ros2_control>",
         ]
 
-    def _component(self, component: Component) -> list[str]:
+    def _component(self, component: HardwareComponent) -> list[str]:
         inside = [
             *(
                 line

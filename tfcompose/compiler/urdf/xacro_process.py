@@ -59,7 +59,7 @@ class MissingError(LookupError):
     """A package is not found."""
 
 
-class OutsideError(Exception):
+class OutsideDocumentError(Exception):
     """A file lies outside of what the document may read."""
 
 
@@ -67,7 +67,7 @@ class UnsafeError(Exception):
     """An expression uses names that lead out of it."""
 
 
-class Files:
+class XacroFiles:
     """What xacro reads, by asking who started this process."""
 
     def __init__(self, channel: Channel) -> None:
@@ -116,7 +116,7 @@ class Files:
         self._channel.send({kind: value})
         reply: dict[str, Any] = self._channel.receive()
         if "outside" in reply:
-            raise OutsideError(posixpath.normpath(value))
+            raise OutsideDocumentError(posixpath.normpath(value))
         if "error" in reply:
             raise OSError(*reply["error"], value)
         return reply
@@ -164,10 +164,10 @@ class _Builder(expatbuilder.ExpatBuilderNS):
             node.setUserData(_PLACE, place, self._cloned)
 
 
-class Expansion:
+class XacroRun:
     """Runs xacro on a request; ``note`` keeps what is being evaluated."""
 
-    def __init__(self, files: Files, note: Callable[[str], None]) -> None:
+    def __init__(self, files: XacroFiles, note: Callable[[str], None]) -> None:
         self._reader = files
         self._note = note
         self._files: dict[str, int] = {}
@@ -240,7 +240,7 @@ class Expansion:
         except OSError as error:
             xacro.filestack.pop()
             raise xacro.XacroException(f"{error.strerror}: {error.filename}", exc=error) from error
-        except OutsideError:
+        except OutsideDocumentError:
             xacro.filestack.pop()
             raise
         number = self._files.setdefault(file, len(self._files))
@@ -300,7 +300,7 @@ class Expansion:
             kind, reason = "package", str(root.args[0])
         elif isinstance(root, substitution_args.ArgException):
             kind, reason = "argument", str(root)
-        elif isinstance(root, OutsideError):
+        elif isinstance(root, OutsideDocumentError):
             kind, reason = "outside", " ".join([f"{root} may not be read", *_suffixes(chain)])
         elif isinstance(root, UnsafeError):
             words = [f"an expression may not use {root}", *_suffixes(chain)]
@@ -447,7 +447,7 @@ def main(reads: int, writes: int, noted: int) -> None:
             data = text.encode("utf-8", "replace")[: len(kept) - 1] + b"\0"
             kept[: len(data)] = data
 
-        answer = Expansion(Files(channel), note).made(request)
+        answer = XacroRun(XacroFiles(channel), note).made(request)
         sys.stdout.flush()
         channel.send({"answer": answer})
     os._exit(0)  # nothing is left to be done, and a large document takes long to be freed

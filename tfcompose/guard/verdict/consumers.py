@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.tf.live.edges import EdgeState
-    from tfcompose.tf.live.state import MovingJoint, StampedData, Topic, TreeState
+    from tfcompose.tf.live.state import MovingJoint, StampedData, TopicState, TreeState
 
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -309,7 +309,7 @@ def _missing(state: TreeState) -> list[MovingJoint]:
     return [joint for joint in state.moving_joints if joint.child not in plain]
 
 
-def _joint_topics(state: TreeState) -> list[Topic]:
+def _joint_topics(state: TreeState) -> list[TopicState]:
     """Return the topics of joint states that are meant.
 
     Those named ``joint_states``, but for robots beside this one.
@@ -333,6 +333,6 @@ def _namespace(topic: str) -> str:
     return topic.rpartition("/")[0]
 
 
-def _transformers(state: TreeState, topic: Topic) -> list[str]:
+def _transformers(state: TreeState, topic: TopicState) -> list[str]:
     writers = {one.node for one in state.publishers if one.node}
     return [node for node in topic.readers if node in writers]

@@ -22,7 +22,7 @@ _MOST_NAMED = 16
 _NAMED_WITHIN_S = 3.0
 
 
-class Description:
+class DescriptionPublisher:
     """The plan's description, published for everybody who joins while this object lives.
 
     The plan says what moves and who publishes it, so another description on the topic changes

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from tfcompose.launcher.publishers.mimics import Followed
     from tfcompose.model.plan import Joint, PlanEdge
-    from tfcompose.tf.ros.joint_codec import Names
+    from tfcompose.tf.ros.joint_codec import JointNames
 
 _SECOND_NS = 1_000_000_000
 # Joint states come with one list of names from each driver; one that never repeats itself must not
@@ -54,8 +54,8 @@ class PublishOptions:
 class _Source:
     """Joint states with the same names, and the newest stamp in nanoseconds."""
 
-    names: Names
-    moving: Moving | None
+    names: JointNames
+    moving: JointGroup | None
     last_ns: int | None = None
     due_ns: int = 0
 
@@ -142,7 +142,9 @@ class JointMover:
         if len(self._sources) >= _MOST_SOURCES:
             self._sources.clear()
         followed = self._joints.followed(names.names)
-        moving = Moving(self._edges, self._all_joints, followed, names.names) if followed else None
+        moving = (
+            JointGroup(self._edges, self._all_joints, followed, names.names) if followed else None
+        )
         self._moved |= {one.joint for one in followed}
         self._sources.append(_Source(names, moving))
         return self._sources[-1]
@@ -186,7 +188,7 @@ class JointMover:
             self._say(line)
 
 
-class Moving:
+class JointGroup:
     """The edges that joint states with one list of names move, as one message.
 
     ``edges`` and ``joints`` are in the order of the indices in ``followed``; positions are in rad,

@@ -27,7 +27,7 @@ def main(argv: Sequence[str]) -> int:
 def joints(own: Own, stop: Stop) -> None:
     """Publish the moving edges of each ``joint_states`` message, and latch the description."""
     # ROS, once signals are handled.
-    from tfcompose.launcher.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415
+    from tfcompose.launcher.publishers.description import CHECK_EVERY_S, DescriptionPublisher  # noqa: PLC0415
 
     # ROS, once signals are handled.
     from tfcompose.launcher.publishers.joint_mover import JointMover, PublishOptions  # noqa: PLC0415
@@ -52,7 +52,7 @@ def joints(own: Own, stop: Stop) -> None:
         clock = StampClock(node, say, sim=own.plan.ros.clock == "sim")
         mover = JointMover(own.edges, say, clock.now_ns, options)
         publisher = TFPublisher(node, static=False)
-        description = Description(own, node)
+        description = DescriptionPublisher(own, node)
         states = JointStateSubscription(node)
         at_most = (
             f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""

@@ -24,7 +24,7 @@ def main(argv: Sequence[str]) -> int:
 def static(own: Own, stop: Stop) -> None:
     """Latch all fixed edges in one message, and the description without ``joints``."""
     # ROS, once signals are handled.
-    from tfcompose.launcher.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415
+    from tfcompose.launcher.publishers.description import CHECK_EVERY_S, DescriptionPublisher  # noqa: PLC0415
 
     # ROS, once signals are handled.
     from tfcompose.tf.ros.node import TFPublisher, open_node, wait  # noqa: PLC0415
@@ -54,7 +54,7 @@ def static(own: Own, stop: Stop) -> None:
         }:
             stop.wait(None)
             return
-        description = Description(own, node)
+        description = DescriptionPublisher(own, node)
         while not stop.requested:
             wait(
                 node,

@@ -23,7 +23,7 @@ class Interface:
 
 
 @dataclass(frozen=True, slots=True)
-class Component:
+class HardwareComponent:
     """A joint, sensor or gpio of a hardware component."""
 
     kind: str
@@ -43,7 +43,7 @@ class Hardware:
     type: str
     at: Span
     params: dict[str, str] = field(default_factory=dict)
-    components: tuple[Component, ...] = ()
+    components: tuple[HardwareComponent, ...] = ()
     rw_rate: int | None = None
     is_async: bool | None = None
 

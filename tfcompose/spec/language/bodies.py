@@ -47,7 +47,7 @@ class Mesh(Spec):
     )
 
 
-class Material(Spec):
+class MaterialSpec(Spec):
     """A colour or a texture, and its name.
 
     The name alone refers to the material that has it elsewhere.
@@ -65,7 +65,7 @@ class Material(Spec):
 SHAPES = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
 
 
-class Shape(Posed):
+class ShapeSpec(Posed):
     """One shape and where it is in its link: a box, cylinder, sphere, capsule or mesh."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
@@ -94,7 +94,7 @@ class Shape(Posed):
         [0, 0, 1],
         "blue",
     )
-    material: Annotated[Material, short("name", Material)] | None = key(
+    material: Annotated[MaterialSpec, short("name", MaterialSpec)] | None = key(
         None,
         "its colour or texture; or the name of one, or of a colour",
         {"rgba": [0.2, 0.4, 0.8, 1]},
@@ -124,7 +124,7 @@ class Tensor(Spec):
 MASSES = frozenset({"mass", "density"})
 
 
-class Inertial(Rotated):
+class InertialSpec(Rotated):
     """A link's mass and its distribution.
 
     The pose is that of the centre of mass, by default that of the shapes.
@@ -155,7 +155,9 @@ class Inertial(Rotated):
 
 
 #: A list of shapes, or one shape for a list of one.
-Shapes = Annotated[tuple[Shape, ...], BeforeValidator(listed, Shape | tuple[Shape, ...])]
+Shapes = Annotated[
+    tuple[ShapeSpec, ...], BeforeValidator(listed, ShapeSpec | tuple[ShapeSpec, ...])
+]
 Collision = Annotated[
     Annotated[Literal["same"], Tag("[same]")] | Annotated[Shapes, Tag("[shapes]")],
     Discriminator(lambda value: "[same]" if isinstance(value, str) else "[shapes]"),
@@ -171,7 +173,7 @@ class LinkSpec(MountKeys):
     collision: Collision = key(
         (), "the shape that collides, or a list of them; same: those of visual", "same"
     )
-    inertial: Inertial | None = key(None, "the mass and its distribution", {"mass": "10 kg"})
+    inertial: InertialSpec | None = key(None, "the mass and its distribution", {"mass": "10 kg"})
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:

@@ -130,7 +130,7 @@ def _unit(rotation: Rotation) -> Rotation:
     return rotation
 
 
-class Transform(FileEntry):
+class RecordedTransform(FileEntry):
     """geometry_msgs/Transform."""
 
     translation: Translation
@@ -143,18 +143,18 @@ class Transform(FileEntry):
         return Pose(xyz, normalised(self.rotation.quat_xyzw))
 
 
-class Header(FileEntry):
+class RecordedHeader(FileEntry):
     """std_msgs/Header, of which the frame matters."""
 
     frame_id: FrameName
 
 
-class TransformStamped(FileEntry):
+class RecordedTransformStamped(FileEntry):
     """geometry_msgs/TransformStamped."""
 
-    header: Header
+    header: RecordedHeader
     child_frame_id: FrameName
-    transform: Transform
+    transform: RecordedTransform
 
 
 class PoseXyzRpy(FileEntry):
@@ -198,7 +198,7 @@ class PoseXyzQuat(FileEntry):
 class HandeyeTransform(FileEntry):
     """HandeyeCalibration of easy_handeye2, without its parameters."""
 
-    transform: Transform
+    transform: RecordedTransform
 
 
 class HandeyeTransformation(FileEntry):
@@ -248,7 +248,7 @@ _DEFAULTS: dict[type[PoseXyzQuat | PoseXyzRpy], dict[str, str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CalibrationEntry:
     """The pose of ``child`` in ``parent``, by the names of the file.
 
     ``what`` is the key that holds it, if it matters.
@@ -277,7 +277,7 @@ class CalibrationFile:
 
     file: str
     format: str
-    entries: tuple[Entry, ...]
+    entries: tuple[CalibrationEntry, ...]
     found: tuple[Finding, ...]
 
 
@@ -323,7 +323,7 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
         return CalibrationFile(
             file, chosen, (), (_of_no_format(file, f"is not a {chosen} file", at, advice),)
         )
-    reader = _Reader(at)
+    reader = _FormatReader(at)
     for document in documents:
         reader.source = document
         reader.entries += _READERS[chosen](reader, document.data)
@@ -378,7 +378,7 @@ M = TypeVar("M", bound=FileEntry)
 
 
 @dataclass(slots=True)
-class _Reader:
+class _FormatReader:
     """Reads documents in each of the formats.
 
     An entry that is wrong is a finding, and the others are taken.
@@ -386,7 +386,7 @@ class _Reader:
 
     named_at: Span
     source: Source = field(init=False)
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[CalibrationEntry] = field(default_factory=list)
     found: list[Finding] = field(default_factory=list)
 
     def model(self, model: type[M], data: Any, path: Path) -> M | None:
@@ -416,12 +416,12 @@ class _Reader:
         parent: str | None = None,
         child: str | None = None,
         what: str = "",
-    ) -> Entry:
+    ) -> CalibrationEntry:
         """Return the entry at a path."""
         span = self.source.at_key(path) if self.source.has_key(path) else self.source.at(path)
-        return Entry(pose, span, parent, child, what)
+        return CalibrationEntry(pose, span, parent, child, what)
 
-    def autoware(self, data: Any) -> Iterator[Entry]:
+    def autoware(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield the entries of a sensor kit."""
         for parent, children in data.items() if isinstance(data, dict) else ():
             for child, values in children.items() if isinstance(children, dict) else ():
@@ -431,7 +431,7 @@ class _Reader:
                         (parent, child), one.pose, parent.lstrip("/"), child.lstrip("/")
                     )
 
-    def easy_handeye2(self, data: Any) -> Iterator[Entry]:
+    def easy_handeye2(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield the one entry of a hand-eye calibration."""
         at: Path = ("parameters",) if isinstance(data, dict) and "parameters" in data else ()
         names = self._handeye_names(data["parameters"] if at else data, at)
@@ -460,7 +460,7 @@ class _Reader:
         base = self.model(EyeOnBase, data, path)
         return (base.robot_base_frame, base.tracking_base_frame) if base else None
 
-    def transform_stamped(self, data: Any) -> Iterator[Entry]:
+    def transform_stamped(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield the entries of a message, or of a message with several."""
         is_list = isinstance(data, dict) and "transforms" in data
         messages = data["transforms"] if is_list else [data]
@@ -469,11 +469,11 @@ class _Reader:
             return
         for index, message in enumerate(messages):
             path: Path = ("transforms", index) if is_list else ()
-            one = self.model(TransformStamped, message, path)
+            one = self.model(RecordedTransformStamped, message, path)
             if one:
                 yield self.entry(path, one.transform.pose, one.header.frame_id, one.child_frame_id)
 
-    def kalibr(self, data: Any) -> Iterator[Entry]:
+    def kalibr(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield what each camera sees: the IMU, and the camera before it."""
         for camera, values in data.items() if isinstance(data, dict) else ():
             number = _CAMERA.match(camera)
@@ -490,13 +490,13 @@ class _Reader:
                 if rows:
                     yield self.entry((camera, key), _pose_of(rows), camera, child, key)
 
-    def matrix(self, data: Any) -> Iterator[Entry]:
+    def matrix(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield the one entry of a file that is a matrix."""
         one = self.model(MatrixFile, {"matrix": data}, ())
         if one:
             yield self.entry((), _pose_of(one.matrix))
 
-    def moveit(self, data: Any) -> Iterator[Entry]:
+    def moveit(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield an entry for each static_transform_publisher of a launch file."""
         for index, words in enumerate(data):
             if any(word.startswith("--") for word in words):
@@ -504,7 +504,7 @@ class _Reader:
             else:
                 yield from self._positions(index, words)
 
-    def _positions(self, index: int, words: list[str]) -> Iterator[Entry]:
+    def _positions(self, index: int, words: list[str]) -> Iterator[CalibrationEntry]:
         """Read x y z qx qy qz qw parent child."""
         if len(words) == 8:  # noqa: PLR2004 (x y z, three angles, two names)
             message = (
@@ -523,7 +523,7 @@ class _Reader:
             if pose:
                 yield self.entry((index,), pose, words[7].lstrip("/"), words[8].lstrip("/"))
 
-    def _flags(self, index: int, words: list[str]) -> Iterator[Entry]:
+    def _flags(self, index: int, words: list[str]) -> Iterator[CalibrationEntry]:
         """Read --x … --qw or --roll --pitch --yaw, --frame-id and --child-frame-id."""
         given = {flag[2:]: value for flag, value in zip(words[::2], words[1::2], strict=False)}
         missing = [name for name in ("frame-id", "child-frame-id") if name not in given]
@@ -571,10 +571,10 @@ def _pose_of(rows: _Rows) -> Pose:
 
 
 _READERS = {
-    "autoware": _Reader.autoware,
-    "easy_handeye2": _Reader.easy_handeye2,
-    "moveit": _Reader.moveit,
-    "kalibr": _Reader.kalibr,
-    "matrix": _Reader.matrix,
-    "transform_stamped": _Reader.transform_stamped,
+    "autoware": _FormatReader.autoware,
+    "easy_handeye2": _FormatReader.easy_handeye2,
+    "moveit": _FormatReader.moveit,
+    "kalibr": _FormatReader.kalibr,
+    "matrix": _FormatReader.matrix,
+    "transform_stamped": _FormatReader.transform_stamped,
 }

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Discriminator, Tag
 from tfcompose.foundation.findings import did_you_mean
 from tfcompose.foundation.units import Mass, Rate
 from tfcompose.model.plan import SensorPublisher
-from tfcompose.spec.language.bodies import Shape
+from tfcompose.spec.language.bodies import ShapeSpec
 from tfcompose.spec.language.node_preset import Fact
 from tfcompose.spec.language.optics import OpticsSpec
 from tfcompose.spec.language.pose import Rotated
@@ -92,7 +92,7 @@ class Body(Spec):
     """The sensor's body, on one of its frames."""
 
     frame: Text = key(..., "the frame that it is on", "{name}_link")
-    shape: Shape = key(..., "its shape", {"box": [0.025, 0.09, 0.025]})
+    shape: ShapeSpec = key(..., "its shape", {"box": [0.025, 0.09, 0.025]})
     mass: Mass | None = key(
         None, "where the vendor's is credible; the inertia is computed", "72 g"
     )

@@ -15,7 +15,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.foundation.findings import Span, finding
-from tfcompose.spec.load.nodes import Place, Reader
+from tfcompose.spec.load.nodes import DocumentReader, Place
 from tfcompose.spec.load.scalars import FLOAT, INT, implicit_tag, scalar
 from tfcompose.spec.load.source import Source, refuse_unreadable
 
@@ -75,7 +75,7 @@ def _documents(text: str, file: str) -> Iterator[Source]:
             found = ()
 
 
-class _CalibrationReader(Reader):
+class _CalibrationReader(DocumentReader):
     """Reads numbers with xacro's tags for angles too, in radians."""
 
     def tagged(self, tag: str, text: str, place: Place) -> Any:
@@ -90,7 +90,7 @@ class _CalibrationReader(Reader):
         return float(scalar(kind, text.strip()) or 0) * ANGLE_TAGS[tag]
 
 
-class _Lines:
+class _LineOffsets:
     """Where an offset in the text stands."""
 
     def __init__(self, text: str, file: str) -> None:
@@ -125,7 +125,7 @@ def _launch(text: str, file: str) -> Source:
 
     What stands in comments is left out, nothing is run.
     """
-    lines = _Lines(text, file)
+    lines = _LineOffsets(text, file)
     places: dict[str | int, Place] = {}
     data: Any = []
     found = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)

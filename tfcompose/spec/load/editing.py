@@ -29,7 +29,7 @@ def _offsets(text: str, span: Span) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, slots=True)
-class Keys:
+class MappingKeys:
     """The keys that stand in one mapping of a file's text, without those that ``<<`` brings."""
 
     text: str
@@ -125,7 +125,7 @@ def with_value(text: str, file: str, path: Path, values: Mapping[str, str | None
         depth < len(path) and (below := place.inside.get(path[depth])) is not None and below.keys
     ):
         place, depth = below, depth + 1
-    keys = Keys(text, place)
+    keys = MappingKeys(text, place)
     there = [key for key in shown if key in place.inside] if depth == len(path) else []
     edits = [Edit(place.inside[key].span, shown[key]) for key in there]
     rest = {key: value for key, value in shown.items() if key not in there}

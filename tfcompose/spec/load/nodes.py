@@ -120,7 +120,7 @@ class _Open:
         return self.is_root and key.startswith("x-")
 
 
-class Reader:
+class DocumentReader:
     """Reads the documents of one text.
 
     ``found`` is what was wrong, ``has_nulls`` whether a value is null.

@@ -78,7 +78,7 @@ def load_params(text: str, file: str) -> ParamsFile:
         raise RejectedError(
             [finding("TF002", "a parameter file is a mapping of nodes", Span(file), help=advice)]
         )
-    reader = _Reader(file)
+    reader = _ParamsReader(file)
     reader.nodes(root, "")
     return reader.result
 
@@ -104,7 +104,7 @@ def _refuse_deep(text: str, file: str) -> None:
             depth -= 1
 
 
-class _Reader:
+class _ParamsReader:
     def __init__(self, file: str) -> None:
         self.file = file
         self.result = ParamsFile()

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Allow, Finding, RejectedError, Span, finding
-from tfcompose.spec.load.nodes import MOST_VALUES, Path, Place, Reader
+from tfcompose.spec.load.nodes import MOST_VALUES, DocumentReader, Path, Place
 from tfcompose.spec.load.syntax import no_yaml
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def load(text: str, file: str) -> Source:
     refuse_unreadable(text, file)
     if (begin := text.lstrip("\ufeff \t\r\n")).startswith("<") and not begin.startswith("<<"):
         raise RejectedError([no_yaml(text, file)])
-    reader = Reader(file)
+    reader = DocumentReader(file)
     reader.read(text)
     data, place = reader.documents[0] if reader.documents else (None, Place(Span(file)))
     if not isinstance(data, dict):

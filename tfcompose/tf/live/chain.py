@@ -26,7 +26,7 @@ class Delay:
 
 
 @dataclass(frozen=True, slots=True)
-class Chain:
+class FrameChain:
     """The frames from A to B, and their edges.
 
     Of each the one that counts, the newest, and those of other publishers.
@@ -48,7 +48,7 @@ class Chain:
         return max(delays, key=lambda one: one.mean_s, default=None)
 
 
-def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> Chain | str:
+def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | str:
     """Return the chain between two frames, or why there is none.
 
     Of several publishers of a frame the one counts whose message is the newest, as in tf2; what
@@ -72,7 +72,9 @@ def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> Chain | str:
     up, down = above_a[: above_a.index(common)], above_b[: above_b.index(common)][::-1]
     some = [by_child[child] for child in (*up, *down)]
     newest = tuple(several[0] for several in some)
-    return Chain((*up, common, *down), newest, tuple(edge for several in some for edge in several))
+    return FrameChain(
+        (*up, common, *down), newest, tuple(edge for several in some for edge in several)
+    )
 
 
 def _above(by_child: dict[str, list[EdgeState]], frame: str) -> list[str]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from tfcompose.tf.ros.node import Received
-    from tfcompose.tf.ros.tf_codec import Layout
+    from tfcompose.tf.ros.tf_codec import MessageLayout
 
 Key = TypeVar("Key")
 #: So many layouts of publishers are remembered whose poses were read.
@@ -50,7 +50,7 @@ class MessageReader:
     def __init__(self, frames: frozenset[str] = frozenset()) -> None:
         self._frames = frames
         self.decoder = Decoder()
-        self._posed: set[tuple[bytes | None, Layout]] = set()
+        self._posed: set[tuple[bytes | None, MessageLayout]] = set()
 
     def read(self, received: Received, *, static: bool) -> Message:
         """Return the message, with frames named as tf2 takes them.
@@ -75,7 +75,7 @@ class MessageReader:
             exact=layout.exact,
         )
 
-    def _poses(self, received: Received, layout: Layout) -> tuple[Pose, ...]:
+    def _poses(self, received: Received, layout: MessageLayout) -> tuple[Pose, ...]:
         if len(self._posed) >= _MOST:
             self._posed.clear()
         if not any(child in self._frames for _, child in layout.plain_edges):
@@ -241,7 +241,7 @@ class Publishers:
 
 
 @dataclass(slots=True)
-class Sender:
+class MessageCounter:
     """One publisher: when it was first heard, and how fast it counts."""
 
     first_received: float
@@ -288,7 +288,7 @@ class SenderMemory:
     """What the next guard must know of a sender; ``nodes`` are those that it can be of."""
 
     nodes: tuple[str, ...]
-    sender: Sender
+    sender: MessageCounter
 
 
 class Senders(Publishers):
@@ -296,7 +296,7 @@ class Senders(Publishers):
 
     def __init__(self, *, says_who: bool = True) -> None:
         super().__init__(says_who=says_who)
-        self._heard: dict[bytes, Sender] = {}
+        self._heard: dict[bytes, MessageCounter] = {}
 
     def update(self, publishers: Sequence[Publisher]) -> None:
         """Take who is in the graph now."""
@@ -312,9 +312,9 @@ class Senders(Publishers):
             sender.heard(message)
         else:
             first = (message.source_ns, message.sequence)
-            self._heard[message.gid] = Sender(now, *first, *first)
+            self._heard[message.gid] = MessageCounter(now, *first, *first)
 
-    def sender(self, gid: bytes | None) -> Sender | None:
+    def sender(self, gid: bytes | None) -> MessageCounter | None:
         """Return what is known of that publisher's messages."""
         return None if gid is None else self._heard.get(gid)
 

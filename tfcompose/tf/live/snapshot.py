@@ -14,7 +14,7 @@ from xml.parsers import expat
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 from tfcompose.tf.live.listener import LAST_WAIT_S, TreeListener
-from tfcompose.tf.live.state import MovingJoint, RosProcess, StampedData, Topic, TreeState
+from tfcompose.tf.live.state import MovingJoint, RosProcess, StampedData, TopicState, TreeState
 from tfcompose.tf.ros.clock import wall_ns
 from tfcompose.tf.ros.environment import RMW
 from tfcompose.tf.ros.graph import ends, nodes, topics, volatile_readers
@@ -67,7 +67,7 @@ class SensorTopics:
         self.moving_joints: tuple[MovingJoint, ...] = ()
         self.joint_names: set[str] = set()
 
-    def subscribe(self, graph: Iterable[Topic], robots_inside: tuple[str, ...]) -> None:
+    def subscribe(self, graph: Iterable[TopicState], robots_inside: tuple[str, ...]) -> None:
         """Listen to topics that are new.
 
         Not to those of robots inside, which have TF topics of their own.
@@ -142,7 +142,7 @@ def _names(data: bytes) -> frozenset[str]:
 MOVING = frozenset({"revolute", "continuous", "prismatic"})
 
 
-class _Reader:
+class _JointReader:
     """Reads the joints of a URDF; a document that declares a type or entities is not read on."""
 
     def __init__(self) -> None:
@@ -190,7 +190,7 @@ class _Reader:
 
 def joints_of(description: str) -> tuple[MovingJoint, ...]:
     """Return the moving joints of a URDF; none where it is none."""
-    reader = _Reader()
+    reader = _JointReader()
     reader.read(description)
     return tuple(reader.joints)
 
@@ -215,8 +215,8 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
         RosError: if ROS cannot start a node, or take messages.
     """
     with open_node("tfcompose_doctor", "") as node:
-        views = [_View(node, pair) for pair in expected]
-        graph: dict[str, Topic] = {}
+        views = [_TopicPair(node, pair) for pair in expected]
+        graph: dict[str, TopicState] = {}
         due = begun = time.monotonic()  # a slow machine may take seconds until it listens
         while not stop.requested and (now := time.monotonic()) < begun + seconds:
             for view in views:
@@ -243,7 +243,7 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
 
 
 @dataclass(slots=True)
-class _View:
+class _TopicPair:
     """What is observed on one pair of topics, and below its namespace."""
 
     node: Node
@@ -304,7 +304,7 @@ class _View:
         )
 
 
-def topics_in(node: Node) -> dict[str, Topic]:
+def topics_in(node: Node) -> dict[str, TopicState]:
     """Return the topics that matter to TF with their endpoints, by name and type."""
     found = {}
     for name, types in topics(node):
@@ -319,11 +319,11 @@ def topics_in(node: Node) -> dict[str, Topic]:
                 dict.fromkeys(who for who, type_, sends in both if not sends and type_ == kind)
             )
             if senders or readers:
-                found[f"{name} {kind}"] = Topic(name, kind, senders, readers)
+                found[f"{name} {kind}"] = TopicState(name, kind, senders, readers)
     return found
 
 
-def _robots_inside(view: _View, graph: dict[str, Topic]) -> tuple[str, ...]:
+def _robots_inside(view: _TopicPair, graph: dict[str, TopicState]) -> tuple[str, ...]:
     """Return the namespaces, below this one, of robots that have TF topics of their own."""
     names = {
         topic.name.removesuffix("/tf")

@@ -22,7 +22,7 @@ NO_NODE = "a DDS program that is no ROS node"
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class TopicState:
     """A topic of the graph: its type, such as ``sensor_msgs/msg/LaserScan``, and nodes."""
 
     name: str
@@ -102,7 +102,7 @@ class TreeState:
     publishers: tuple[Publisher, ...] = ()
     volatile_readers: tuple[str, ...] = ()
     nodes: tuple[str, ...] = ()
-    graph: tuple[Topic, ...] = ()
+    graph: tuple[TopicState, ...] = ()
     clock_ns: int | None = None
     clock_moves: bool = False
     stamped: tuple[StampedData, ...] = ()
@@ -159,7 +159,7 @@ class TreeState:
         """Return the machine and process of an edge's publisher, empty if unknown."""
         return next((one.where for one in self.publishers if one.gid == edge.stream.gid), "")
 
-    def typed(self, type_: str) -> list[Topic]:
+    def typed(self, type_: str) -> list[TopicState]:
         """Return the topics of that type."""
         return [topic for topic in self.graph if topic.type == type_]
 

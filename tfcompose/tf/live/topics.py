@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from tfcompose.tf.ros.graph import Writer
-    from tfcompose.tf.ros.node import Reader, Received
+    from tfcompose.tf.ros.graph import GraphPublisher
+    from tfcompose.tf.ros.node import MessageSource, Received
 
     Topics = tuple[str, str]
     #: How processes are fenced off: by a partition, or by topics of each one's own; empty: they
@@ -96,7 +96,7 @@ class TFTopics:
             self._public.append(_Readable(reader, static))
 
     @property
-    def readers(self) -> list[Reader]:
+    def readers(self) -> list[MessageSource]:
         """What is waited for."""
         return [one.reader for one in (*self._fenced, *self._public)]
 
@@ -138,7 +138,7 @@ class TFTopics:
 class _Readable:
     """A reader, and what holds for all that comes there, as in ``TFData``."""
 
-    reader: Reader
+    reader: MessageSource
     static: bool
     fenced: bool = False
     process: str = ""
@@ -304,7 +304,7 @@ class TFGraph:
 
     def _on(
         self,
-        ask: Callable[[Node, str], list[Writer]],
+        ask: Callable[[Node, str], list[GraphPublisher]],
         topics: Topics,
         *,
         fenced: bool | None = None,
@@ -317,7 +317,7 @@ class TFGraph:
             if not self._is_own(one)
         ]
 
-    def _is_own(self, one: Writer) -> bool:
+    def _is_own(self, one: GraphPublisher) -> bool:
         """Whether a publisher is of this process.
 
         By its id, or on Zenoh, whose ids are hashes, by its node's name.
@@ -349,7 +349,7 @@ class TFGraph:
                 )
 
     def _publisher(
-        self, writer: Writer, topic: str, *, static: bool, fenced: bool | None
+        self, writer: GraphPublisher, topic: str, *, static: bool, fenced: bool | None
     ) -> Publisher:
         if writer.gid not in self._where:
             own = self._own_gid()
@@ -392,7 +392,7 @@ class TFGraph:
         return self._own
 
 
-def _node_of(writer: Writer) -> str | None:
+def _node_of(writer: GraphPublisher) -> str | None:
     """Return the node's full name, None while it is not known; a writer of plain DDS has none."""
     if writer.node.endswith(UNKNOWN_NODE):
         return None

@@ -50,7 +50,7 @@ _tokens: list[RobotGraph] = []
 
 
 @dataclass(frozen=True, slots=True)
-class Writer:
+class GraphPublisher:
     """One publisher of a topic.
 
     ``gid`` is its id, 16 bytes, and equals ``Received.gid`` of its messages. ``node`` is the full
@@ -67,7 +67,7 @@ class Writer:
     type: str
 
 
-def writers(node: Node, topic: str) -> list[Writer]:
+def writers(node: Node, topic: str) -> list[GraphPublisher]:
     """Return the topic's publishers that ``node`` has discovered, sorted by node and id.
 
     A relative ``topic`` is taken in the node's namespace, and the node's remappings are applied.
@@ -75,7 +75,8 @@ def writers(node: Node, topic: str) -> list[Writer]:
     if _tokens:
         found = _tokens[0].publishers(node.resolve_topic_name(topic))
         return [
-            Writer(one.gid, one.node, one.durability, one.reliability, one.type) for one in found
+            GraphPublisher(one.gid, one.node, one.durability, one.reliability, one.type)
+            for one in found
         ]
     return _sorted(node.get_publishers_info_by_topic(topic))
 
@@ -85,7 +86,7 @@ def publishing_nodes(node: Node, topic: str) -> list[str]:
     return sorted({writer.node for writer in writers(node, topic)})
 
 
-def writers_unmapped(node: Node, topic: str) -> list[Writer]:
+def writers_unmapped(node: Node, topic: str) -> list[GraphPublisher]:
     """Return the same for exactly this absolute topic, whatever the node's remappings are.
 
     It is asked for by its DDS name, ``rt/…``; an rmw without DDS shows nobody.
@@ -93,7 +94,7 @@ def writers_unmapped(node: Node, topic: str) -> list[Writer]:
     return _sorted(node.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True))
 
 
-def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[Writer]:
+def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[GraphPublisher]:
     return sorted(map(_writer, infos), key=lambda writer: (writer.node, writer.gid))
 
 
@@ -119,10 +120,10 @@ def own_gid(node: Node, topic: str) -> bytes:
     return next((bytes(info.endpoint_gid[:16]) for info in own), b"")
 
 
-def _writer(info: TopicEndpointInfo) -> Writer:
+def _writer(info: TopicEndpointInfo) -> GraphPublisher:
     latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     best_effort = info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
-    return Writer(
+    return GraphPublisher(
         gid=bytes(info.endpoint_gid[:16]),
         node=_full_name(info.node_namespace, info.node_name),
         durability="transient_local" if latched else "volatile",

@@ -31,7 +31,7 @@ _DOUBLE = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Names:
+class JointNames:
     """The part of a message that stays while its sender does.
 
     The frame and the names, as they were sent.
@@ -80,7 +80,7 @@ class Names:
         return np.frombuffer(data, f"{self.order}f8", count, at)
 
 
-def read_names(data: bytes) -> Names:
+def read_names(data: bytes) -> JointNames:
     """Return the names of a message. Work and memory are bounded by its length.
 
     Raises:
@@ -99,7 +99,7 @@ def read_names(data: bytes) -> Names:
         _, end = _count(data, at, order)
     except (struct.error, UnicodeDecodeError, IndexError):
         raise ValueError("its bytes are not one") from None
-    return Names(tuple(names), order, data[_FRAME_AT : end - 4])
+    return JointNames(tuple(names), order, data[_FRAME_AT : end - 4])
 
 
 def encode_names(names: Sequence[str]) -> bytearray:

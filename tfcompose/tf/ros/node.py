@@ -253,7 +253,7 @@ class TFPublisher:
         self.publisher.publish(data)
 
 
-class Reader(ABC):
+class MessageSource(ABC):
     """A source of a topic's messages as bytes, which ``wait`` waits for."""
 
     def __init__(self, topic: str, *, says_who: bool) -> None:
@@ -300,7 +300,7 @@ class Reader(ABC):
         )
 
 
-class Subscription(Reader):
+class Subscription(MessageSource):
     """A subscription of any type, taken as bytes and never called back."""
 
     def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
@@ -377,7 +377,7 @@ class _Options(ctypes.Structure):
     )
 
 
-class PublicTFReader(Reader):
+class PublicTFReader(MessageSource):
     """Reads a TF topic outside of all partitions, through a port of its own.
 
     Profiles of readers go by the topic's name in ROS. This reader is of the same DDS topic under
@@ -447,12 +447,12 @@ class PublicTFReader(Reader):
 class WaitSet:
     """Readers that are waited for again and again, until ``stop`` is requested."""
 
-    def __init__(self, node: Node, readers: Sequence[Reader], stop: Stop) -> None:
+    def __init__(self, node: Node, readers: Sequence[MessageSource], stop: Stop) -> None:
         self._readers, self._stop = tuple(readers), stop
         self._context = node.context.handle
         self._wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, self._context)
 
-    def wait(self, timeout_s: float | None) -> list[Reader]:
+    def wait(self, timeout_s: float | None) -> list[MessageSource]:
         """Wait until a reader has something, time is up (None: never) or ``stop``.
 
         Return the readers that have something. A new publisher or reader in the graph ends no
@@ -470,7 +470,9 @@ class WaitSet:
         return [reader for reader, kind, index in awaited if wait_set.is_ready(kind, index)]
 
 
-def wait(node: Node, readers: Sequence[Reader], timeout_s: float | None, stop: Stop) -> None:
+def wait(
+    node: Node, readers: Sequence[MessageSource], timeout_s: float | None, stop: Stop
+) -> None:
     """Wait once, as ``WaitSet.wait`` does."""
     WaitSet(node, readers, stop).wait(timeout_s)
 

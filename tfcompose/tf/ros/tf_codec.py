@@ -237,7 +237,7 @@ def transforms(data: bytes) -> Iterator[Transform]:
     Raises:
         ValueError: with one sentence, where it is not one.
     """
-    reader = _Reader(data)
+    reader = _MessageReader(data)
     for _ in range(reader.begin()):
         yield reader.transform()
 
@@ -253,7 +253,7 @@ def number_of_transforms(data: bytes) -> int:
     return min(claimed, len(data) // _SHORTEST)
 
 
-class Layout:
+class MessageLayout:
     """What does not change from one message of a publisher to the next.
 
     The names, and where the numbers are.
@@ -332,7 +332,7 @@ class Decoder:
     """
 
     def __init__(self) -> None:
-        self._layouts: dict[tuple[int, bytes, bytes], list[Layout]] = {}
+        self._layouts: dict[tuple[int, bytes, bytes], list[MessageLayout]] = {}
         self._bytes = 0
         #: How many messages were laid out like none before.
         self.read_anew = 0
@@ -354,7 +354,7 @@ class Decoder:
                 return rows
         return self._remembered(key, data).rows(data) or ()
 
-    def stamps(self, data: bytes) -> tuple[Layout, Sequence[int]]:
+    def stamps(self, data: bytes) -> tuple[MessageLayout, Sequence[int]]:
         """Return a TFMessage's layout with its names, and its stamps in nanoseconds.
 
         Raises:
@@ -368,8 +368,8 @@ class Decoder:
         layout = self._remembered(key, data)
         return layout, layout.stamps(data) or ()
 
-    def _remembered(self, key: tuple[int, bytes, bytes], data: bytes) -> Layout:
-        layout = Layout(data)
+    def _remembered(self, key: tuple[int, bytes, bytes], data: bytes) -> MessageLayout:
+        layout = MessageLayout(data)
         self.read_anew += 1
         if len(data) > _MOST_BYTES:
             return layout
@@ -390,7 +390,7 @@ def _unpacking(data: bytes, pose: str) -> tuple[list[tuple[str, str]], struct.St
 
     Header, count, and of each transform stamp, names and ``pose``.
     """
-    reader = _Reader(data)
+    reader = _MessageReader(data)
     edges: list[tuple[str, str]] = []
     layout = "".join(reader.skip(edges) + pose for _ in range(reader.begin()))
     return edges, struct.Struct(f"{reader.order}2s2xI{layout}")
@@ -428,7 +428,7 @@ def _raw_name(data: bytes, at: int, order: Order) -> bytes:
     return data[at : at + 4 + int.from_bytes(data[at : at + 4], order)]
 
 
-class _Reader:
+class _MessageReader:
     """Reads a message from its begin to its end.
 
     Raises:

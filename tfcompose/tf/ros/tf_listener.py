@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 _numbers = count(1)
 
 
-class Topic(NamedTuple):
+class TransformTopic(NamedTuple):
     """What is listened to: fixed edges or moving ones.
 
     ``qos`` is rclpy's profile, a depth, or None for tf2's.
@@ -66,7 +66,7 @@ class NodeListener:
     """
 
     def __init__(
-        self, node: Node, on_message: OnMessage, topics: Sequence[Topic], *, spin: bool
+        self, node: Node, on_message: OnMessage, topics: Sequence[TransformTopic], *, spin: bool
     ) -> None:
         self.node: Any = node
         self._on_message = on_message
@@ -103,7 +103,7 @@ class NodeListener:
             with suppress(_rclpy.InvalidHandle):
                 self.node.destroy_subscription(subscription)
 
-    def _subscribe(self, topic: Topic, group: ReentrantCallbackGroup) -> Any:
+    def _subscribe(self, topic: TransformTopic, group: ReentrantCallbackGroup) -> Any:
         def callback(data: bytes) -> None:
             self._on_message(data, topic.static)
 
@@ -127,7 +127,7 @@ class ThreadListener:
     """
 
     def __init__(
-        self, on_message: OnMessage, topics: Sequence[Topic], *, use_sim_time: bool
+        self, on_message: OnMessage, topics: Sequence[TransformTopic], *, use_sim_time: bool
     ) -> None:
         self._on_message = on_message
         self._stop = Stop()

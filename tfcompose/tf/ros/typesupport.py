@@ -158,17 +158,17 @@ class FieldType(ctypes.Structure):
     )
 
 
-class Field(ctypes.Structure):
+class FieldDescription(ctypes.Structure):
     """rosidl_runtime_c__type_description__Field."""
 
     _fields_ = (("name", String), ("type", FieldType), ("default_value", String))
 
 
 class Fields(ctypes.Structure):
-    """A sequence of ``Field``; every sequence in C messages has this size."""
+    """A sequence of ``FieldDescription``; every sequence in C messages has this size."""
 
     _fields_ = (
-        ("data", ctypes.POINTER(Field)),
+        ("data", ctypes.POINTER(FieldDescription)),
         ("size", ctypes.c_size_t),
         ("capacity", ctypes.c_size_t),
     )
@@ -190,7 +190,7 @@ class Types(ctypes.Structure):
     )
 
 
-class Description(ctypes.Structure):
+class TypeDescription(ctypes.Structure):
     """rosidl_runtime_c__type_description__TypeDescription."""
 
     _fields_ = (("type_description", Type), ("referenced", Types))
@@ -328,15 +328,17 @@ def _stamped() -> int:
     return stamped
 
 
-def _description(stamped: Description) -> tuple[Description, list[Any]]:
+def _description(stamped: TypeDescription) -> tuple[TypeDescription, list[Any]]:
     """Return TFMessage's description, and what it points to."""
     kind = FieldType(_UNBOUNDED_SEQUENCE_OF_MESSAGES, 0, 0, String.of(_STAMPED))
-    field = Field(String.of("transforms"), kind, String.of(""))
+    field = FieldDescription(String.of("transforms"), kind, String.of(""))
     known = [*stamped.referenced.data[: stamped.referenced.size], stamped.type_description]
     known.sort(key=lambda each: each.type_name.text)
     types = (Type * len(known))(*known)
     fields = Fields(ctypes.pointer(field), 1, 1)
-    made = Description(Type(String.of(TF_MESSAGE), fields), Types(types, len(known), len(known)))
+    made = TypeDescription(
+        Type(String.of(TF_MESSAGE), fields), Types(types, len(known), len(known))
+    )
     return made, [field, types]
 
 
@@ -408,7 +410,7 @@ def capsule_address(capsule: object) -> int:
     return int(get(capsule, None))
 
 
-def description_of(support: TypeSupport, address: int) -> Description:
+def description_of(support: TypeSupport, address: int) -> TypeDescription:
     """Return the description that a type support at that address gives.
 
     A ValueError if it gives none.
@@ -416,7 +418,7 @@ def description_of(support: TypeSupport, address: int) -> Description:
     where = Getter(support.get_description)(address)
     if not where:
         raise ValueError("a type without a description")
-    return Description.from_address(where)
+    return TypeDescription.from_address(where)
 
 
 def _type_json(described: Type) -> dict[str, Any]:
@@ -427,7 +429,7 @@ def _type_json(described: Type) -> dict[str, Any]:
     }
 
 
-def _field_json(field: Field) -> dict[str, Any]:
+def _field_json(field: FieldDescription) -> dict[str, Any]:
     kind = field.type
     return {
         "name": field.name.text,

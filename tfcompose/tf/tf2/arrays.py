@@ -23,7 +23,7 @@ from tfcompose.tf.tf2.poses import IDENTITY, PoseTuple, inverse, inverse_product
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tfcompose.tf.tf2.cache import Chain, TimeCache
+    from tfcompose.tf.tf2.cache import PoseChain, TimeCache
     from tfcompose.tf.tf2.pose_buffer import PoseBuffer
 
     Floats = NDArray[np.float64]
@@ -129,7 +129,7 @@ def _one_by_one(
     return found, known
 
 
-def _at_once(chain: Chain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
+def _at_once(chain: PoseChain, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
     """Return the poses at those times, and which times all edges know.
 
     The poses at others mean nothing.
@@ -159,7 +159,7 @@ def _keep_memory(count: int) -> None:
     np.empty((_ARRAYS, count))
 
 
-def _along(chain: Chain, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Any, ...]:
+def _along(chain: PoseChain, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Any, ...]:
     """Return the chain's poses at ascending times, and unset ``known`` where an edge has none."""
     pose: Any = None
     for cache, fixed, backwards in chain.links:

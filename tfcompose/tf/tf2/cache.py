@@ -243,7 +243,7 @@ class TimeCache:
 Link = tuple[None, PoseTuple, bool] | tuple["TimeCache", None, bool]
 
 
-class Chain:
+class PoseChain:
     """The pose of the source in the target as a product of links, from the source on.
 
     ``children`` are those of all edges. ``moving`` are the edges with samples over time. Where
@@ -300,7 +300,7 @@ def _links(passed: Sequence[tuple[TimeCache, bool]]) -> list[Link]:
     return links
 
 
-def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> Chain:
+def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> PoseChain:
     """Return the chain between two frames by each frame's newest parent.
 
     Raises:
@@ -310,10 +310,12 @@ def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> C
     up, down, tops = _meet(caches, target, source, lambda cache: cache.parent)
     if tops:
         raise ConnectivityException(exceptions.two_trees(caches, target, source, *tops))
-    return Chain(up, down)
+    return PoseChain(up, down)
 
 
-def chain_at(caches: Mapping[str, TimeCache], target: str, source: str, stamp_ns: int) -> Chain:
+def chain_at(
+    caches: Mapping[str, TimeCache], target: str, source: str, stamp_ns: int
+) -> PoseChain:
     """Return the chain between two frames by each frame's parent at that time.
 
     Where an edge has no pose at that time and might lead on, that is what is raised, as in tf2.
@@ -329,7 +331,7 @@ def chain_at(caches: Mapping[str, TimeCache], target: str, source: str, stamp_ns
             raise ExtrapolationException(outside(caches[top], stamp_ns))
     if tops:
         raise ConnectivityException(exceptions.two_trees(caches, target, source, *tops))
-    return Chain(up, down)
+    return PoseChain(up, down)
 
 
 def _meet(

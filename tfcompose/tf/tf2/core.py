@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.tf.tf2.exceptions import TransformException
 from tfcompose.tf.tf2.messages import nanoseconds, time_of, transform_stamped
 from tfcompose.tf.tf2.pose_buffer import CACHE_NS, FrameInfo, PoseBuffer, Row
-from tfcompose.tf.tf2.velocity import Moving, Velocity, mean_velocity
+from tfcompose.tf.tf2.velocity import Velocity, VelocityQuery, mean_velocity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -136,7 +136,7 @@ class BufferCore(PoseBuffer):
         Raises:
             ValueError: if the interval is not positive.
         """
-        moving = Moving(
+        moving = VelocityQuery(
             tracking_frame,
             observation_frame,
             reference_frame,
@@ -155,7 +155,7 @@ class BufferCore(PoseBuffer):
         But time 0 is the epoch here, as in tf2, and not the newest.
         """
         return self._velocity(
-            Moving(tracking_frame, observation_frame), nanoseconds(time), averaging_interval
+            VelocityQuery(tracking_frame, observation_frame), nanoseconds(time), averaging_interval
         )
 
     def lookupVelocityFullCore(  # noqa: N802, PLR0913, PLR0917 (tf2_py's name and arguments)
@@ -172,7 +172,7 @@ class BufferCore(PoseBuffer):
 
         But time 0 is the epoch here, as in tf2, and not the newest.
         """
-        moving = Moving(
+        moving = VelocityQuery(
             tracking_frame,
             observation_frame,
             reference_frame,
@@ -182,7 +182,7 @@ class BufferCore(PoseBuffer):
         return self._velocity(moving, nanoseconds(time), averaging_interval)
 
     def _velocity(
-        self, moving: Moving, time_ns: int, interval: Any, *, up_to_newest: bool = False
+        self, moving: VelocityQuery, time_ns: int, interval: Any, *, up_to_newest: bool = False
     ) -> Velocity:
         interval_ns = nanoseconds(interval)
         if interval_ns <= 0:

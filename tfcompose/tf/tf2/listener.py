@@ -66,12 +66,12 @@ class TransformListener:
         from tfcompose.tf.ros.tf_codec import Decoder  # noqa: PLC0415 (the same)
 
         # The same.
-        from tfcompose.tf.ros.tf_listener import NodeListener, ThreadListener, Topic  # noqa: PLC0415
+        from tfcompose.tf.ros.tf_listener import NodeListener, ThreadListener, TransformTopic  # noqa: PLC0415
 
         prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
-        topics = [Topic(prefix + tf_static_topic, static=True, qos=static_qos)]
+        topics = [TransformTopic(prefix + tf_static_topic, static=True, qos=static_qos)]
         if not static_only:
-            topics.append(Topic(prefix + tf_topic, static=False, qos=qos))
+            topics.append(TransformTopic(prefix + tf_topic, static=False, qos=qos))
         self.buffer = buffer
         self.node = node
         self._decoder = Decoder()

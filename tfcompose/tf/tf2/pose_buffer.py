@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.geometry import Pose
 from tfcompose.tf.tf2 import exceptions
 from tfcompose.tf.tf2.cache import (
-    Chain,
+    PoseChain,
     TimeCache,
     chain_at,
     newest_chain,
@@ -91,7 +91,7 @@ class PoseBuffer:
         self.on_insert: list[Callable[[], object]] = []
         self._caches: dict[str, TimeCache] = {}
         self._names: dict[str, None] = {}
-        self._chains: dict[tuple[str, str], Chain] = {}
+        self._chains: dict[tuple[str, str], PoseChain] = {}
         self._mixed: set[str] = set()
 
     @property
@@ -236,7 +236,7 @@ class PoseBuffer:
         """Return a context in which nothing is taken, by any thread."""
         return self._lock
 
-    def chain_for_all_times(self, target: str, source: str) -> Chain | None:
+    def chain_for_all_times(self, target: str, source: str) -> PoseChain | None:
         """Return the chain between two frames, None if a frame changed its parent.
 
         Raises:
@@ -245,7 +245,7 @@ class PoseBuffer:
         """
         if self._mixed:
             return None
-        return self._chain_between(target, source) if target != source else Chain((), ())
+        return self._chain_between(target, source) if target != source else PoseChain((), ())
 
     def _pose(self, target: str, source: str, stamp_ns: int) -> tuple[PoseTuple, int]:
         """Return what ``lookup`` does, as numbers."""
@@ -293,7 +293,7 @@ class PoseBuffer:
             )
         return pose
 
-    def _chain_between(self, target: str, source: str, stamp_ns: int = 0) -> Chain:
+    def _chain_between(self, target: str, source: str, stamp_ns: int = 0) -> PoseChain:
         """Return the chain between the two.
 
         The one by newest parents, if there is any, is remembered.

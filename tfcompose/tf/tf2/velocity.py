@@ -31,7 +31,7 @@ class Velocity(NamedTuple):
     angular: Three
 
 
-class Moving(NamedTuple):
+class VelocityQuery(NamedTuple):
     """A velocity's subject, observer, axes, and the point that moves along."""
 
     tracking_frame: str
@@ -42,7 +42,7 @@ class Moving(NamedTuple):
 
 
 def mean_velocity(
-    pose_of: PoseOf, moving: Moving, begin_ns: int, end_ns: int, at_ns: int
+    pose_of: PoseOf, moving: VelocityQuery, begin_ns: int, end_ns: int, at_ns: int
 ) -> Velocity:
     """Return the mean velocity from ``begin_ns`` to ``end_ns``.
 

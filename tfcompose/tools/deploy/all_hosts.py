@@ -38,7 +38,7 @@ def run_on_all_hosts(
     if arguments.robot is not None:
         fail("--all-hosts takes the robot of --file: leave out --robot", UNREADABLE)
     plan = _plan(arguments)
-    printer = _Printer(command, is_json=getattr(arguments, "format", "text") == "json")
+    printer = _HostPrinter(command, is_json=getattr(arguments, "format", "text") == "json")
     shares = {
         name: _of_host(plan, name, processes) for name in plan.hosts if name in hosts_of(plan)
     }
@@ -79,7 +79,7 @@ def _plan(arguments: Namespace) -> Plan:
     return plan
 
 
-async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _Printer) -> int:
+async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _HostPrinter) -> int:
     printer.width = max(map(len, commands))
     codes = await asyncio.gather(
         *(_run_on(plan, name, words, printer) for name, words in commands.items())
@@ -88,7 +88,7 @@ async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _Printer)
     return max(codes)
 
 
-async def _run_on(plan: Plan, name: str, words: list[str], printer: _Printer) -> int:
+async def _run_on(plan: Plan, name: str, words: list[str], printer: _HostPrinter) -> int:
     from tfcompose.tools.deploy.connection import Host, connected, settings_of
 
     host = plan.hosts[name]
@@ -102,7 +102,7 @@ async def _run_on(plan: Plan, name: str, words: list[str], printer: _Printer) ->
         await there.close()
 
 
-async def _printed(host: Host, words: list[str], printer: _Printer) -> int:
+async def _printed(host: Host, words: list[str], printer: _HostPrinter) -> int:
     process = await host.execute(words)
 
     async def errors() -> None:
@@ -135,7 +135,7 @@ def _robots(text: str) -> list[Any]:
     return found if isinstance(found, list) else []
 
 
-class _Printer:
+class _HostPrinter:
     """What hosts print, as lines; a robot's table is printed at the end, in one piece."""
 
     def __init__(self, command: str, *, is_json: bool) -> None:

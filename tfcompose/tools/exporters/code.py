@@ -13,11 +13,11 @@ _WIDTH = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class CodeBlock:
     """An expression in brackets: what is before its parts, the parts, and what is behind them."""
 
     begin: str
-    parts: tuple[Code | str, ...]
+    parts: tuple[CodeBlock | str, ...]
     end: str
 
     def __str__(self) -> str:
@@ -41,20 +41,20 @@ class Code:
         yield f"{indent}{self.end}{end}"
 
 
-def call(name: str, *parts: Code | str) -> Code:
+def call(name: str, *parts: CodeBlock | str) -> CodeBlock:
     """Return the call of a function."""
-    return Code(f"{name}(", parts, ")")
+    return CodeBlock(f"{name}(", parts, ")")
 
 
-def items(parts: Iterable[Code | str], keyword: str = "") -> Code:
+def items(parts: Iterable[CodeBlock | str], keyword: str = "") -> CodeBlock:
     """Return a list, or a keyword with one."""
-    return Code(f"{keyword}=[" if keyword else "[", tuple(parts), "]")
+    return CodeBlock(f"{keyword}=[" if keyword else "[", tuple(parts), "]")
 
 
-def keyword(name: str, value: Code | str) -> Code | str:
+def keyword(name: str, value: CodeBlock | str) -> CodeBlock | str:
     """Return a keyword with its value."""
     return (
         f"{name}={value}"
         if isinstance(value, str)
-        else Code(f"{name}={value.begin}", value.parts, value.end)
+        else CodeBlock(f"{name}={value.begin}", value.parts, value.end)
     )

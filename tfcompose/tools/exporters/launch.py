@@ -18,7 +18,7 @@ from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
 from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, PythonCode
-from tfcompose.tools.exporters.code import Code, call, items, keyword
+from tfcompose.tools.exporters.code import CodeBlock, call, items, keyword
 from tfcompose.tools.exporters.launch_values import (
     LaunchValues,
     condition_code,
@@ -173,7 +173,9 @@ def launch(
     return (File(f"{plain_name(plan.robot)}.launch.py", text),), export.gaps
 
 
-def _text(plan: Plan, machine: Machine, actions: list[Code], named: Mapping[str, Code]) -> str:
+def _text(
+    plan: Plan, machine: Machine, actions: list[CodeBlock], named: Mapping[str, CodeBlock]
+) -> str:
     """Return the launch file: what it imports, the functions that it calls, and its actions.
 
     ``named`` are actions that others refer to, by their variables' names.
@@ -198,9 +200,9 @@ def _text(plan: Plan, machine: Machine, actions: list[Code], named: Mapping[str,
     lines.append("from launch import LaunchDescription")
     for module, names in _IMPORTS.items():
         several = [name for name in names if name in used]
-        imported = Code(f"from {module} import ", tuple(several), "")
+        imported = CodeBlock(f"from {module} import ", tuple(several), "")
         if len(str(imported)) > 100:  # noqa: PLR2004 (as long as lines of code are)
-            imported = Code(f"from {module} import (", tuple(several), ")")
+            imported = CodeBlock(f"from {module} import (", tuple(several), ")")
         lines += imported.lines() if several else []
     for name in ("BUILD", "HERE"):
         if name in used:
@@ -235,8 +237,8 @@ def _in_double_quotes(text: str) -> str:
     return "".join(lines)
 
 
-def _assigned(name: str, action: Code) -> Iterator[str]:
-    return Code(f"{name} = {action.begin}", action.parts, action.end).lines("    ")
+def _assigned(name: str, action: CodeBlock) -> Iterator[str]:
+    return CodeBlock(f"{name} = {action.begin}", action.parts, action.end).lines("    ")
 
 
 class _Export:
@@ -250,7 +252,7 @@ class _Export:
         self.processes = (*plan.managed, *values.more)
         self.known = {process.name: process for process in (*plan.processes, *values.more)}
         self.gaps: list[str] = []
-        self.named: dict[str, Code] = {}
+        self.named: dict[str, CodeBlock] = {}
         self._variables: dict[str, str] = {}
         self._delays_s = _delays_s(self.known)
         #: The components that each container loads, by its name.
@@ -260,7 +262,7 @@ class _Export:
                 container = process.component.container
                 self._components.setdefault(container, []).append(process)
 
-    def actions(self, stock: list[PlanEdge] | None) -> Iterator[Code]:
+    def actions(self, stock: list[PlanEdge] | None) -> Iterator[CodeBlock]:
         """Yield the actions in order.
 
         ``stock`` are the edges of static_transform_publishers, None without such.
@@ -297,7 +299,7 @@ class _Export:
             action = self._started(process)
             if process.name in self._variables:
                 self.named[self._variables[process.name]] = action
-                action = Code(self._variables[process.name], (), "")
+                action = CodeBlock(self._variables[process.name], (), "")
             delay_s = self._delays_s[process.name]
             action = (
                 call("TimerAction", f"period={delay_s!r}", items([action], "actions"))
@@ -377,7 +379,7 @@ class _Export:
             if key.startswith(f"{place}.")
         }
 
-    def _condition(self, process: PlanProcess) -> list[Code | str]:
+    def _condition(self, process: PlanProcess) -> list[CodeBlock | str]:
         expression = self.values.conditions.get(process.name)
         return (
             [keyword("condition", condition_code(expression, self.values.kinds))]
@@ -395,7 +397,7 @@ class _Export:
                 f" {', '.join(loads)}"
             )
 
-    def _started(self, process: PlanProcess) -> Code:
+    def _started(self, process: PlanProcess) -> CodeBlock:
         if process.component:
             container = self.known[process.component.container].nodes[0]
             several = items([self._component(process)], "composable_node_descriptions")
@@ -427,19 +429,19 @@ class _Export:
         """Return Python that gives the process's parameter file."""
         return f"{'HERE' if process in self.values.more else 'BUILD'} / {process.params_file!r}"
 
-    def _filled(self, process: PlanProcess, words: Iterable[str]) -> list[Code | str]:
+    def _filled(self, process: PlanProcess, words: Iterable[str]) -> list[CodeBlock | str]:
         return [_filled(word, self._file(process)) for word in words]
 
-    def _environment(self, process: PlanProcess) -> dict[str, Code | str]:
+    def _environment(self, process: PlanProcess) -> dict[str, CodeBlock | str]:
         """Return the process's variables, as Python."""
-        env: dict[str, Code | str] = {
+        env: dict[str, CodeBlock | str] = {
             name: _filled(value, self._file(process)) for name, value in process.env.items()
         }
         return env | {
             name: text_code(text) for name, text in self._texts_of(process, "env").items()
         }
 
-    def _settings(self, process: PlanProcess, *, is_own: bool = True) -> Iterator[Code | str]:
+    def _settings(self, process: PlanProcess, *, is_own: bool = True) -> Iterator[CodeBlock | str]:
         """Yield the keywords of a process's keys; ``is_own``: launch starts its program itself."""
         for key in PROCESS_KEYS:
             dialect = key.launch
@@ -452,7 +454,7 @@ class _Export:
 
     def _python(
         self, process: PlanProcess, value: Any, texts: Mapping[str, Text] | None = None
-    ) -> Code | str:
+    ) -> CodeBlock | str:
         """Return a value as Python; a mapping also has the ``texts`` that the file makes."""
         if isinstance(value, PythonCode):
             return str(value)
@@ -467,7 +469,7 @@ class _Export:
             )
         return repr(value)
 
-    def _node(self, process: PlanProcess, more: list[Code | str]) -> Code:
+    def _node(self, process: PlanProcess, more: list[CodeBlock | str]) -> CodeBlock:
         package = _EXECUTABLE.fullmatch(process.argv[0])
         own, ros_words = _rest(process)
         words = self._filled(process, own)
@@ -476,7 +478,7 @@ class _Export:
         texts = {
             name: parameter_code(text) for name, text in self._texts_of(process, "params").items()
         }
-        given: list[Code | str] = (
+        given: list[CodeBlock | str] = (
             [f"str({self._file(process)})"] if "--params-file" in process.argv else []
         )
         given += [_mapping(texts)] if texts else []
@@ -485,7 +487,7 @@ class _Export:
             if process.nodes[0].endswith(f"/{process.name}")
             else [f"exec_name={process.name!r}"]
         )
-        parts: list[Code | str] = [
+        parts: list[CodeBlock | str] = [
             f"package={package[1]!r}" if package else "",
             f"executable={package[2]!r}" if package else "",
             *_named(process),
@@ -510,7 +512,7 @@ class _Export:
             return call("Node", *parts)
         return call("*managed", call("LifecycleNode", *parts), f"active={state == 'active'}")
 
-    def _component(self, process: PlanProcess) -> Code:
+    def _component(self, process: PlanProcess) -> CodeBlock:
         """Return the description of a component.
 
         Its condition is here if its container's action loads it.
@@ -538,13 +540,13 @@ class _Export:
             *condition,
         )
 
-    def _remapped(self, process: PlanProcess) -> Iterator[Code]:
-        remap: dict[str, Code | str] = {old: repr(new) for old, new in process.remap.items()}
+    def _remapped(self, process: PlanProcess) -> Iterator[CodeBlock]:
+        remap: dict[str, CodeBlock | str] = {old: repr(new) for old, new in process.remap.items()}
         remap |= {old: text_code(text) for old, text in self._texts_of(process, "remap").items()}
         if remap:
             yield items((f"({old!r}, {new})" for old, new in remap.items()), "remappings")
 
-    def _included(self, process: PlanProcess) -> Code:
+    def _included(self, process: PlanProcess) -> CodeBlock:
         """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
         plan, meant = self.plan, _LAUNCH.fullmatch(process.argv[0])
         package, file = (meant[1], meant[2]) if meant else ("", "")
@@ -592,15 +594,15 @@ def _variable_name(name: str, taken: Collection[str]) -> str:
     return plain
 
 
-def _mapping(values: Mapping[str, Code | str]) -> Code:
+def _mapping(values: Mapping[str, CodeBlock | str]) -> CodeBlock:
     """Return a dict."""
-    pairs: list[str | Code] = []
+    pairs: list[str | CodeBlock] = []
     for key, value in values.items():
         if isinstance(value, str):
             pairs.append(f"{key!r}: {value}")
         else:
-            pairs.append(Code(f"{key!r}: {value.begin}", value.parts, value.end))
-    return Code("{", tuple(pairs), "}")
+            pairs.append(CodeBlock(f"{key!r}: {value.begin}", value.parts, value.end))
+    return CodeBlock("{", tuple(pairs), "}")
 
 
 def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
@@ -686,7 +688,7 @@ def _package(process: PlanProcess) -> str:
     return meant[1] if meant else ""
 
 
-def _keywords(plan: Plan) -> Iterator[str | Code]:
+def _keywords(plan: Plan) -> Iterator[str | CodeBlock]:
     """Yield the keywords of stock nodes: namespace, and the publishers' remappings."""
     remap = {
         old: new for one in plan.started if one.kind in OWN_KINDS for old, new in one.remap.items()
@@ -697,7 +699,7 @@ def _keywords(plan: Plan) -> Iterator[str | Code]:
         yield items(map(repr, remap.items()), "remappings")
 
 
-def _state_publisher(plan: Plan) -> Code:
+def _state_publisher(plan: Plan) -> CodeBlock:
     """Return robot_state_publisher, limited to the joint states of the plan's publisher."""
     joints = next((process for process in plan.started if process.kind == "joints"), None)
     given = _params(joints.argv) if joints else {}
@@ -705,7 +707,7 @@ def _state_publisher(plan: Plan) -> Code:
     values["use_sim_time"] = plan.ros.clock == "sim"
     if plan.ros.frame_prefix:
         values["frame_prefix"] = plan.ros.frame_prefix
-    params = Code(
+    params = CodeBlock(
         "{",
         ('"robot_description": description()', *(f"{k!r}: {v!r}" for k, v in values.items())),
         "}",
@@ -724,10 +726,11 @@ def _params(argv: tuple[str, ...]) -> dict[str, Any]:
     return {name: json.loads(value) for name, _, value in (word.partition(":=") for word in words)}
 
 
-def _fixed(plan: Plan, edge: PlanEdge, name: str) -> Code:
+def _fixed(plan: Plan, edge: PlanEdge, name: str) -> CodeBlock:
     ends = (repr(name), repr(edge.parent), repr(edge.child))
     numbers = (
-        Code("(", tuple(map(number, part)), ")") for part in (edge.pose.xyz, edge.pose.quat_xyzw)
+        CodeBlock("(", tuple(map(number, part)), ")")
+        for part in (edge.pose.xyz, edge.pose.quat_xyzw)
     )
     return call("fixed", *ends, *numbers, *_keywords(plan))
 

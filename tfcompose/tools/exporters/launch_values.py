@@ -14,7 +14,7 @@ from functools import reduce
 from typing import TYPE_CHECKING
 
 from tfcompose.spec.language.expressions import constant, parse
-from tfcompose.tools.exporters.code import Code, call, items
+from tfcompose.tools.exporters.code import CodeBlock, call, items
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,14 +49,14 @@ class Argument:
     description: str = ""
     env: str | None = None
 
-    def code(self) -> Code:
+    def code(self) -> CodeBlock:
         """Return its declaration."""
-        default: Code | str = repr(self.default)
+        default: CodeBlock | str = repr(self.default)
         if self.env:
             default = call(
                 "EnvironmentVariable", repr(self.env), f"default_value={self.default!r}"
             )
-        parts: list[Code | str] = [repr(self.name), f"default_value={default}"]
+        parts: list[CodeBlock | str] = [repr(self.name), f"default_value={default}"]
         parts += [items(map(repr, self.choices), "choices")] if self.choices else []
         parts += [f"description={self.description!r}"] if self.description else []
         return call("DeclareLaunchArgument", *parts)
@@ -103,20 +103,20 @@ class LaunchValues:
         return {one.name: one.kind for one in self.arguments}
 
 
-def text_code(text: Text) -> Code | str:
+def text_code(text: Text) -> CodeBlock | str:
     """Return the substitutions that make a text."""
     several = [_part(part) for part in text]
     return several[0] if len(several) == 1 else items(several)
 
 
-def parameter_code(text: Text) -> Code | str:
+def parameter_code(text: Text) -> CodeBlock | str:
     """Return the substitutions as the value of a parameter, with its type."""
     only, *rest = text
     kind = _TYPES[only.kind] if not rest and isinstance(only, ArgumentValue) else "str"
     return call("ParameterValue", text_code(text), f"value_type={kind}")
 
 
-def _part(part: str | ArgumentValue | VariableValue) -> Code | str:
+def _part(part: str | ArgumentValue | VariableValue) -> CodeBlock | str:
     if isinstance(part, str):
         return repr(part)
     if isinstance(part, ArgumentValue):
@@ -125,7 +125,7 @@ def _part(part: str | ArgumentValue | VariableValue) -> Code | str:
     return call("EnvironmentVariable", repr(part.name), *default)
 
 
-def condition_code(expression: str, kinds: Mapping[str, str]) -> Code:
+def condition_code(expression: str, kinds: Mapping[str, str]) -> CodeBlock:
     """Return launch's condition for an expression of a robot file.
 
     Raises:
@@ -138,7 +138,7 @@ def condition_code(expression: str, kinds: Mapping[str, str]) -> Code:
     return call("IfCondition", _truth(parsed.body, parsed, kinds))
 
 
-def _truth(node: ast.expr, expression: Expression, kinds: Mapping[str, str]) -> Code | str:
+def _truth(node: ast.expr, expression: Expression, kinds: Mapping[str, str]) -> CodeBlock | str:
     match node:
         case ast.BoolOp(op=op, values=values):
             name = "AndSubstitution" if isinstance(op, ast.And) else "OrSubstitution"
@@ -157,7 +157,7 @@ def _truth(node: ast.expr, expression: Expression, kinds: Mapping[str, str]) -> 
     return call("LaunchConfiguration", repr(name))
 
 
-def _comparison(left: str, op: ast.cmpop, right: str, kinds: Mapping[str, str]) -> Code:
+def _comparison(left: str, op: ast.cmpop, right: str, kinds: Mapping[str, str]) -> CodeBlock:
     if not left.startswith("args."):
         left, right, op = right, left, _FLIPPED.get(type(op), type(op))()
     name, value = left.removeprefix("args."), constant(right)

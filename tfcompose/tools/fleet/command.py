@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.foundation.findings import Finding
-    from tfcompose.tools.fleet.observe import FleetObserver, RobotStatus
+    from tfcompose.tools.fleet.observe import FleetObserver, FleetRobotStatus
     from tfcompose.tools.fleet.spec import FleetSpec
 
 #: What can be done, with the names that it takes.
@@ -196,7 +196,7 @@ def _report(observer: FleetObserver, arguments: Namespace) -> int:
     return 0 if all(one.state == "live" for one in robots) else FAILED
 
 
-def _row(one: RobotStatus) -> tuple[str, ...]:
+def _row(one: FleetRobotStatus) -> tuple[str, ...]:
     live = sum(edge.age_s is not None and not edge.stale for edge in one.edges)
     age = "–" if one.age_s is None else f"{one.age_s:.1f} s"
     return one.robot, one.state, age, f"{live}/{len(one.edges)}", one.router

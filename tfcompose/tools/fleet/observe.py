@@ -61,7 +61,7 @@ class EdgeStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotStatus:
+class FleetRobotStatus:
     """What is known of a robot: whether it is reached, how long ago it sent, and what it shares.
 
     live: it sends; stale: nothing came that was sent within ``STALE_S``; silent: its router is
@@ -137,7 +137,7 @@ class FleetObserver:
         """Return whether every edge of every robot has come."""
         return all(edge.age_s is not None for robot in self.status() for edge in robot.edges)
 
-    def status(self) -> list[RobotStatus]:
+    def status(self) -> list[FleetRobotStatus]:
         """Return what is known now of each robot, in the order of the file."""
         now = time.monotonic()
         with self._lock:
@@ -181,7 +181,7 @@ class FleetObserver:
             chains.append(set(chain))
         return chains[0] ^ chains[1]
 
-    def _status(self, robot: str, now: float) -> RobotStatus:
+    def _status(self, robot: str, now: float) -> FleetRobotStatus:
         link, router = self._links[robot], self.fleet.robots[robot].router
         edges = []
         for shared in self.fleet.edges_of(robot):
@@ -191,7 +191,7 @@ class FleetObserver:
             stale = age_s is not None and age_s > max(STALE_S, _PERIODS / shared.rate)
             edges.append(EdgeStatus(parent, child, age_s, delay_s, stale))
         age_s = None if link.last is None else now - link.last
-        return RobotStatus(
+        return FleetRobotStatus(
             robot,
             router,
             self._state(router, age_s),
@@ -254,7 +254,7 @@ class FleetObserver:
         self.buffer.insert(rows, static=static, authority=robot)
 
 
-def problems_of(one: RobotStatus) -> Iterator[Finding]:
+def problems_of(one: FleetRobotStatus) -> Iterator[Finding]:
     """Yield what is wrong with a robot."""
     if one.state == "unreachable":
         ago = f", and nothing came for {one.age_s:.1f} s" if one.age_s is not None else ""

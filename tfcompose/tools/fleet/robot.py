@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.model.plan.topics import topics_below
-from tfcompose.tf.ros.tf_listener import ThreadListener, Topic
-from tfcompose.tools.fleet.share import BEAT_S, Sender
+from tfcompose.tf.ros.tf_listener import ThreadListener, TransformTopic
+from tfcompose.tools.fleet.share import BEAT_S, EdgeSender
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,9 +23,12 @@ def share(
     Raises:
         RosError: if ROS cannot start a node.
     """
-    sender = Sender(fleet, robot, say)
+    sender = EdgeSender(fleet, robot, say)
     moving, fixed = topics_below(namespace)
-    topics = [Topic(fixed, static=True, qos=None), Topic(moving, static=False, qos=None)]
+    topics = [
+        TransformTopic(fixed, static=True, qos=None),
+        TransformTopic(moving, static=False, qos=None),
+    ]
     listener = ThreadListener(sender.on_message, topics, use_sim_time=False)
     listener.start()
     try:

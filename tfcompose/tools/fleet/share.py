@@ -83,7 +83,7 @@ class SharedEdges:
                 )
 
 
-class Sender:
+class EdgeSender:
     """Sends a robot's edges to its router, whenever that is reached.
 
     What comes meanwhile is dropped.

@@ -19,7 +19,7 @@ from tfcompose.foundation.reach import OutsideError, Reach
 from tfcompose.foundation.yaml_text import Bare, parameter
 from tfcompose.tools.importers.static_transforms import (
     PROGRAM,
-    RefusedError,
+    ArgumentsRefusedError,
     reader_of,
     static_transform,
 )
@@ -272,7 +272,7 @@ def _add_transform(draft: Draft, program: Program) -> None:
     reader = program.reader or reader_of(program.argv)
     try:
         transform = static_transform(program.argv, reader)
-    except RefusedError as error:
+    except ArgumentsRefusedError as error:
         draft.todo(
             f"{PROGRAM} {' '.join(program.argv)}: {error}", at, advice="write the frame by hand"
         )

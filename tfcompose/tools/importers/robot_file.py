@@ -21,7 +21,7 @@ from tfcompose.tools.importers.omitted import (
     without_unused_blocks,
 )
 from tfcompose.tools.importers.sensors import recognised
-from tfcompose.tools.importers.values import Values, rotation
+from tfcompose.tools.importers.values import RobotFileValues, rotation
 from tfcompose.tools.importers.yaml_text import without_expressions
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class _Writer:
 
     def __init__(self, imported: Imported) -> None:
         self.imported, self.robot = imported, imported.robot
-        self.values = Values(imported.rpy, imported.robot, imported.target)
+        self.values = RobotFileValues(imported.rpy, imported.robot, imported.target)
         self.notes: dict[Entry, list[str]] = {
             at: list(notes) for at, notes in imported.notes.items()
         }

@@ -92,7 +92,7 @@ class _Fit:
 
 
 @dataclass(frozen=True, slots=True)
-class _Match:
+class _FrameMatch:
     """A frame of a preset in the robot.
 
     Its edge, and whether its position and rotation are its own.
@@ -379,12 +379,12 @@ class _Search:
         names: dict[str, str],
         *,
         has_own_names: bool,
-    ) -> dict[str, _Match]:
+    ) -> dict[str, _FrameMatch]:
         """Return where the robot has the preset's frames.
 
         ``names`` gets those that they have in the robot.
         """
-        found: dict[str, _Match] = {}
+        found: dict[str, _FrameMatch] = {}
         waiting = dict(wanted)
         while waiting:
             ready = [key for key, one in waiting.items() if one.parent not in waiting]
@@ -417,7 +417,7 @@ class _Search:
 
     def _match(
         self, preset: PresetSpec, edge: Edge, pattern: str, frame: PresetFrame
-    ) -> _Match | None:
+    ) -> _FrameMatch | None:
         """Return the edge as that of a preset's frame, or None where it is another one."""
         rotation = rotation_of(frame, pattern)
         unknown = frame.xyz is None and rotation is None
@@ -436,7 +436,7 @@ class _Search:
         tells = (frame.xyz is not None and any(frame.xyz)) or (
             preset.vendor == GENERIC and rotates
         )
-        return _Match(edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, tells)
+        return _FrameMatch(edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, tells)
 
 
 #: What names no model: a kind of sensor.

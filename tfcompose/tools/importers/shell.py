@@ -140,7 +140,7 @@ _LEADING = frozenset({"then", "else", "do", "{", "(", "!"})
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class ShellCommand:
     """A simple command: its words with quotes removed, its text as it stands, and its line.
 
     ``unknown`` holds what of the words only a shell can know. ``piped`` is whether it is one of
@@ -154,7 +154,7 @@ class Command:
     piped: bool = False
 
 
-class _Reader:
+class _ShellReader:
     """Splits a text into commands."""
 
     def __init__(self, text: str) -> None:
@@ -162,7 +162,7 @@ class _Reader:
         self.at, self.line = 0, 1
         self.variables: dict[str, str] = {}
 
-    def commands(self) -> Iterator[Command]:
+    def commands(self) -> Iterator[ShellCommand]:
         """Yield the commands in order; variables are as they are where each one stands."""
         piped = False
         while self.at < len(self.text):
@@ -175,7 +175,7 @@ class _Reader:
                 line += self.text[begin : self.at].count(
                     "\n", 0, _first_word(self.text[begin : self.at])
                 )
-                yield Command(
+                yield ShellCommand(
                     tuple(words), body.replace("\\ ", ""), line, tuple(unknown), is_piped
                 )
 
@@ -312,16 +312,16 @@ class _Script:
     environment: dict[str, str] = field(default_factory=dict)
 
     def add(self, text: str) -> None:
-        reader = _Reader(text)
+        reader = _ShellReader(text)
         for command in reader.commands():
             self._command(command, reader.variables)
 
-    def _todo(self, command: Command, why: str) -> None:
+    def _todo(self, command: ShellCommand, why: str) -> None:
         self.draft.todo(
             f"{command.text}: {why}" if why else command.text, Span(self.file, command.line)
         )
 
-    def _command(self, command: Command, variables: dict[str, str]) -> None:
+    def _command(self, command: ShellCommand, variables: dict[str, str]) -> None:
         words = _without_prompt(list(command.words))
         while words and words[0] in _LEADING:
             words.pop(0)
@@ -342,7 +342,7 @@ class _Script:
         elif words[0] not in _OF_SHELL:
             self._start(command, words, given)
 
-    def _start(self, command: Command, words: list[str], given: dict[str, str]) -> None:
+    def _start(self, command: ShellCommand, words: list[str], given: dict[str, str]) -> None:
         if tuple(words) in _STAYS_OPEN:
             return
         if command.unknown:
@@ -354,12 +354,12 @@ class _Script:
         else:
             self._todo(command, "it opens files, and starts nothing")
 
-    def _add(self, command: Command, words: list[str], given: dict[str, str]) -> None:
+    def _add(self, command: ShellCommand, words: list[str], given: dict[str, str]) -> None:
         """Add a command, or what it starts in a shell, in a terminal or behind a prefix."""
         if words[0] in _TERMINALS | _SHELLS and "-c" in words[:-1]:
             text = words[words.index("-c") + 1]
             if _OF_ROS.search(text):
-                for inner in _Reader(text).commands():
+                for inner in _ShellReader(text).commands():
                     self._command(replace(inner, line=command.line), {})
                 return
         begin = _program_at(words)
@@ -385,14 +385,16 @@ class _Script:
         )
         add_program(self.draft, program, self.target)
 
-    def _assign(self, given: dict[str, str], command: Command, variables: dict[str, str]) -> None:
+    def _assign(
+        self, given: dict[str, str], command: ShellCommand, variables: dict[str, str]
+    ) -> None:
         for name, value in given.items():
             if command.unknown:
                 variables.pop(name, None)
             else:
                 variables[name] = value
 
-    def _export(self, command: Command, words: list[str], variables: dict[str, str]) -> None:
+    def _export(self, command: ShellCommand, words: list[str], variables: dict[str, str]) -> None:
         for word in words:
             found = _ASSIGNMENT.fullmatch(word)
             if found and not command.unknown:

@@ -46,7 +46,7 @@ _UNIT = 0.01
 _LARGEST_RAD = 1e9
 
 
-class RefusedError(ValueError):
+class ArgumentsRefusedError(ValueError):
     """The program would refuse these arguments, or every listener what it then sends."""
 
 
@@ -86,14 +86,14 @@ def static_transform(words: Sequence[str], reader: Reader = "ros2") -> StaticTra
         if word in _FLAGS:
             value = next(rest, None)
             if value is None:
-                raise RefusedError(f"{word} has no value")
+                raise ArgumentsRefusedError(f"{word} has no value")
             given[word] = value
         else:
             loose.append(word)
     if not loose:
         return _by_name(given)
     if given:
-        raise RefusedError(
+        raise ArgumentsRefusedError(
             f"{loose[0]} stands beside {next(iter(given))}: arguments are by name or in order"
         )
     return _in_order(loose, reader)
@@ -133,7 +133,7 @@ def _by_name(given: dict[str, str]) -> StaticTransform:
     x, y, z = (numbers.get(key, 0.0) for key in _POSITION)
     has_angles = any(key in numbers for key in _ANGLES)
     if has_angles and any(key in numbers for key in _QUATERNION):
-        raise RefusedError("angles and a quaternion at once")
+        raise ArgumentsRefusedError("angles and a quaternion at once")
     parent, child = (given.get(key, "") for key in _FRAMES)
     if any(key in numbers for key in _QUATERNION):
         usual = (0.0, 0.0, 0.0, 1.0)
@@ -149,7 +149,7 @@ def _in_order(words: list[str], reader: Reader) -> StaticTransform:
     kept, period = list(words), ""
     if reader == "tf":
         if len(kept) not in {_WITH_ANGLES + 1, _WITH_QUATERNION + 1}:
-            raise RefusedError(
+            raise ArgumentsRefusedError(
                 f"{len(kept)} arguments; tf's takes 9 or 10, of which the last is the period in ms"
             )
         period = kept.pop()
@@ -160,12 +160,12 @@ def _in_order(words: list[str], reader: Reader) -> StaticTransform:
         and _is_number(kept[-1])
         and not _is_number(kept[-3])
     ):
-        raise RefusedError(
+        raise ArgumentsRefusedError(
             f"{kept[-1]} behind the frames is the period of ROS 1's tf, which this program does"
             " not take"
         )
     if len(kept) not in {_WITH_ANGLES, _WITH_QUATERNION}:
-        raise RefusedError(f"{len(kept)} arguments; it takes 8, or 9 with a quaternion")
+        raise ArgumentsRefusedError(f"{len(kept)} arguments; it takes 8, or 9 with a quaternion")
     parent, child = kept[-2:]
     numbers = [_number(word, f"argument {place}") for place, word in enumerate(kept[:-2], start=1)]
     x, y, z, *rest = numbers
@@ -188,9 +188,9 @@ def _of(
 ) -> StaticTransform:
     parent, child = parent.removeprefix("/"), child.removeprefix("/")  # tf2 strips it
     if not parent or not child:
-        raise RefusedError(f"the {'child' if parent else 'parent'} frame has no name")
+        raise ArgumentsRefusedError(f"the {'child' if parent else 'parent'} frame has no name")
     if parent == child:
-        raise RefusedError(f"{child} is its own parent")
+        raise ArgumentsRefusedError(f"{child} is its own parent")
     if len(rotation) == len(_ANGLES):
         roll, pitch, yaw = rotation
         return StaticTransform(
@@ -199,7 +199,7 @@ def _of(
     qx, qy, qz, qw = rotation
     length = norm(rotation)
     if abs(length**2 - 1) >= _UNIT:
-        raise RefusedError(
+        raise ArgumentsRefusedError(
             f"the quaternion has length {length:.6g}, and every listener drops the transform"
         )
     return StaticTransform(parent, child, Pose(xyz, (qx, qy, qz, qw)), None, order)
@@ -209,9 +209,9 @@ def _number(word: str, what: str) -> float:
     try:
         value = float(word)
     except ValueError:
-        raise RefusedError(f"{what} is {word!r}, not a number") from None
+        raise ArgumentsRefusedError(f"{what} is {word!r}, not a number") from None
     if not math.isfinite(value) or abs(value) > _LARGEST_RAD:
-        raise RefusedError(f"{what} is {word}")
+        raise ArgumentsRefusedError(f"{what} is {word}")
     return value
 
 

@@ -35,7 +35,7 @@ _SOFT_LIMITS = ("soft_lower_limit", "soft_upper_limit")
 _DIAGONAL = ("ixx", "iyy", "izz")
 
 
-class Values:
+class RobotFileValues:
     """The values of one robot; a colour that has been described once is later its name alone.
 
     ``rpy`` are the angles by which the source has rotations; ``target`` says how files are

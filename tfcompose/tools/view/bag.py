@@ -19,7 +19,7 @@ from tfcompose.guard.verdict.verify import state_of
 from tfcompose.tf.bags import observe_bag
 from tfcompose.tf.live.edges import TreeObserver
 from tfcompose.tf.tf2.exceptions import rejection_of
-from tfcompose.tools.view.judgement import Judge, Judgement
+from tfcompose.tools.view.judgement import Judgement, PlanJudge
 from tfcompose.tools.view.picture import ShownTree
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ class BagTree(ShownTree):
         self._recorded = recorded
         self._rows: dict[str, tuple[_Track, int, Row]] = {}
         states = {topics: state_of(one, topics) for topics, one in recorded.observers.items()}
-        self.judgement: Judgement = Judge(robot, plan, tolerance).judge(states, lambda _: True)
+        self.judgement: Judgement = PlanJudge(robot, plan, tolerance).judge(states, lambda _: True)
         self._rates = {
             self._pictures.name(edge.child): edge.timing.rate
             for state in states.values()

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.geometry import Offset
     from tfcompose.tools.view.bag_view import BagView
-    from tfcompose.tools.view.reload import Files
+    from tfcompose.tools.view.reload import WatchedFiles
     from tfcompose.tools.view.session import Session
 
 _HOST, _PORT = "127.0.0.1", 8080
@@ -93,7 +93,7 @@ def run(arguments: Namespace) -> int:
     Exit code 1 if the file gives no robot, 2 if it cannot be shown.
     """
     try:
-        from tfcompose.tools.view.reload import Files
+        from tfcompose.tools.view.reload import WatchedFiles
     except ImportError as error:
         fail(f"{error.name} is not installed: pip install 'tfcompose[view]'", UNREADABLE)
     from tfcompose.cli.reading import read_text
@@ -119,7 +119,7 @@ def run(arguments: Namespace) -> int:
     file = arguments.file or _running_plan(arguments) or DEFAULT_FILE
     if arguments.html:
         _check_output(Path(arguments.html), [file, *arguments.overlays])
-    files = Files(read_text)
+    files = WatchedFiles(read_text)
     session = session_of(file, arguments, files)
     if arguments.html:
         _write(session, Path(arguments.html))
@@ -127,7 +127,7 @@ def run(arguments: Namespace) -> int:
     return _serve(session, files, arguments)
 
 
-def _serve(session: Session, files: Files, arguments: Namespace) -> int:
+def _serve(session: Session, files: WatchedFiles, arguments: Namespace) -> int:
     """Show the session in the browser until Ctrl-C; return the exit code."""
     from tfcompose.tools.view.reload import ReloadedPanel, Watcher
     from tfcompose.tools.view.server import new_token, start_server, stop_server

@@ -26,7 +26,7 @@ from tfcompose.foundation.units import UnitError, quantity
 from tfcompose.model.robot import JOINTS, STATIC, is_optical
 from tfcompose.spec.language import DIRECTIONS
 from tfcompose.spec.load import load
-from tfcompose.spec.load.editing import Keys, text_at, with_value
+from tfcompose.spec.load.editing import MappingKeys, text_at, with_value
 from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.rotations import FORMS
 
@@ -53,7 +53,7 @@ class ImmovableError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class MountEdits:
     """Edits that move one mount; they belong together."""
 
     edits: tuple[Edit, ...]
@@ -145,7 +145,7 @@ def mount_of(robot: Robot, source: Source, child: str) -> Mount:
 
 def change_of(
     robot: Robot, source: Source, texts: Mapping[str, str], child: str, parent_from_child: Pose
-) -> Change | Elsewhere:
+) -> MountEdits | Elsewhere:
     """Return the edits that give the frame this pose, or the value that forbids them.
 
     ``source`` is what the robot was made from, overlays merged over it; ``texts`` are the files
@@ -157,7 +157,9 @@ def change_of(
     mount = mount_of(robot, source, child)
     tolerance = ROUNDING / max(1.0, norm(mount.child_from_place.xyz))
     computed = {one.path: one.numbers for one in robot.source_numbers if not one.in_part}
-    return _Change(mount, source, texts, tolerance, computed).of(mount.given(parent_from_child))
+    return _MountEditor(mount, source, texts, tolerance, computed).of(
+        mount.given(parent_from_child)
+    )
 
 
 class _ElsewhereError(Exception):
@@ -170,7 +172,7 @@ class _ElsewhereError(Exception):
 
 
 @dataclass(slots=True)
-class _Change:
+class _MountEditor:
     mount: Mount
     source: Source
     texts: Mapping[str, str]
@@ -178,21 +180,21 @@ class _Change:
     computed: Mapping[Path, tuple[float, ...]]
     _raw: dict[str, Place] = field(default_factory=dict)
 
-    def of(self, new: Pose) -> Change | Elsewhere:
+    def of(self, new: Pose) -> MountEdits | Elsewhere:
         """Return how the given pose becomes the new one."""
         mount = self.mount
         old = mount.given(mount.edge.pose)
         moves = any(abs(a - b) > self.tolerance for a, b in zip(new.xyz, old.xyz, strict=True))
         rotates = angle_between(new.quat_xyzw, old.quat_xyzw) > self.tolerance
         if not moves and not rotates:
-            return Change(())
+            return MountEdits(())
         try:
             self._refuse_other_files()
             edits = self._moved(old, new) if moves else []
             edits += self._rotated(old.quat_xyzw, new.quat_xyzw) if rotates else []
         except _ElsewhereError as error:
             return self._elsewhere(error, new, moves=moves, rotates=rotates)
-        return Change(tuple(_joined(edits)))
+        return MountEdits(tuple(_joined(edits)))
 
     def _elsewhere(
         self, error: _ElsewhereError, new: Pose, *, moves: bool, rotates: bool
@@ -261,7 +263,7 @@ class _Change:
             return list(self._renumbered(key, before, after))
         except _SharedError:
             entry = self._place_in_text(self.mount.entry)
-            if complete is None or key in Keys(self.texts[entry.span.file], entry).own:
+            if complete is None or key in MappingKeys(self.texts[entry.span.file], entry).own:
                 raise
             return [self._inserted({key: complete}, ("parent", "xyz"))]
 
@@ -323,7 +325,7 @@ class _Change:
         if missing:
             self._own((key,))
             place = self._place_in_text((*self.mount.entry, key))
-            yield Keys(self.texts[place.span.file], place).insertion(missing)
+            yield MappingKeys(self.texts[place.span.file], place).insertion(missing)
 
     def _number(self, path: Path, value: float) -> Edit:
         span = self._own(path)
@@ -371,7 +373,7 @@ class _Change:
         """Return the edit that writes keys into the entry."""
         self._own(())
         place = self._place_in_text(self.mount.entry)
-        return Keys(self.texts[place.span.file], place).insertion(values, after)
+        return MappingKeys(self.texts[place.span.file], place).insertion(values, after)
 
     def _xyz(self, pose: Pose) -> str:
         return _list(self._short(value, "") for value in pose.xyz)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class Forest:
+class FrameForest:
     """The trees that frames form by their parents.
 
     Where they form a loop, one of its frames counts as a root.

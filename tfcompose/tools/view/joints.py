@@ -23,7 +23,7 @@ _ASK_EVERY_S = 0.25
 _SEND_EVERY_S = 0.05
 
 
-class Publisher(Protocol):
+class PositionPublisher(Protocol):
     """Publishes positions (rad or m) in the order of the names that it was made with."""
 
     def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
@@ -66,14 +66,14 @@ class JointSender:
 
     topic: str
     names: Mapping[str, str]
-    make: Callable[[], Publisher]
+    make: Callable[[], PositionPublisher]
     others: Callable[[], Sequence[str]]
     state: Literal["waiting", "sending", "refused", "stopped"] = "waiting"
     others_found: tuple[str, ...] = ()
     _begun: float | None = None
     _ask_at: float = 0.0
     _send_at: float = 0.0
-    _publisher: Publisher | None = field(default=None, repr=False)
+    _publisher: PositionPublisher | None = field(default=None, repr=False)
 
     @property
     def text(self) -> str:

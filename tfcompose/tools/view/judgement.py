@@ -61,7 +61,7 @@ class Judgement:
         return off + [f"{one.code} {one.message}" for one in self.of_frame.get(frame, ())]
 
 
-class Judge:
+class PlanJudge:
     """Judges a robot by its plan; poses may be off by the tolerance.
 
     Frames have the names of the robot's file.

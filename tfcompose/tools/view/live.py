@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.text import duration
 from tfcompose.guard.verdict.verify import state_of
 from tfcompose.tf.live.state import who
-from tfcompose.tools.view.judgement import Judge, Judgement
+from tfcompose.tools.view.judgement import Judgement, PlanJudge
 from tfcompose.tools.view.picture import ShownTree
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class LiveTree(ShownTree):
         super().__init__(robot)
         self.judgement = Judgement()
         self._observers = observers
-        self._judge = Judge(robot, plan, tolerance)
+        self._judge = PlanJudge(robot, plan, tolerance)
         self._states: dict[str, list[EdgeState]] = {}
 
     def _newest(self) -> dict[str, Row]:

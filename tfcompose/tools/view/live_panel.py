@@ -44,7 +44,7 @@ class LivePanel:
         self._panel = panel
         self._scene = server.scene
         self._ghosts = Ghosts(server.scene, tree.robot)
-        self._wrong = _Lines(server.scene, "/live/wrong", _RED)
+        self._wrong = _ColouredLines(server.scene, "/live/wrong", _RED)
         self._further: dict[str, Any] = {}
         fixed = panel.choices.fixed or tree.robot.base  # what drives off stays in the picture
         tree.fixed = fixed if fixed in tree.robot.frames else tree.robot.roots()[0]
@@ -133,7 +133,7 @@ class BagPanel:
             self._panel.show_text()
 
 
-class _Lines:
+class _ColouredLines:
     """Lines of one colour, as many as there are just now."""
 
     def __init__(self, scene: viser.SceneApi, name: str, colour: tuple[int, int, int]) -> None:

@@ -11,7 +11,7 @@ from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject, warn
 from tfcompose.foundation.findings import finding
 from tfcompose.foundation.signals import Stop
-from tfcompose.launcher.control import RefusedError, ask
+from tfcompose.launcher.control import RequestRefusedError, ask
 from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of
 from tfcompose.model.messages import RobotStatus, StatusRequest
@@ -182,7 +182,7 @@ def _status(name: str) -> RobotStatus | None:
             place for place, _ in running() if place.domain == domain and is_meant(place, name)
         ]
         return ask(places[0], StatusRequest(), RobotStatus) if places else None
-    except (RuntimeDirError, RefusedError, OSError):
+    except (RuntimeDirError, RequestRefusedError, OSError):
         return None
 
 

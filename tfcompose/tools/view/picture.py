@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tfcompose.foundation.geometry import Pose
-from tfcompose.tools.view.forest import Forest, pose_of, poses_of, row_of
+from tfcompose.tools.view.forest import FrameForest, pose_of, poses_of, row_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -88,7 +88,7 @@ class Pictures:
         """Take the parents of frames, and begin with the poses that the robot has."""
         self._parents = parents
         frames = dict.fromkeys([*self.robot.frames, *parents, *parents.values()])
-        self._forest = Forest(tuple(frames), parents)
+        self._forest = FrameForest(tuple(frames), parents)
         poses = {child: edge.pose for child, edge in self.edges.items()}
         rows = [row_of(poses.get(frame, Pose())) for frame in frames]
         self._local = np.array(rows, np.float64).reshape(-1, 7)

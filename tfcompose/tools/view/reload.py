@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _TOGETHER_MS = 100
 
 
-class Files:
+class WatchedFiles:
     """Reads files, and knows which it has read, and what was in them.
 
     Of meshes, when they were changed.
@@ -88,7 +88,7 @@ def _changed_ns(file: str) -> int:
 class Watcher:
     """Sets ``changed`` when watched files change, in its own thread, within ``with``."""
 
-    def __init__(self, files: Files) -> None:
+    def __init__(self, files: WatchedFiles) -> None:
         self.changed = threading.Event()
         self._files = files
         self._over = threading.Event()
@@ -143,7 +143,7 @@ class ReloadedPanel:
         self,
         server: viser.ViserServer | viser.ClientHandle,
         session: Session,
-        files: Files,
+        files: WatchedFiles,
         **options: Any,
     ) -> None:
         self.session = session

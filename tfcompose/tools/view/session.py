@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.compiler.compile import Compiled
 from tfcompose.foundation.findings import RejectedError, edited
-from tfcompose.tools.view.edit import Change, Elsewhere, change_of, mount_of
+from tfcompose.tools.view.edit import Elsewhere, MountEdits, change_of, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -185,7 +185,7 @@ class Session:
             step.update({child: pose for child, pose in before.items() if child not in step})
 
 
-def _with(texts: Mapping[str, str], change: Change) -> dict[str, str]:
+def _with(texts: Mapping[str, str], change: MountEdits) -> dict[str, str]:
     files = {edit.span.file for edit in change.edits}
     new = {
         file: edited(texts[file], [edit for edit in change.edits if edit.span.file == file])

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.model.plan import Plan
-    from tfcompose.tools.view.reload import Files
+    from tfcompose.tools.view.reload import WatchedFiles
 
 
-def session_of(file: str, arguments: Namespace, files: Files) -> Session:
+def session_of(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
     """Return the robot of a file, built plan or folder, with overlays, read by ``files``.
 
     Raises:
@@ -45,7 +45,7 @@ def session_of(file: str, arguments: Namespace, files: Files) -> Session:
     return session
 
 
-def _robot_session(file: str, arguments: Namespace, files: Files) -> Session:
+def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
     texts = {one: files(one) for one in (file, *arguments.overlays)}
     presets, packages = library(files), replace(disk_of(file, arguments), read=files)
 
@@ -72,7 +72,7 @@ def _robot_session(file: str, arguments: Namespace, files: Files) -> Session:
     return Session(texts, compiled, write)
 
 
-def _plan_session(file: str, arguments: Namespace, files: Files) -> Session:
+def _plan_session(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
     refuse_variant(arguments)
     if arguments.edit:
         fail("a built plan cannot be edited: give the robot's file", UNREADABLE)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.compile import Compiled
     from tfcompose.foundation.findings import Finding
     from tfcompose.tools.view.choices import Choices
-    from tfcompose.tools.view.reload import Files
+    from tfcompose.tools.view.reload import WatchedFiles
     from tfcompose.tools.view.session import Session
 
 #: What windows left that were closed is kept of so many.
@@ -51,7 +51,7 @@ class Windows:
         self,
         server: viser.ViserServer,
         session: Session,
-        files: Files,
+        files: WatchedFiles,
         *,
         edit: bool,
         joints: bool,

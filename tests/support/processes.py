@@ -159,11 +159,12 @@ def default_signal_actions() -> Iterator[None]:
 
 def children() -> set[int]:
     """Return the process ids of this process's children that have not ended."""
-    pids = {
-        int(pid)
-        for task in Path("/proc/self/task").iterdir()
-        for pid in (task / "children").read_text("ascii").split()
-    }
+    pids: set[int] = set()
+    for task in Path("/proc/self/task").iterdir():  # one may end meanwhile
+        with contextlib.suppress(
+            FileNotFoundError, ProcessLookupError
+        ):  # a thread that has just ended
+            pids |= set(map(int, (task / "children").read_text("ascii").split()))
     return {pid for pid in pids if command_line(pid)}
 
 

@@ -140,15 +140,26 @@ NO_CHOICES = (
 )
 
 
-def test_an_expression_chooses_between_two_values() -> None:
-    for text, expected in CHOICES.items():
-        found = evaluate(text, lambda _name: "right")
-        assert isinstance(found, Quantity), text
-        assert found.value == expected, text
+@pytest.mark.parametrize("text", CHOICES)
+def test_an_expression_chooses_between_two_values(text: str) -> None:
+    found = evaluate(text, lambda _name: "right")
+    assert isinstance(found, Quantity)
+    assert found.value == CHOICES[text]
+
+
+def test_an_expression_chooses_between_two_texts() -> None:
     assert evaluate("'a' if side == 'right' else 'b'", lambda _name: "right") == "a"
-    for text in NO_CHOICES:
-        with pytest.raises(ExpressionError):
-            evaluate(text, lambda _name: "right")
+
+
+@pytest.mark.parametrize("text", NO_CHOICES)
+def test_half_a_choice_is_refused(text: str) -> None:
+    with pytest.raises(ExpressionError):
+        evaluate(text, lambda _name: "right")
+
+
+@pytest.mark.parametrize("name", ["in", "class", "args.lambda", "None"])
+def test_words_of_python_can_name_variables(name: str) -> None:
+    assert evaluate(f"2 * {name}", lambda _name: Quantity(3.0)) == Quantity(6.0)
 
 
 numbers = st.integers(0, 99).map(str)
@@ -204,7 +215,7 @@ UNCOMPUTABLE = [
         "1; 2",
         "__import__(1)",
     ),
-    "1 furlong",
+    *("1 furlong", "2 m m", "1 < 2 < 3", "1, 2", "()", "sin()", "2 (3)", "1 + not true"),
 ]
 
 

@@ -161,9 +161,7 @@ def children() -> set[int]:
     """Return the process ids of this process's children that have not ended."""
     pids: set[int] = set()
     for task in Path("/proc/self/task").iterdir():  # one may end meanwhile
-        with contextlib.suppress(
-            FileNotFoundError, ProcessLookupError
-        ):  # a thread that has just ended
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
             pids |= set(map(int, (task / "children").read_text("ascii").split()))
     return {pid for pid in pids if command_line(pid)}
 

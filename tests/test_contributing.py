@@ -8,12 +8,16 @@ import struct
 
 import yaml
 
+from tests.support.guard_history import History
 from tests.support.house import GUIDE, ROOT, mermaid, with_drawing
+from tests.support.machine_history import GUARD, begin
 from tests.support.skips import ACCEPTED
 from tfcompose.cli.compiling import library
+from tfcompose.cli.console import Console
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.compiler.resolve import resolve
 from tfcompose.foundation.catalogue import read_code
+from tfcompose.model.messages import GUARD_EVENTS, Clear, FindingShown
 from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.spec.language import validate
 from tfcompose.spec.load import load
@@ -77,6 +81,37 @@ def test_a_mounts_xyz_has_the_forms_of_the_way() -> None:
     pose = planned.pose
     sent = encode([Transform(0, planned.parent, planned.child, pose.xyz, pose.quat_xyzw)])
     assert struct.pack("<3d", *xyz) in sent
+
+
+def test_tf801_passes_at_most_five_hands() -> None:
+    section = TEXT.partition("## The way of TF801\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (.*?) \| `tfcompose\.(\w+)\..*?` \|$", section, re.MULTILINE)
+    assert [wing for _, wing in rows] == ["tf", "guard", "guard", "launcher", "cli"]
+
+
+def test_tf801_has_the_forms_of_its_way() -> None:
+    guard = History().clear()
+    for name in ("/slam", "/old_slam"):
+        guard.repeat(guard.joins(name), "map odom", 10)
+    (event,) = [event for event in guard.events if isinstance(event, FindingShown)]
+    assert event.found.code == "TF801"
+    launcher = begin(GUARD).feed(Clear(), GUARD_EVENTS.read(GUARD_EVENTS.line(event)))
+    (notice,) = launcher.all(FindingShown)
+    assert notice.found == event.found
+    output = Lines()
+    Console(launcher.plan, output, colour=False)(notice)
+    assert "TF801" in output.text
+    assert "/old_slam" in output.text
+
+
+class Lines:
+    """Keeps what a console writes."""
+
+    text = ""
+
+    def write(self, text: str, *, log: bool = False) -> None:
+        del log
+        self.text += text
 
 
 def test_each_file_that_it_names_is_there() -> None:

@@ -1,7 +1,7 @@
-"""Draw the tree as SVG, PDF, PNG, DOT or Mermaid.
+"""Draw the tree as SVG, PNG, DOT or Mermaid.
 
 Draw the tree: frames coloured by owner, fixed and moving edges, each sensor in a box. The suffix
-of the file selects the format: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or
+of the file selects the format: .svg, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or
 --bag, draw the published tree, coloured by publisher, with second parents and loops as they are,
 and with FILE also what is missing.
 """
@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
     from tfcompose.tf.live.edges import EdgeState, TreeObserver
 
-FORMATS = (".svg", ".pdf", ".png", ".dot", ".gv", ".mmd")
-FORMAT_NAMES = "svg, pdf, png, dot or mmd"
+FORMATS = (".svg", ".png", ".dot", ".gv", ".mmd")
+FORMAT_NAMES = "svg, png, dot or mmd"
+PNG_PACKAGES = ("resvg_py", "font_lato")
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -116,6 +117,9 @@ def _check_output(path: Path) -> None:
         SystemExit: after saying why.
     """
     ending = path.suffix.lower()
+    if ending == ".pdf":
+        svg_path = path.with_suffix(".svg")
+        fail(f"graph writes no PDF: write {svg_path}, and print it in a browser", UNREADABLE)
     if ending not in FORMATS:
         what = (
             f"{path.suffix} is not a format that graph writes"
@@ -127,9 +131,10 @@ def _check_output(path: Path) -> None:
 
     if not is_folder(path.parent):
         fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
-    if ending == ".png" and find_spec("pypdfium2") is None:
-        advice = "pip install 'tfcompose[pictures]'; svg and pdf need nothing"
-        fail(f"PNG needs the package pypdfium2: {advice}", UNREADABLE)
+    missing = [package for package in PNG_PACKAGES if find_spec(package) is None]
+    if ending == ".png" and missing:
+        advice = "pip install 'tfcompose[pictures]'; svg needs nothing"
+        fail(f"PNG needs the package {missing[0]}: {advice}", UNREADABLE)
 
 
 def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
@@ -145,10 +150,6 @@ def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
     from tfcompose.compiler.draw.picture import draw
 
     drawing = draw(graph, direction)
-    if ending == ".pdf":
-        from tfcompose.compiler.draw.pdf import pdf
-
-        return pdf(drawing)
     if ending == ".png":
         from tfcompose.compiler.draw.png import png
 

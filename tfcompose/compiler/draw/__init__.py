@@ -1,6 +1,6 @@
-"""Draws a TF tree from a plain description of frames and edges: SVG, PDF, PNG, DOT and Mermaid.
+"""Draws a TF tree from a plain description of frames and edges: SVG, PNG, DOT and Mermaid.
 
-Lengths are points of 1/72 inch.
+Lengths are CSS's px of 1/96 inch.
 """
 
 from tfcompose.compiler.draw.graph import Arrow, Graph, Group

@@ -1,4 +1,4 @@
-"""Colours, lines and fonts in one table for SVG and PDF, and widths of text.
+"""Colours, lines and fonts in one table, and widths of text.
 
 The colours of owners are those of Okabe and Ito, which people with any kind of colour blindness
 tell apart; each owner has a number as well, for print without colour and for robots with more

@@ -64,6 +64,7 @@ ONLY_IN: dict[str, set[str]] = {
     "yourdfpy": {"compiler.urdf"},
     "resvg_py": {"compiler.draw"},
     "font_lato": {"compiler.draw"},
+    "argcomplete": {"cli"},
     "regex": {"launcher"},
     "rich": {"cli"},
     "rclpy": {"tf.ros"},

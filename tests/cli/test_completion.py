@@ -1,16 +1,20 @@
 """What the shell completes, and how a mistyped command line is answered."""
 
+import io
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
+import argcomplete
 import pytest
+from argcomplete.finders import CompletionFinder
 
 from tests.support.cli import tfcompose_in
 from tests.support.shell import PROMPT, Shell
-from tfcompose.cli.commands.completion import SCRIPTS
+from tfcompose.cli.commands.completion import SHELLS
 from tfcompose.cli.parser import all_commands, all_groups
 from tfcompose.cli.tool_commands import summary_of
 from tfcompose.launcher.runtime_dir import Lock, runtime_dir_of
@@ -28,7 +32,8 @@ profiles: {demo: {}}
 """
 
 CASES = {
-    "": {*all_commands(), "--help", "--version"},
+    "": {*all_commands()},
+    "--": {"--help", "--version"},
     "li": {"lint"},
     "lint --sel": {"--select"},
     "lint --select TF61": {f"TF61{n}" for n in range(10)},
@@ -49,53 +54,71 @@ CASES = {
     "down --robot ": set(),
     "nothing ": set(),
 }
-#: Words that can be files as well, or these alone.
+#: Words that can be files, and what else they can be.
 FILES = {
-    "lint ro": set(),
-    "up --overlay ": set(),
-    "up --overlay=": set(),
-    "build -o ": set(),
+    "lint two": {"two_rovers.yaml"},
+    "up --overlay two": {"two_rovers.yaml"},
+    "up --overlay=two": {"--overlay=two_rovers.yaml"},
+    "build -o ../rob": {"../robots/"},
     "pose rover.yaml odo": {"odom"},
     "explain TF30": {f"TF30{n}" for n in range(1, 10)},
     "explain rover.yaml ma": {"map"},
 }
 
 
+Asking = Callable[..., set[str]]
+
+
+@pytest.fixture
+def completed(monkeypatch: pytest.MonkeyPatch) -> Asking:
+    """What argcomplete answers a shell whose cursor is at the end of a line."""
+
+    def ask(folder: Path, line: str, breaks: str = "") -> set[str]:
+        answer = io.StringIO()
+        monkeypatch.setattr(
+            argcomplete, "autocomplete", partial(CompletionFinder(), output_stream=answer)
+        )
+        monkeypatch.setattr(CompletionFinder, "_init_debug_stream", lambda _: None)  # takes fd 9
+        asked = {
+            "_ARGCOMPLETE": "1",
+            "_ARGCOMPLETE_IFS": "\n",
+            "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
+            "_ARGCOMPLETE_COMP_WORDBREAKS": breaks,
+            "COMP_LINE": line,
+            "COMP_POINT": str(len(line)),
+        }
+        done = tfcompose_in(folder, **asked)
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+        return set(answer.getvalue().split("\n")) - {""}
+
+    return ask
+
+
 @pytest.mark.parametrize("line", [*CASES, *FILES])
-def test_a_word_is_completed(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_argument_is_completed(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, completed: Asking
+) -> None:
     tmp_path.chmod(0o700)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    words = line.split(" ")
-    done = tfcompose_in(ROBOTS, "completion", "--at", len(words), "--", "tfcompose", *words)
-    assert (done.returncode, set(done.stdout.split())) == (
-        int(line in FILES),
-        (CASES | FILES)[line],
-    )
+    assert completed(ROBOTS, f"tfcompose {line}") == (CASES | FILES)[line]
 
 
 LINES = {
-    "tfcompose li": ["lint"],
-    "tfcompose lint --format=s": ["sarif"],
-    "tfcompose pose 'my robot.yaml' odo": ["odom"],
-    'tfcompose pose "my robot.yaml" odo': ["odom"],
-    "tfcompose pose my\\ robot.yaml odo": ["odom"],
-    "tfcompose pose 'my robot.yaml' 'odo": ["odom"],
-    "tfcompose up cell.yaml cameras:": ["="],
-    "tfcompose up cell.yaml --host ": ["main", "jetson"],
-    "tfcompose up cell.yaml -p ": ["demo"],
+    "tfcompose li": {"lint"},
+    "tfcompose lint --format=s": {"sarif"},
+    "tfcompose pose 'my robot.yaml' odo": {"odom"},
+    'tfcompose pose "my robot.yaml" odo': {"odom"},
+    "tfcompose pose my\\ robot.yaml odo": {"odom"},
+    "tfcompose pose 'my robot.yaml' 'odo": {"odom"},
+    "tfcompose up cell.yaml cameras:": {"="},
+    "tfcompose up cell.yaml --host ": {"main", "jetson"},
+    "tfcompose up cell.yaml -p ": {"demo"},
 }
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_a_line_is_split_as_bash_does_it(line: str, folder: Path) -> None:
-    done = tfcompose_in(folder, "completion", "--line", line, "--breaks", " \t\n\"'@><=;|&(:")
-    assert done.stdout.split() == LINES[line]
-
-
-@pytest.mark.parametrize("at", [-3, 0, 99])
-def test_a_place_outside_of_the_line_has_nothing(at: int, tmp_path: Path) -> None:
-    done = tfcompose_in(tmp_path, "completion", "--at", at, "--", "tfcompose", "nothing")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+def test_a_line_is_split_as_bash_does_it(line: str, folder: Path, completed: Asking) -> None:
+    assert completed(folder, line, " \t\n\"'@><=;|&(:") == LINES[line]
 
 
 #: What is typed before the tab key, and the line after it; a frame, a file, a preset, a code, a
@@ -170,9 +193,9 @@ def test_a_shell_on_a_terminal_completes_words_at_the_tab_key(name: str, folder:
 
 
 def test_there_is_a_script_for_each_shell_and_for_no_other(tmp_path: Path) -> None:
-    assert SCRIPTS.keys() == SETUP.keys()
+    assert SETUP.keys() == set(SHELLS)
     assert all(
-        tfcompose_in(tmp_path, "completion", shell).stdout == SCRIPTS[shell] for shell in SCRIPTS
+        "tfcompose" in tfcompose_in(tmp_path, "completion", shell).stdout for shell in SHELLS
     )
     assert tfcompose_in(tmp_path, "completion", "csh").returncode == 2
 

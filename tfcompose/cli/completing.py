@@ -1,16 +1,23 @@
-"""What a word of a command line can be.
+"""Completion of a command line: commands, options, their values, and names of the robot file.
 
-Commands, options, their values, and names that the robot file has.
+argcomplete reads the line and answers the shell; the sources here know the names that an argument
+can have.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import shlex
+import sys
+from argparse import ArgumentParser
+from functools import partial
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.command_parser import CommandModule, command_parser
+import argcomplete
+from argcomplete.completers import FilesCompleter, SuppressCompleter
+from argcomplete.lexers import split_line
+
+from tfcompose.cli.command_parser import CommandModule, Parser
 from tfcompose.cli.documentation import topics
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.plans import is_plan
@@ -22,6 +29,8 @@ if TYPE_CHECKING:
     from argparse import Action
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    Source = Callable[[Sequence[str]], list[str]]
+
 YAML = (".yaml", ".yml")
 
 
@@ -29,116 +38,78 @@ YAML = (".yaml", ".yml")
 PATHS = frozenset({"FILE", "DIR", "FOLDER", "BAG", "PICTURE", "PLAN", "OLD", "NEW"})
 
 
-def candidates(
-    commands: Mapping[str, CommandModule], words: Sequence[str], at: int
-) -> tuple[list[str], bool]:
-    """Return what ``words[at]`` can be, and whether it can also be a file.
+def complete(commands: Mapping[str, CommandModule]) -> None:
+    """Print what the argument at the shell's cursor can be, and exit.
 
-    ``words`` begins with the program's name, and the word may be half written.
+    Raises:
+        SystemExit: always, with 0.
     """
-    if at < 1:
-        return [], False
-    word, before = (
-        (words[at] if at < len(words) else ""),
-        list(map(_expanded, words[1:at])),
+    line, point = os.environ["COMP_LINE"], int(os.environ["COMP_POINT"])
+    _quote, _prefix, _suffix, words, _break = split_line(line, point)
+    argv = list(map(_expanded, words[1:]))
+    if argv and argv[0] not in commands:
+        commands = {}
+    parser = ArgumentParser(prog="tfcompose")
+    parser.add_argument("--version", action="version")
+    subparsers = parser.add_subparsers(parser_class=Parser)
+    for name, command in commands.items():
+        subparser = subparsers.add_parser(name)
+        if [name] == argv[:1]:
+            command.arguments(subparser)
+            add_all_options(name, subparser)
+            for action in subparser._actions:  # noqa: SLF001 (argparse has no other way)
+                if action.choices is None:
+                    action.completer = _Completer(action, argv, commands)  # type: ignore[attr-defined]
+    argcomplete.autocomplete(
+        parser,
+        always_complete_options=False,
+        default_completer=SuppressCompleter(),
+        exit_method=sys.exit,
     )
-    if not before:
-        return _beginning(word, [*commands, "--help", "--version"]), False
-    if before[0] not in commands:
-        return [], False
-    if before == ["help"]:
-        from tfcompose.spec.language.reference import keys, paths
-
-        return _beginning(
-            word, [*topics(), *commands, *(paths() if "." in word else keys())]
-        ), False
-    parser = command_parser(before[0], commands[before[0]])
-    add_all_options(before[0], parser)
-    actions = parser._actions  # noqa: SLF001 (argparse has no other way)
-    options = {text: action for action in actions for text in action.option_strings}
-    option, equals, value = word.partition("=")
-    joined = options.get(option) if equals else None
-    if joined is not None and joined.nargs != 0:
-        return [
-            f"{option}={one}" for one in _completed(value, _values(joined, before), joined)
-        ], _is_path(joined)
-    valued = options.get(before[-1])
-    if valued is not None and valued.nargs != 0:
-        return _completed(word, _values(valued, before), valued), _is_path(valued)
-    if word.startswith("-"):
-        return _beginning(word, options), False
-    positionals = [one for one in actions if not one.option_strings]
-    if (
-        positionals
-        and positionals[0].choices
-        and positionals[0].nargs is None
-        and len(before) == 1
-    ):
-        positionals = positionals[:1]  # the first word is needed
-    known = [value for one in positionals for value in _values(one, before)]
-    return _beginning(word, known), any(map(_is_path, positionals))
 
 
-def split_line(line: str) -> list[str]:
-    """Return the words of a command line up to the cursor.
+def _expanded(argument: str) -> str:
+    return os.path.expanduser(argument)  # noqa: PTH111 (an unknown user's stays as it is)
 
-    The last one may be empty, or its quotes still open.
-    """
-    for end in ("", "'", '"', "\\"):
-        try:
-            words = shlex.split(f"{line}{end}")
-        except ValueError:
-            continue
-        return (
-            [*words, ""]
-            if not end and (not line or line[-1].isspace()) and not line.endswith("\\ ")
-            else words
+
+class _Completer:
+    """Completes one argument of a command line, by names and by files."""
+
+    def __init__(self, action: Action, argv: Sequence[str], commands: Iterable[str]) -> None:
+        self._source = _source_of(action, argv[0], commands)
+        self._argv = argv
+        self._is_path = isinstance(action.metavar, str) and not PATHS.isdisjoint(
+            re.findall("[A-Z]+", action.metavar)
         )
-    return []
+        self._is_list = action.metavar == "CODES"
+
+    def __call__(self, prefix: str, **_: object) -> list[str]:
+        """Return what the argument can be; of a list with commas, what its last part can be."""
+        first, comma, _last = prefix.rpartition(",") if self._is_list else ("", "", prefix)
+        names = [f"{first}{comma}{name}" for name in self._source(self._argv)]
+        return [*names, *FilesCompleter()(prefix)] if self._is_path else names
 
 
-def _expanded(word: str) -> str:
-    return os.path.expanduser(word)  # noqa: PTH111 (where there is no such user it stays as it is)
-
-
-def _is_path(action: Action) -> bool:
-    return isinstance(action.metavar, str) and not PATHS.isdisjoint(
-        re.findall("[A-Z]+", action.metavar)
-    )
-
-
-def _completed(word: str, known: Iterable[str], action: Action) -> list[str]:
-    """Return what an option's value can be; of a list with commas, what its last part can be."""
-    first, comma, last = word.rpartition(",") if action.metavar == "CODES" else ("", "", word)
-    return [f"{first}{comma}{one}" for one in _beginning(last, known)]
-
-
-def _beginning(word: str, known: Iterable[str]) -> list[str]:
-    return [one for one in dict.fromkeys(known) if one.startswith(word)]
-
-
-def _values(action: Action, before: Sequence[str]) -> list[str]:
-    """Return the values of an argument, as far as they have names."""
-    if action.choices is not None:
-        return [str(one) for one in action.choices]
-    if isinstance(action.metavar, str) and action.metavar.islower():
-        return action.metavar.split("|")
-    source = _SOURCES.get((before[0], action.dest)) or _SOURCES.get(("", action.dest))
+def _source_of(action: Action, command: str, commands: Iterable[str]) -> Source:
+    """Return the function that lists the names an argument of the command can have."""
+    if command == "help":
+        return partial(_help_pages, commands)
+    source = _SOURCES.get((command, action.dest)) or _SOURCES.get(("", action.dest))
     if source:
-        return source(before)
-    command = find(before[0])
-    sections = dict(command.command.completes) if command else {}
-    return _section(sections[action.dest], before) if action.dest in sections else []
+        return source
+    tool_command = find(command)
+    section = dict(tool_command.command.completes).get(action.dest) if tool_command else None
+    return partial(_section, section) if section else _nothing
 
 
-def _frames(before: Sequence[str]) -> list[str]:
+def _frames(argv: Sequence[str]) -> list[str]:
     """Return the frames of the robot file; before it is named, nothing: files are meant."""
     from tfcompose.cli.compiling import library
     from tfcompose.compiler.compile import compile_source
     from tfcompose.spec.load import load
 
-    file = next((word for word in before if word.endswith(YAML)), None)
-    if file is None and before[0] == "explain":
+    file = next((word for word in argv if word.endswith(YAML)), None)
+    if file is None and argv[0] == "explain":
         return []
     try:
         robot = compile_source(
@@ -153,23 +124,31 @@ def _frames(before: Sequence[str]) -> list[str]:
     )
 
 
+def _nothing(_: Sequence[str]) -> list[str]:
+    return []
+
+
+def _help_pages(commands: Iterable[str], _: Sequence[str]) -> list[str]:
+    from tfcompose.spec.language.reference import keys, paths
+
+    return [*topics(), *commands, *keys(), *paths()]
+
+
 def _codes(_: Sequence[str]) -> list[str]:
     from tfcompose.foundation.catalogue import CATALOGUE
 
     return list(CATALOGUE)
 
 
-def _codes_or_frames(before: Sequence[str]) -> list[str]:
-    return _frames(before) if any(word.endswith(YAML) for word in before) else _codes(before)
+def _codes_or_frames(argv: Sequence[str]) -> list[str]:
+    return _frames(argv) if any(word.endswith(YAML) for word in argv) else _codes(argv)
 
 
-def _section(name: str, before: Sequence[str]) -> list[str]:
+def _section(name: str, argv: Sequence[str]) -> list[str]:
     """Return the names in a section of the robot file that is given, or of that of this folder."""
     from tfcompose.spec.load import load
 
-    file = next(
-        (word for word in before if word.endswith(YAML) and not is_plan(word)), DEFAULT_FILE
-    )
+    file = next((word for word in argv if word.endswith(YAML) and not is_plan(word)), DEFAULT_FILE)
     try:
         section = load(read_text(file), file).data.get(name)
     except RejectedError:
@@ -177,16 +156,16 @@ def _section(name: str, before: Sequence[str]) -> list[str]:
     return [str(one) for one in section] if isinstance(section, dict) else []
 
 
-def _profiles(before: Sequence[str]) -> list[str]:
-    return _section("profiles", before)
+def _profiles(argv: Sequence[str]) -> list[str]:
+    return _section("profiles", argv)
 
 
-def _hosts(before: Sequence[str]) -> list[str]:
-    return _section("hosts", before)
+def _hosts(argv: Sequence[str]) -> list[str]:
+    return _section("hosts", argv)
 
 
-def _given(before: Sequence[str]) -> list[str]:
-    return [f"{name}:=" for name in _section("args", before)]
+def _given(argv: Sequence[str]) -> list[str]:
+    return [f"{name}:=" for name in _section("args", argv)]
 
 
 def _presets(_: Sequence[str]) -> list[str]:
@@ -220,7 +199,7 @@ def _processes(_: Sequence[str]) -> list[str]:
 
 
 #: What an argument can be: by its command, or for all commands that have it, and its name.
-_SOURCES: dict[tuple[str, str], Callable[[Sequence[str]], list[str]]] = {
+_SOURCES: dict[tuple[str, str], Source] = {
     ("", "profiles"): _profiles,
     ("", "robot"): _robots,
     ("", "given"): _given,

@@ -146,6 +146,10 @@ def _refuse_path(error: OSError) -> int:
 
 
 def _main(words: list[str]) -> int:
+    if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion, which runs the program
+        from tfcompose.cli.completing import complete
+
+        complete(all_commands())
     command = words[0] if words else ""
     if command in {"-h", "--help"} or words == ["help"]:
         sys.stdout.write(help_text())

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import jsonschema
 import pytest
 
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.cli.schemas import LANGUAGES, schema_text
 from tfcompose.compiler.compile import compile_robot
@@ -51,7 +50,9 @@ def test_the_example_robots_are_valid(file: Path) -> None:
     assert (file.parent / schema[1]).resolve() == ROOT / "schemas" / "robot.schema.json"
 
 
-@for_each(sorted((ROOT / "tfcompose/data/presets").glob("*/*.yaml")))
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "tfcompose/data/presets").glob("*/*.yaml")), ids=lambda file: file.stem
+)
 def test_the_presets_are_valid(file: Path) -> None:
     validator("preset").validate(load(file.read_text("utf-8"), file.name).data)
 

@@ -3,13 +3,11 @@
 Their output may be public.
 """
 
-import itertools
 from pathlib import Path
 
 import pytest
 
 from tests.support.cli import tfcompose_in
-from tests.support.tables import for_each
 
 #: Files that hold a secret.
 SECRETS = {
@@ -50,7 +48,8 @@ NAMING = {
 ROBOT = "tfcompose: 1\nrobot: r\nlinks: {{base_link: {{}}}}\n{}\n"
 
 
-@for_each(itertools.product(SECRETS, NAMING))
+@pytest.mark.parametrize("kind", SECRETS)
+@pytest.mark.parametrize("naming", NAMING)
 def test_a_finding_shows_nothing_of_a_file_that_is_no_robots(
     kind: str, naming: str, tmp_path: Path
 ) -> None:
@@ -62,7 +61,7 @@ def test_a_finding_shows_nothing_of_a_file_that_is_no_robots(
         assert "Traceback" not in done.stderr
 
 
-@for_each(SECRETS)
+@pytest.mark.parametrize("kind", SECRETS)
 def test_no_line_of_a_file_in_the_robot_files_place_is_shown(kind: str, tmp_path: Path) -> None:
     """As where a link of that name is in a pull request.
 

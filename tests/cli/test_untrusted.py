@@ -3,7 +3,6 @@
 Besides that only installed packages and presets, and no environment.
 """
 
-import itertools
 import subprocess
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pytest
 
 from tests.cli.test_secrets import NAMING, ROBOT
 from tests.support.cli import tfcompose_in
-from tests.support.tables import for_each
 
 #: A robot file beside the stranger's, whose one fault no finding may repeat.
 OTHER = "tfcompose: 1\nrobot: other\nlinks: {base_link: {}}\nhunter2: {}\n"
@@ -42,7 +40,8 @@ def lint(
 OUTSIDE = ("../../other.yaml", "link.yaml", "../.git/config", "/proc/self/environ", "/etc/passwd")
 
 
-@for_each(itertools.product(OUTSIDE, NAMING))
+@pytest.mark.parametrize("path", OUTSIDE)
+@pytest.mark.parametrize("naming", NAMING)
 def test_nothing_outside_of_the_robots_tree_is_read(path: str, naming: str, folder: Path) -> None:
     done = lint(folder, ROBOT.format(NAMING[naming].format(path)))
     assert not [word for word in ("hunter2", "root:", "PATH=") if word in done.stdout]
@@ -121,7 +120,7 @@ def test_xacro_reads_no_environment(folder: Path) -> None:
         assert ("hunter2" in done.stdout + done.stderr) == is_read
 
 
-@for_each(["--fix", "--diff", "--trust"])
+@pytest.mark.parametrize("option", ["--fix", "--diff", "--trust"])
 def test_an_option_that_trusts_or_writes_is_refused(option: str, folder: Path) -> None:
     done = lint(folder, ROBOT.format(""), option)
     assert (done.returncode, done.stdout) == (2, "")

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
-from tests.support.tables import for_each
 from tfcompose.foundation.catalogue import (
     CATALOGUE,
     FAMILIES,
@@ -34,7 +33,7 @@ HEAD = "---\nname: pump_off\nseverity: warning\nfamily: live\n---\n\n"
 PAGE = "The pump is off.\n\nSwitch it on.\n"
 
 
-@for_each(FILES)
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_each_file_is_a_code_and_a_page_whose_first_paragraph_is_a_sentence(file: Path) -> None:
     assert CATALOGUE[file.stem] == read_code(file.stem, file.read_text("utf-8"))
     summary = CATALOGUE.summary(file.stem)

@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 
-from tests.support.tables import for_each
 from tfcompose.cli import main
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
@@ -135,7 +134,7 @@ def lines_run(words: list[str]) -> int:
 
 @pytest.mark.slow
 @pytest.mark.alone
-@for_each(CASES)
+@pytest.mark.parametrize(("make", "words"), CASES)
 def test_a_command_takes_in_proportion_to_the_size(
     make: Callable[[int], str], words: list[str]
 ) -> None:

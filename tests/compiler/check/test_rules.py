@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from tests.support.findings import words, words_of
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.cli.compiling import moments as measured
 from tfcompose.cli.reading import read_text
@@ -79,7 +78,7 @@ def places(found: tuple[Finding, ...]) -> set[tuple[int, str]]:
     return {(one.span.line, one.code) for one in found if one.span}
 
 
-@for_each(SPECS)
+@pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Path) -> None:
     expected = marks(spec.read_text("utf-8"))
     bare = compiled(spec)
@@ -93,7 +92,7 @@ def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Pa
         assert places(tuple(added)) == more
 
 
-@for_each(sorted(set(CATALOGUE) - NOT_OF_A_LINE - LIVE))
+@pytest.mark.parametrize("code", sorted(set(CATALOGUE) - NOT_OF_A_LINE - LIVE))
 def test_each_code_that_a_robot_file_can_provoke_has_a_marked_line(code: str) -> None:
     marked = {
         code
@@ -130,7 +129,7 @@ def test_a_conflict_shows_its_other_place_too(code: str, spec: str) -> None:
     assert all("self" in one.message for one in alone), "only a frame on itself has one place"
 
 
-@for_each(SPECS)
+@pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> None:
     lines = spec.read_text("utf-8").splitlines()
     for one in compiled(spec).found:
@@ -150,7 +149,8 @@ def test_findings_come_in_the_order_of_the_file() -> None:
     assert at == sorted(at)
 
 
-@for_each(
+@pytest.mark.parametrize(
+    ("spec", "wrong", "right"),
     [
         ("owners", "base_drvie", "base_drive"),
         ("values", "gaurd", "guard"),

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit import emit
@@ -15,7 +14,7 @@ SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
 PRESETS = library()
 
 
-@for_each(SPECS)
+@pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_with_all_rules_off_that_can_be_off_a_robot_is_built_or_refused(spec: Path) -> None:
     text = spec.read_text("utf-8")
     codes = sorted(
@@ -53,12 +52,13 @@ def test_what_leaves_nothing_to_build_always_counts(text: str, code: str) -> Non
     assert (found[code], found["TF017"]) == ("error", "error")
 
 
-@for_each(
+@pytest.mark.parametrize(
+    "entry",
     [
         "TF641: {limit: 10 %}",
         "view_blocked: {limit: 10 %}",
         "TF641: {limit: 10 %, severity: error}",
-    ]
+    ],
 )
 def test_a_limit_alone_switches_nothing_off(entry: str) -> None:
     wall = "wall: {parent: base_link, xyz: [0.3, 0, 0.3], collision: {box: [0.02, 0.15, 0.4]}}"

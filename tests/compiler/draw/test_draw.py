@@ -14,7 +14,6 @@ import pydot
 import pytest
 from PIL import Image
 
-from tests.support.tables import for_each
 from tfcompose.compiler.draw import Arrow, Graph, Group
 from tfcompose.compiler.draw.arrange import Direction
 from tfcompose.compiler.draw.dot import dot
@@ -129,7 +128,7 @@ def around(shape: Box | Text) -> tuple[float, float, float, float]:
     return left, shape.y - 0.75 * size, left + shape.width, shape.y + 0.2 * size
 
 
-@for_each(FAMILY)
+@pytest.mark.parametrize(("seed", "frames", "poses"), FAMILY)
 def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(
     seed: int, frames: int, *, poses: bool
 ) -> None:
@@ -152,7 +151,7 @@ def nothing_overlaps(drawing: Drawing, frames: int) -> None:
         assert bottom < drawing.height
 
 
-@for_each(FAMILY)
+@pytest.mark.parametrize(("seed", "frames", "poses"), FAMILY)
 def test_the_area_of_a_group_holds_its_frames_entirely_and_crosses_no_box(
     seed: int, frames: int, *, poses: bool
 ) -> None:
@@ -216,7 +215,7 @@ def test_a_tall_picture_is_in_columns_by_itself_and_no_taller_than_wide() -> Non
     assert draw(chain(4), "columns") == draw(chain(4), "right")
 
 
-@for_each(FAMILY)
+@pytest.mark.parametrize(("seed", "frames", "poses"), FAMILY)
 def test_in_columns_no_edge_to_a_child_of_the_trunk_crosses_a_box(
     seed: int, frames: int, *, poses: bool
 ) -> None:

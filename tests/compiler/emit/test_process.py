@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import disk, library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit import emit
@@ -91,7 +90,7 @@ REACH: dict[str, dict[str, Any]] = {
 }
 
 
-@for_each(REACH)
+@pytest.mark.parametrize("keys", REACH)
 def test_a_key_of_a_process_reaches_the_plan(keys: str) -> None:
     head = (
         HEAD.replace("map: {}", "map: {}, odom: {parent: map, owner: a}")
@@ -200,7 +199,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }
 
 
-@for_each(COMMANDS)
+@pytest.mark.parametrize("keys", COMMANDS)
 def test_how_it_is_run_becomes_words_that_the_launcher_can_follow(keys: str) -> None:
     assert process_of(keys).argv == COMMANDS[keys]
 

@@ -8,9 +8,9 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.resolve.poses import rotation_of
 from tfcompose.compiler.resolve.presets import filled
@@ -75,7 +75,9 @@ def is_there(frame: PresetFrame, fact: dict[str, Any], name: str, *, optical: bo
     return angle_between(rotation, OPTICAL_XYZW if optical else quat_from_rpy(*fact["rpy"])) < 1e-9
 
 
-@for_each([(preset, name) for preset, frames in FACTS.items() for name in frames])
+@pytest.mark.parametrize(
+    ("preset", "name"), [(preset, name) for preset, frames in FACTS.items() for name in frames]
+)
 def test_a_frame_is_where_the_package_of_its_vendor_has_it(preset: str, name: str) -> None:
     fact = FACTS[preset][name]
     found = [one for frames in variants(preset) for one in frames.get(name, [])]

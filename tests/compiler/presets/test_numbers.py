@@ -10,7 +10,8 @@ import json
 import math
 from typing import Any
 
-from tests.support.tables import for_each
+import pytest
+
 from tests.support.texts import robot_in
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
@@ -137,7 +138,7 @@ def in_mount(robot: Robot, frame: str) -> Pose:
     return pose
 
 
-@for_each(TABLE)
+@pytest.mark.parametrize(("preset", "options", "frame", "xyz", "axes"), TABLE)
 def test_a_frame_is_where_the_vendor_has_it(
     preset: str, options: dict[str, Any], frame: str, xyz: Vector, axes: Axes
 ) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.model.robot import Optics
@@ -114,7 +113,7 @@ def of_mode(fact: dict[str, Any], mode: dict[str, Any]) -> dict[str, Any]:
     return made | ({"depth_range_m": mode["range_m"]} if "range_m" in mode else {})
 
 
-@for_each(FACTS)
+@pytest.mark.parametrize("preset", FACTS)
 def test_a_stream_sees_what_its_maker_says(preset: str) -> None:
     found = optics(preset)
     for stream, fact in FACTS[preset].items():
@@ -129,13 +128,14 @@ def test_a_stream_sees_what_its_maker_says(preset: str) -> None:
 OPTION = {"zed": "resolution", "microsoft": "depth_mode", "orbbec": "depth_mode"}
 
 
-@for_each(
+@pytest.mark.parametrize(
+    ("preset", "stream"),
     [
         (preset, stream)
         for preset, streams in FACTS.items()
         for stream, fact in streams.items()
         if "modes" in fact
-    ]
+    ],
 )
 def test_an_option_chooses_what_a_stream_sees(preset: str, stream: str) -> None:
     fact = FACTS[preset][stream]
@@ -154,7 +154,7 @@ def test_an_image_of_4_to_3_is_a_crop_and_narrower() -> None:
     assert wide["depth"] == crop["depth"]
 
 
-@for_each(KNOWN.names)
+@pytest.mark.parametrize("preset", KNOWN.names)
 def test_every_value_of_a_vendor_keeps_its_source(preset: str) -> None:
     for stream, one in KNOWN.get(preset).optics.items():
         keys = {

@@ -10,13 +10,16 @@ from functools import cache
 from itertools import product
 from typing import Any
 
-from tests.support.tables import for_each
+import pytest
+
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.resolve.presets import filled
 from tfcompose.foundation.geometry import angle_between, rotate
 from tfcompose.model.robot import Robot, is_optical
 
+#: One worker makes the robots, for all tests.
+pytestmark = pytest.mark.xdist_group("presets")
 KNOWN = library()
 NAMES = KNOWN.names
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
@@ -75,7 +78,7 @@ def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
     return made
 
 
-@for_each(NAMES)
+@pytest.mark.parametrize("name", NAMES)
 def test_its_frames_are_one_tree_below_its_mount(name: str) -> None:
     for _tf, _options, robot in robots(name):
         children = [edge.child for edge in robot.edges]
@@ -85,7 +88,7 @@ def test_its_frames_are_one_tree_below_its_mount(name: str) -> None:
         assert [edge.child for edge in robot.edges if edge.parent == "base_link"] == [mount]
 
 
-@for_each([name for name in NAMES if name != "realsense/t265"])
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "realsense/t265"])
 def test_its_optical_frames_have_z_forward_x_right_and_y_down(name: str) -> None:
     for _tf, _options, robot in robots(name):
         for edge in robot.edges:
@@ -115,7 +118,7 @@ def test_the_optical_frames_of_a_t265_have_x_right_y_up_and_z_backward() -> None
                     assert math.dist(rotate(edge.pose.quat_xyzw, axis), wanted) < 1e-9
 
 
-@for_each(NAMES)
+@pytest.mark.parametrize("name", NAMES)
 def test_what_stamps_its_messages_is_a_frame_of_the_robot(name: str) -> None:
     for tf, options, robot in robots(name):
         preset = KNOWN.get(name, {key: options[key] for key in (variants(name) or [{}])[0]})
@@ -124,7 +127,7 @@ def test_what_stamps_its_messages_is_a_frame_of_the_robot(name: str) -> None:
             assert output.hard_coded is (stamped not in robot.frames), (tf, topic, stamped)
 
 
-@for_each(NAMES)
+@pytest.mark.parametrize("name", NAMES)
 def test_it_says_where_it_is_from(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.source or name.startswith("generic/")

@@ -14,7 +14,6 @@ import yaml
 
 from tests.support.findings import expect
 from tests.support.presets import MAST, WRONG_IN_MAST
-from tests.support.tables import for_each
 from tests.support.texts import robot_in
 from tfcompose.cli import compiling
 from tfcompose.cli.commands import presets as presets_command
@@ -86,7 +85,7 @@ WITH_SWITCH = [name for name in DRIVEN if (driver := KNOWN.get(name).driver) and
 WITH_CLAIMS = [name for name in NAMES if (driver := KNOWN.get(name).driver) and driver.claims]
 
 
-@for_each(WITH_SWITCH)
+@pytest.mark.parametrize("name", WITH_SWITCH)
 def test_the_switch_is_among_the_parameters_of_the_driver(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.driver
@@ -113,7 +112,7 @@ def test_without_a_switch_tfcompose_cannot_publish_what_the_driver_does(name: st
     assert not compiled(name, tf="driver", frames=unknown(name)).errors
 
 
-@for_each(WITH_CLAIMS)
+@pytest.mark.parametrize("name", WITH_CLAIMS)
 def test_what_a_driver_claims_outside_its_sensor_is_switched_off_unless_it_owns_it(
     name: str,
 ) -> None:
@@ -126,7 +125,9 @@ def test_what_a_driver_claims_outside_its_sensor_is_switched_off_unless_it_owns_
     assert not off.keys() & driver_parameters(robot_of(name, frames=frames, owner="s")).keys()
 
 
-@for_each([name for name in NAMES if (driver := KNOWN.get(name).driver) and driver.naming])
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if (driver := KNOWN.get(name).driver) and driver.naming]
+)
 def test_a_driver_gets_the_final_names_of_its_frames(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.driver
@@ -291,7 +292,7 @@ def test_what_nobody_knows_is_requested_with_the_yaml_to_write_and_is_never_a_ze
     ] == []
 
 
-@for_each(NAMES)
+@pytest.mark.parametrize("name", NAMES)
 def test_every_preset_has_no_findings_with_its_default_options(name: str) -> None:
     found = compiled(name, xyz=[0.1, 0, 0.2]).found
     assert found == ()

@@ -13,7 +13,6 @@ from urllib.parse import unquote, urlparse
 import pytest
 from jsonschema import Draft4Validator, ValidationError
 
-from tests.support.tables import for_each
 from tfcompose import __version__
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
@@ -52,7 +51,7 @@ def test_the_schema_is_the_official_one_of_2_1_0() -> None:
         )
 
 
-@for_each(SPECS)
+@pytest.mark.parametrize("spec", SPECS, ids=lambda file: file.stem)
 def test_it_is_valid_and_says_what_was_found(spec: Path) -> None:
     found = findings(spec)
     run = source_text(found)

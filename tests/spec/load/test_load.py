@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.support.tables import for_each
 from tfcompose.foundation.findings import RejectedError, Span
 from tfcompose.spec.language import composed, validate
 from tfcompose.spec.load import Source, load
@@ -53,7 +52,7 @@ SCALARS: dict[str, Any] = {
 }
 
 
-@for_each(SCALARS)
+@pytest.mark.parametrize("source_text", SCALARS)
 def test_a_scalar_is_read_as_yaml_1_2_reads_it(source_text: str) -> None:
     value = load(f"a: {source_text}\n", "f").data["a"]
     assert value == SCALARS[source_text]
@@ -284,7 +283,8 @@ def test_what_is_too_large_for_a_robot_is_refused_no_later_than_the_largest_file
         assert time.process_time() - began < longest, case
 
 
-@for_each(
+@pytest.mark.parametrize(
+    ("case", "text", "expected"),
     [
         ("brackets", "a: 1\nb: " + "[" * 2000, ("TF008", 2, 43)),
         ("braces", "{" * 20_000, ("TF008", 1, 41)),
@@ -292,7 +292,7 @@ def test_what_is_too_large_for_a_robot_is_refused_no_later_than_the_largest_file
         ("closed", "- " + "[" * 5000 + "]" * 5000, ("TF008", 1, 42)),
         ("a string", "b: " + "[" * 100 + '"' + " " * 60 + '", ' + "[" * 1200, ("TF008", 1, 43)),
         ("no key where one must be", "a: 1\n" + "[" * 2000, ("TF002", 2, 1)),
-    ]
+    ],
 )
 def test_text_that_is_nested_too_deep_is_refused_at_the_first_level_too_many(
     case: str, text: str, expected: tuple[str, int, int]

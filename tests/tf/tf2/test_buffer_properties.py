@@ -10,7 +10,6 @@ from pytransform3d.transform_manager import TransformManager
 from pytransform3d.transformations import transform_from_pq
 from scipy.spatial.transform import Rotation, Slerp
 
-from tests.support.tables import for_each
 from tfcompose.foundation.geometry import Pose, Quaternion, angle_between, normalised
 from tfcompose.tf.ros.tf_codec import Decoder, Transform, encode
 from tfcompose.tf.tf2 import Buffer, TransformException
@@ -140,7 +139,7 @@ def test_a_trajectory_is_row_by_row_what_lookup_returns(
         assert found.quat_xyzw[row, 3] >= 0
 
 
-@for_each(range(20))
+@pytest.mark.parametrize("seed", range(20))
 def test_random_trees_agree_with_pytransform3d(seed: int) -> None:
     rng = random.Random(seed)
     buffer, manager, frames = Buffer(), TransformManager(), ["f0"]

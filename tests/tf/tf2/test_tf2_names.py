@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.tables import for_each
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
 from tfcompose.tf import tf2
 from tfcompose.tf.tf2 import (
@@ -106,7 +105,7 @@ OF_THE_CORE = [
 ]
 
 
-@for_each(OF_THE_CORE)
+@pytest.mark.parametrize("name", OF_THE_CORE)
 def test_the_core_has_tf2_pys_methods(name: str) -> None:
     assert (
         list(inspect.signature(getattr(tf2.BufferCore(), name)).parameters)
@@ -119,13 +118,13 @@ OF_THE_CLIENT = ["transform", "transform_full", "lookup_transform", "lookup_tran
 OF_THE_CLIENT += ["can_transform", "can_transform_full"]
 
 
-@for_each(OF_THE_CLIENT)
+@pytest.mark.parametrize("name", OF_THE_CLIENT)
 def test_the_client_has_the_buffers_lookups(name: str) -> None:
     named = list(inspect.signature(getattr(tf2.BufferClient, name)).parameters)[1:]
     assert named == [word for word in METHODS[name].split() if word != "return_debug_tuple"]
 
 
-@for_each(METHODS)
+@pytest.mark.parametrize("name", METHODS)
 def test_a_method_takes_tf2s_arguments_in_tf2s_order(name: str) -> None:
     assert list(inspect.signature(getattr(Buffer(), name)).parameters) == METHODS[name].split()
 

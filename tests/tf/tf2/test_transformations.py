@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from tests.support.tables import for_each
 from tfcompose.tf.tf2 import transformations as tf
 
 ORDERS = [
@@ -29,7 +28,7 @@ def away(quat: object, expected: Rotation) -> float:
     return float((Rotation.from_quat(quat) * expected.inv()).magnitude())
 
 
-@for_each(ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 def test_an_order_of_rotations_gives_the_quaternion_and_back_the_angles(order: str) -> None:
     for angles in ANGLES:
         expected, (i, j, k) = rotation(angles, order), angles

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.tables import for_each
 from tfcompose.foundation.geometry import Pose, normalised, quat_from_rpy
 from tfcompose.tf.tf2 import Buffer, InvalidArgumentException
 from tfcompose.tf.tf2.exceptions import TypeException
@@ -283,7 +282,7 @@ class Layout:
         ]
 
 
-@for_each(range(40))
+@pytest.mark.parametrize("seed", range(40))
 def test_a_cloud_of_any_layout_is_moved_and_every_other_byte_stays(seed: int) -> None:
     layout = Layout(random.Random(seed))
     given = layout.cloud()

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.foundation.findings import edited
@@ -324,7 +323,7 @@ CASES = {
 }
 
 
-@for_each(CASES)
+@pytest.mark.parametrize("name", CASES)
 def test_one_line_changes(name: str) -> None:
     text, xyz, rpy, line = CASES[name]
     x, y, z = map(math.radians, rpy)
@@ -369,7 +368,7 @@ ELSEWHERE = {
 }
 
 
-@for_each(ELSEWHERE)
+@pytest.mark.parametrize("name", ELSEWHERE)
 @pytest.mark.parametrize(
     "overlay",
     ["", "frames:\n  other: {parent: base_link}\n", "frames: {other: {parent: base_link}}"],
@@ -431,7 +430,7 @@ def test_what_another_node_publishes_cannot_be_moved() -> None:
         change_of(done.robot, done.sources[0], {"r.yaml": text}, "map", Pose((1, 0, 0)))
 
 
-@for_each(sorted(ROBOTS.glob("*.yaml")))
+@pytest.mark.parametrize("file", sorted(ROBOTS.glob("*.yaml")), ids=lambda file: file.stem)
 def test_every_mount_of_the_gallery_moves_or_says_why_not(file: Path) -> None:
     text = file.read_text("utf-8")
     done = compiled(text, file=f"robots/{file.name}")

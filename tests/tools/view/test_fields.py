@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import viser
 
-from tests.support.tables import for_each
 from tests.tools.view.test_view import PRESETS
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.rays import contains, directions, is_plane
@@ -50,7 +49,7 @@ def test_a_rim_bounds_what_each_preset_sees() -> None:
     assert count > 80
 
 
-@for_each([(0.2, 0.2), (5.0, 0.4)])
+@pytest.mark.parametrize(("requested", "drawn"), [(0.2, 0.2), (5.0, 0.4)])
 def test_a_cone_is_drawn_as_far_as_requested_and_no_farther_than_it_sees(
     requested: float, drawn: float
 ) -> None:

@@ -2,7 +2,8 @@
 
 import random
 
-from tests.support.tables import for_each
+import pytest
+
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.tools.view.frame_tree import FrameTree
@@ -61,14 +62,15 @@ def test_nothing_below_a_closed_frame_has_a_row() -> None:
     assert drawn(tree, {"odom": False, "arm": True}) == ["+odom"]
 
 
-@for_each(
+@pytest.mark.parametrize(
+    ("search", "rows"),
     [
         ("lid", ["-odom", "  -base_link", "    -mast", "      lidar"]),
         ("ARM", ["-odom", "  -base_link", "    -arm", "      Tool_Arm"]),
         ("arm  too", ["-odom", "  -base_link", "    -arm", "      Tool_Arm"]),
         ("wheel", []),
         ("  ", ["+odom"]),
-    ]
+    ],
 )
 def test_a_search_leaves_what_it_finds_and_all_above_open(search: str, rows: list[str]) -> None:
     assert drawn(tree_of(ARM), {"odom": False, "mast": False}, search) == rows
@@ -99,7 +101,7 @@ LOOPS: list[dict[str, str]] = [
 ]
 
 
-@for_each(LOOPS)
+@pytest.mark.parametrize("parents", LOOPS)
 def test_frames_of_a_loop_or_below_an_unknown_one_have_rows_too(parents: dict[str, str]) -> None:
     tree = tree_of(parents)
     rows = list(tree.rows(dict.fromkeys(tree.frames, True)))

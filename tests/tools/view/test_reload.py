@@ -7,7 +7,6 @@ import pytest
 import trimesh
 
 from tests.support.browser import TOKEN
-from tests.support.tables import for_each
 from tests.support.waiting import until
 from tfcompose.cli.parser import parser_of
 from tfcompose.cli.reading import read_text
@@ -102,7 +101,7 @@ def test_an_included_file_is_one_of_the_robots(shown: ReloadedPanel, tmp_path: P
     assert shown.panel.poses()["mast"].xyz == (0, 0, 3)
 
 
-@for_each(BROKEN)
+@pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_file_leaves_the_last_good_scene_and_is_found_wrong(
     name: str, shown: ReloadedPanel, tmp_path: Path
 ) -> None:

@@ -22,7 +22,6 @@ from websockets.typing import Origin, Subprotocol
 
 from tests.support import processes
 from tests.support.browser import TOKEN
-from tests.support.tables import for_each
 from tfcompose.cli.parser import parser_of
 from tfcompose.tools.view import command as view
 
@@ -70,7 +69,7 @@ def answer_of(port: int, path: str) -> tuple[int, bytes, str]:
             return answer.status, answer.read(), cookie
 
 
-@for_each(WRONG_TOKENS)
+@pytest.mark.parametrize("query", WRONG_TOKENS)
 def test_without_the_token_there_is_neither_page_nor_websocket(
     query: str, server: viser.ViserServer
 ) -> None:
@@ -95,8 +94,9 @@ def test_the_token_lets_in_and_then_the_cookie_does(server: viser.ViserServer) -
     assert is_refused(port, Cookie='x="; tfcompose_view')
 
 
-@for_each(
-    ["https://example.org", "http://127.0.0.1.example.org:{port}", "null", "http://127.0.0.1:1"]
+@pytest.mark.parametrize(
+    "origin",
+    ["https://example.org", "http://127.0.0.1.example.org:{port}", "null", "http://127.0.0.1:1"],
 )
 def test_a_page_of_another_site_or_port_is_refused_even_with_the_token(
     origin: str, server: viser.ViserServer
@@ -112,7 +112,9 @@ def test_a_path_that_is_no_name_of_a_file_is_not_found(server: viser.ViserServer
         assert status == http.HTTPStatus.NOT_FOUND
 
 
-@for_each([b"\xc1", b"", b"\x81\xa4type\xa4None", b"\x90", "text", b"\x00" * 10_000])
+@pytest.mark.parametrize(
+    "data", [b"\xc1", b"", b"\x81\xa4type\xa4None", b"\x90", "text", b"\x00" * 10_000]
+)
 def test_bytes_that_are_no_message_end_one_connection_without_a_traceback(
     data: bytes | str, server: viser.ViserServer, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -139,7 +141,7 @@ def running_view(file: Path, *options: str, stderr: IO[bytes] | None = None) -> 
         processes.end(running)
 
 
-@for_each(["127.0.0.1", "127.0.0.2", "localhost"])
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "localhost"])
 def test_the_command_prints_an_address_with_a_token_of_its_own(host: str, rover: Path) -> None:
     with running_view(rover, "--edit", "--host", host) as address:
         page, _, token = address.partition("?token=")

@@ -17,7 +17,6 @@ import viser
 from tests.support import processes
 from tests.support.browser import page_of
 from tests.support.cli import tfcompose_in
-from tests.support.tables import for_each
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.fixing import ChangedError, rewrite
 from tfcompose.cli.parser import parser_of
@@ -261,7 +260,7 @@ WRONG = {
 }
 
 
-@for_each(WRONG)
+@pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_robot_is_shown_and_its_mounts_move(
     name: str, tmp_path: Path, server: viser.ViserServer
 ) -> None:
@@ -456,13 +455,14 @@ def test_without_ros_nothing_is_served_live(rover: Path) -> None:
     assert "[TF901]" in done.stderr
 
 
-@for_each(
+@pytest.mark.parametrize(
+    "words",
     [
-        (["--at", "3"],),
-        (["--at", "0"],),
-        (["--html", "r.html", "--edit"],),
-        (["--tolerance", "2mm"],),
-    ]
+        ["--at", "3"],
+        ["--at", "0"],
+        ["--html", "r.html", "--edit"],
+        ["--tolerance", "2mm"],
+    ],
 )
 def test_an_option_without_what_it_is_for_is_refused(words: list[str], tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_bytes(ROVER.read_bytes())

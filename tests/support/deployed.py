@@ -41,7 +41,6 @@ PROBE: dict[str, Any] = {
     "env": {},
     "machine": "a",
     "lingers": True,
-    "zenoh": True,
     "base": "/home/pi/.local/share/tfcompose/x",
     "setup": [],
 }

@@ -6,6 +6,7 @@ One that is broken stops nothing.
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from typing import TYPE_CHECKING
@@ -95,7 +96,54 @@ def test_its_section_is_merged_like_every_other_and_adds_its_process(
     assert run("build", "-p", "loud", "-o", "built").returncode == 0
     plan = json.loads((tmp_path / "built/plan.json").read_text())
     (beeper,) = (process for process in plan["processes"] if process["name"] == "beeper")
-    assert (beeper["argv"], beeper["env"]) == (["sleep", "3"], {"LOUD": "very"})
+    assert (beeper["argv"], beeper["env"]) == (
+        ["${tfcompose}", "beep", "${plan}"],
+        {"LOUD": "very"},
+    )
+    assert plan["sections"] == {"acme": {"frame": "mast", "reach": 3}}
+
+
+#: Prints what keeps the plan's processes from being started, without starting one.
+PREFLIGHT = """
+import json, os
+from pathlib import Path
+from tfcompose.launcher.preflight import commands_of
+from tfcompose.model.plan.file import read_plan
+file = Path("built/plan.json")
+plan = read_plan(file.read_text(), str(file))
+environment = lambda base, ros, own: dict(base)
+_, found = commands_of(plan, plan.managed, file, os.environ, environment)
+print(json.dumps([f"{one.code}: {one.message}" for one in found]))
+"""
+
+
+def hindrances(path: str | Path, folder: Path, **environment: str) -> list[str]:
+    assert run_with(path, folder, "build", "-o", "built").returncode == 0
+    env = os.environ | {"PYTHONPATH": str(path)} | environment
+    done = processes.run([sys.executable, "-c", PREFLIGHT], cwd=folder, env=env, check=True)
+    found: list[str] = json.loads(done.stdout)
+    return found
+
+
+def test_its_process_reads_its_section_of_the_plan(run: Run, acme: Path, tmp_path: Path) -> None:
+    assert hindrances(acme, tmp_path) == []
+    done = run("beep", "built/plan.json")
+    assert (done.returncode, done.stdout) == (0, "beep on mast, heard 2 m away\n")
+
+
+def test_its_preflight_check_runs_before_anything_starts(acme: Path, tmp_path: Path) -> None:
+    write_robot(tmp_path, "acme: {frame: mast}")
+    assert hindrances(acme, tmp_path, ACME_MUTED="1") == ["ACME103: mast is muted by ACME_MUTED"]
+
+
+def test_a_preflight_check_that_crashes_is_a_bug_of_the_tool(tmp_path: Path) -> None:
+    key = "Key('bell', 'bell:Bell', 'a bell', in_plan=True)"
+    spec = "from tfcompose.spec.language.spec import Spec\nclass Bell(Spec): pass"
+    more = f"preflight='bell:no_such_function', keys=({key},)"
+    write_tool(tmp_path / "site", "bell", f"{spec}\n{TOOL}name='bell', package='bell', {more})")
+    write_robot(tmp_path, "bell: {}")
+    (found,) = hindrances(tmp_path / "site", tmp_path)
+    assert re.match("TF903: bell:no_such_function of bell crashed: AttributeError", found)
 
 
 def test_its_rule_finds_at_its_place_and_can_be_silenced_and_explained(

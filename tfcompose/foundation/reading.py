@@ -11,12 +11,8 @@ import errno
 import os
 import stat
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
 
 #: Of a file of text: robot, description, plan.
 MOST_BYTES = 16_000_000
@@ -94,19 +90,6 @@ def _bytes_of(descriptor: int, name: str, most: int) -> bytes | None:
         return stream.read(most)
 
 
-def read_plain_text(path: str | Path) -> str:
-    """Return the text of a file in UTF-8, its byte order mark left out.
-
-    Raises:
-        RejectedError: with one TF001 or TF008 finding, as ``read_bytes``, or if it is no text.
-    """
-    data = read_bytes(path)
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise no_text(str(path), data, error, "save it as UTF-8") from None
-
-
 def no_text(path: str, data: bytes, error: UnicodeDecodeError, advice: str) -> RejectedError:
     """Return the error that a file is not UTF-8, at the place of the first byte that is not."""
     before = data[: error.start]
@@ -133,14 +116,10 @@ def unreadable(path: str | Path, error: OSError | ValueError) -> RejectedError:
 def _files_next_to(name: str) -> str:
     folder = Path(name).parent
     ending = next((ending for ending in _ENDINGS if name.endswith(ending)), ".yaml")
-    there = [other for other in _names_if_any(folder) if other.endswith(ending)]
+    try:
+        there = [other for other in names_in(folder) if other.endswith(ending)]
+    except RejectedError:
+        there = []
     if not there:
         return f"there is no {ending} file in {folder}"
     return f"in {folder} there is {', '.join(there[:_MOST_NAMED])}"
-
-
-def _names_if_any(folder: Path) -> Collection[str]:
-    try:
-        return names_in(folder)
-    except RejectedError:
-        return ()

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from tfcompose.foundation.findings import Finding, Span
+
 #: The package with the table of the tools that ship, ``TOOLS``; the only name by which the core
 #: knows it.
 SHIPPED = "tfcompose.tools"
@@ -59,10 +61,13 @@ class Key(NamedTuple):
     ``model`` leads to a pydantic model based on ``tfcompose.spec.language.spec.Spec``. The hooks
     run only for robots whose file has the key:
 
-    - ``processes``: a function of a ``ToolSection``, returns processes that the robot starts;
+    - ``processes``: a function of a ``ToolSection``, returns processes that the robot starts; with
+      the ``argv`` ``(PROGRAM, COMMAND, …)`` one runs a command of the tool;
     - ``check``: a function of a ``ToolSection`` and the ``Robot``, returns findings; it may read
       files;
     - ``rules``: a module with rules, as ``tfcompose.compiler.check.rule.rule`` makes them.
+
+    With ``in_plan`` the section is in the plan: ``Plan.sections[name]`` is its model as JSON.
     """
 
     name: str
@@ -72,6 +77,7 @@ class Key(NamedTuple):
     processes: str = ""
     check: str = ""
     rules: str = ""
+    in_plan: bool = False
 
     def __hash__(self) -> int:
         """Return the hash of what identifies it: examples may be lists and mappings."""
@@ -107,6 +113,9 @@ class Tool(NamedTuple):
     ``package`` is the one in whose folder ``topics`` its topics and the pages of its commands are,
     ``codes`` the one in whose folder ``codes`` are the pages of its codes; empty: it has none.
     ``extra`` is the extra of tfcompose that installs what it needs, empty if it needs nothing.
+    ``preflight`` is a function of a ``Plan``, which returns findings before anything starts on a
+    machine, also when a robot is deployed to it. It runs for plans with a section of the tool, or
+    a process that runs a command of the tool, and gets the share of the machine.
     """
 
     name: str
@@ -118,6 +127,7 @@ class Tool(NamedTuple):
     languages: tuple[Language, ...] = ()
     options: tuple[Option, ...] = ()
     extra: str = ""
+    preflight: str = ""
 
     @property
     def topic_folder(self) -> Path:
@@ -254,15 +264,28 @@ def _wrong_codes(tool: Tool) -> Iterator[Problem]:
             yield Problem("TF922", message, advice)
 
 
+def run_hook(reference: str, owner: str, at: Span | None, *arguments: Any) -> list[Any] | Finding:
+    """Return what a tool's function yields; the finding TF903 where it crashes."""
+    try:
+        return list(load(reference)(*arguments))
+    except Exception as error:  # noqa: BLE001 (a tool's fault must not hide the others' findings)
+        from tfcompose.foundation.findings import finding  # which needs the codes of tools
+
+        return finding(
+            "TF903",
+            f"{reference} of {owner} crashed: {type(error).__name__}: {error}",
+            at,
+            help="this is a bug in the tool: please report it",
+        )
+
+
 def code_folders() -> Iterator[Path]:
     """Yield the folders with the codes of the tools that ship, then of the others.
 
     Those are looked up when reached.
     """
-    ships = shipped().tools
-    yield from filter(None, (tool.code_folder for tool in ships))
-    others = installed().tools[len(ships) :]
-    yield from filter(None, (tool.code_folder for tool in others))
+    for toolset in (shipped, installed):
+        yield from filter(None, (tool.code_folder for tool in toolset().tools))
 
 
 def absent(kind: str, name: str) -> str:

@@ -21,18 +21,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.tool import installed, run_hook
 from tfcompose.launcher.child import ChildCommand
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
 from tfcompose.launcher.kernel_settings import refused_settings
 from tfcompose.launcher.program import HERE, without_current_folder
 from tfcompose.model.plan import PROGRAM
 from tfcompose.model.plan.components import load_request
-from tfcompose.model.plan.fleet import missing_zenoh
 from tfcompose.model.variables import REMAPPED
 from tfcompose.tf.ros.environment import missing_composition
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.model.plan import Plan, PlanProcess, RosSettings
 
@@ -72,7 +72,7 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
     """
     folder = built_in or plan_file.absolute().parent
-    found = _never_started(plan)
+    found = [*_never_started(plan), *_found_by_tools(plan)]
     commands: dict[str, ChildCommand] = {}
     missing = []
     way = way_of(plan, base)
@@ -98,9 +98,8 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
         commands, wrong = by_partition(plan, commands, plan_file.absolute().parent)
         found += wrong
     elif way == "remap":
-        commands = {
-            name: _with_remapping_mark(plan, name, command) for name, command in commands.items()
-        }
+        guards = {process.name for process in processes if process.kind == "guard"}
+        commands |= {name: _marked(commands[name]) for name in guards & commands.keys()}
     if missing:
         found.append(not_found(missing))
     return commands, list(dict.fromkeys(found))
@@ -113,9 +112,6 @@ def _command_of(
     base: Mapping[str, str],
     environment: Environment,
 ) -> ChildCommand | NotFound | Finding:
-    trouble = missing_zenoh(process)
-    if trouble:
-        return trouble
     own = process.kind != "run"
     env = environment(base, ros, own=own) | own_env(process, *files)
     if process.argv[:1] == (PROGRAM,):
@@ -126,10 +122,9 @@ def _command_of(
     folder = folder_of(process, *files)
     if not own and not folder.is_dir():
         lost = f"the folder {folder} that {process.name} runs in does not exist"
-        optional = process.required is False
         return (
             ChildCommand(argv, env, folder, missing=lost)
-            if optional
+            if process.required is False
             else finding("TF810", lost, None)
         )
     command: ChildCommand | NotFound | Finding
@@ -149,19 +144,34 @@ def _command_of(
         )
     if isinstance(command, ChildCommand):
         command = replace(command, process=process)
-    if isinstance(command, ChildCommand) and process.prefix:
-        runner = executable_of(process, process.prefix[0], folder, env)
-        words = (runner, *process.prefix[1:], *command.argv) if isinstance(runner, str) else ()
-        command = replace(command, argv=words) if isinstance(runner, str) else runner
+        if process.prefix:
+            runner = executable_of(process, process.prefix[0], folder, env)
+            command = (
+                replace(command, argv=(runner, *process.prefix[1:], *command.argv))
+                if isinstance(runner, str)
+                else runner
+            )
     if isinstance(command, NotFound) and process.required is False:
         return ChildCommand(argv, env, folder, missing=not_found([command]).message)
     return command
 
 
-def _with_remapping_mark(plan: Plan, name: str, command: ChildCommand) -> ChildCommand:
-    if plan.process(name).kind != "guard":
-        return command
-    return replace(command, env=command.env | {REMAPPED: "1"})
+def _found_by_tools(plan: Plan) -> Iterator[Finding]:
+    """Yield what tools find in the plan that has a section, or runs a command, of theirs."""
+    commands = {
+        ("command", process.argv[1])
+        for process in plan.managed
+        if process.kind == "run" and process.argv[:1] == (PROGRAM,)
+    }
+    wanted = commands | {("key", name) for name in plan.sections}
+    for tool in installed().tools if wanted else ():
+        if tool.preflight and not wanted.isdisjoint(tool.names()):
+            found = run_hook(tool.preflight, tool.name, None, plan)
+            yield from [found] if isinstance(found, Finding) else found
+
+
+def _marked(guard: ChildCommand) -> ChildCommand:
+    return replace(guard, env=guard.env | {REMAPPED: "1"})
 
 
 def _never_started(plan: Plan) -> list[Finding]:
@@ -176,7 +186,7 @@ def _never_started(plan: Plan) -> list[Finding]:
                         "TF902", f"{process.name} waits for {name}, which is not in the plan", None
                     )
                 )
-            elif what not in _promises(known[name]):
+            elif what == "done" and known[name].kind != "run":
                 message = f"{process.name} waits until {name} is {what}, which never happens"
                 found.append(finding("TF902", message, None))
     waiting = {
@@ -203,10 +213,6 @@ def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]
         ]
     trouble = missing_composition()
     return [trouble] if trouble else []
-
-
-def _promises(process: PlanProcess) -> tuple[str, ...]:
-    return ("started", "ready", "done") if process.kind == "run" else ("started", "ready")
 
 
 # Programs.

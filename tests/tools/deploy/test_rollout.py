@@ -1,7 +1,6 @@
 """What a deployment decides, with hosts that answer as the test has them answer."""
 
 import asyncio
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,8 +18,6 @@ from tests.support.deployed import (
 from tests.support.findings import expect
 from tests.support.plans import compiled_plan
 from tfcompose.foundation.findings import Finding, RejectedError
-from tfcompose.model.plan import PlanProcess
-from tfcompose.model.plan.fleet import SHARE_COMMAND
 from tfcompose.tools.deploy.connection import LostError, RefusedError
 from tfcompose.tools.deploy.rollout import Rollout, target_of
 
@@ -158,19 +155,6 @@ def test_hosts_that_are_unfit_or_apart_are_found() -> None:
         "jetson",
     )
     assert not examined(StandInHost("main"), StandInHost("jetson", offset_s=0.05))
-
-
-def test_only_the_host_that_shares_with_the_fleet_needs_zenoh() -> None:
-    probes = {name: {"zenoh": False} for name in ("main", "jetson")}
-    rollout = rollout_to(StandInHost("main"), StandInHost("jetson"), probes=probes)
-    assert not asyncio.run(rollout.examine())
-    share = PlanProcess(
-        "fleet_share", "run", argv=(*SHARE_COMMAND, "r1", "fleet.yaml"), host="jetson"
-    )
-    plan = replace(rollout.target.plan, processes=(*rollout.target.plan.processes, share))
-    rollout.target = replace(rollout.target, plan=plan)
-    (found,) = asyncio.run(rollout.examine())
-    expect(found, "TF914", "jetson", "eclipse-zenoh", "fleet_share")
 
 
 def test_a_robot_that_was_started_by_hand_is_found() -> None:

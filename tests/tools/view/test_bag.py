@@ -12,6 +12,7 @@ import pytest
 from tests.support.bags import START_S, UP, Sent, write_bag
 from tests.support.browser import TOKEN
 from tests.support.cli import tfcompose_in
+from tests.support.scenes import body_pose
 from tests.tools.view.test_live import TEXT, TOLERANCE, robot_of
 from tests.tools.view.test_view import session_of
 from tfcompose.compiler.emit.plan import plan_of
@@ -123,7 +124,7 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         recorded = Recorded(str(bag), [GLOBAL])
         tree = BagTree(session.robot, plan_of(session.robot), recorded, TOLERANCE)
         shown = BagPanel(server, panel, tree, recorded.length_s)
-        assert panel.scene.body_pose("base_link").xyz == (
+        assert body_pose(panel.scene, "base_link").xyz == (
             0,
             0,
             0,
@@ -131,7 +132,7 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         shown.tree.fixed = "odom"
         for at_s in (8.0, 3.0):
             shown.slider.value = at_s
-            assert panel.scene.body_pose("base_link").xyz[0] == pytest.approx(at_s)
+            assert body_pose(panel.scene, "base_link").xyz[0] == pytest.approx(at_s)
         shown.fixed.value = "mast"
         later = Panel(server, session, edit=False, joints=False, choices=panel.choices)
         assert BagPanel(server, later, tree, recorded.length_s).fixed.value == "mast", (

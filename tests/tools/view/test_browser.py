@@ -11,6 +11,7 @@ from playwright.sync_api import Locator, Page
 
 from tests.support.browser import address_of, page_of
 from tests.support.cli import tfcompose_in
+from tests.support.scenes import body_pose
 from tests.support.waiting import until
 from tests.tools.view.test_view import ROVER, session_of
 from tfcompose.foundation.geometry import Pose, offset_of, quat_from_rpy
@@ -134,16 +135,16 @@ def test_a_slider_in_the_browser_moves_its_wheel_only(
 ) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     wheels = ("front_left_wheel_link", "front_right_wheel_link")
-    left, right = (panel.scene.body_pose(wheel) for wheel in wheels)
+    left, right = (body_pose(panel.scene, wheel) for wheel in wheels)
     with page_of(address_of(server)) as page:
         enter(page, "front_left_wheel_joint (deg)", "30")
         until(lambda: panel.positions["front_left_wheel_joint"] != 0)
     off = offset_of(
         left @ Pose(quat_xyzw=quat_from_rpy(0, 0, math.radians(30))),
-        panel.scene.body_pose("front_left_wheel_link"),
+        body_pose(panel.scene, "front_left_wheel_link"),
     )
     assert max(off.xyz_m, off.rot_rad) < 1e-6
-    assert panel.scene.body_pose("front_right_wheel_link") == right
+    assert body_pose(panel.scene, "front_right_wheel_link") == right
 
 
 def tick(page: Page, label: str) -> None:
@@ -324,6 +325,6 @@ def test_a_sweep_moves_every_joint_until_it_is_switched_off(
         until(lambda: all(abs(panel.positions[name] - joints[name]) > 0.5 for name in joints))
         tick(page, "sweep")
         until(lambda: not panel.is_sweeping)
-        wheel = panel.scene.body_pose("rear_left_wheel_link")
+        wheel = body_pose(panel.scene, "rear_left_wheel_link")
         page.wait_for_timeout(300)
-        assert panel.scene.body_pose("rear_left_wheel_link") == wheel
+        assert body_pose(panel.scene, "rear_left_wheel_link") == wheel

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from tests.support.browser import TOKEN
+from tests.support.scenes import is_owner_shown
 from tests.support.waiting import until
 from tfcompose.cli.parser import parser_of
 from tfcompose.cli.reading import read_text
@@ -87,8 +88,8 @@ def test_what_was_hidden_opened_and_chosen_outlives_reloads_where_it_still_exist
     assert shown.panel.choices.base == "mast"
     assert shown.panel.choices.search == "a"
     assert not shown.panel.tree.tree.is_open("arm", shown.panel.choices.is_open)
-    assert not shown.panel.scene.is_owner_shown("joints")
-    assert shown.panel.scene.is_owner_shown("static")
+    assert not is_owner_shown(shown.panel.scene, "joints")
+    assert is_owner_shown(shown.panel.scene, "static")
     (tmp_path / "more.yaml").write_text("{}\n", "utf-8")
     assert shown.reload()
     assert shown.panel.selected == "base_link"

@@ -17,6 +17,7 @@ import viser
 from tests.support import processes
 from tests.support.browser import page_of
 from tests.support.cli import tfcompose_in
+from tests.support.scenes import body_pose
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.fixing import ChangedError, rewrite
 from tfcompose.cli.parser import parser_of
@@ -157,13 +158,13 @@ def test_a_file_that_somebody_else_changed_is_not_overwritten(rover: Path) -> No
 
 def test_a_slider_moves_the_body_of_a_wheel(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
-    before = panel.scene.body_pose("front_left_wheel_link")
+    before = body_pose(panel.scene, "front_left_wheel_link")
     panel.set_joint("front_left_wheel_joint", math.radians(30))
     expected = before @ Pose(quat_xyzw=quat_from_rpy(0, 0, math.radians(30)))
-    off = offset_of(expected, panel.scene.body_pose("front_left_wheel_link"))
+    off = offset_of(expected, body_pose(panel.scene, "front_left_wheel_link"))
     assert off.xyz_m < 1e-6
     assert off.rot_rad < 1e-6
-    assert panel.scene.body_pose("front_right_wheel_link").xyz != before.xyz
+    assert body_pose(panel.scene, "front_right_wheel_link").xyz != before.xyz
 
 
 def test_a_mimic_joint_follows() -> None:

@@ -69,6 +69,11 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
         args=robot.args,
         environment=robot.environment,
         hosts={name: host.planned() for name, host in robot.hosts.items()},
+        sections={
+            name: section.planned
+            for name, section in robot.sections.items()
+            if section.planned is not None
+        },
     )
 
 

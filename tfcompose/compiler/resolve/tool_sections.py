@@ -8,9 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from pydantic_core import to_jsonable_python
+
 from tfcompose.compiler.resolve.processes import added, says_how
-from tfcompose.foundation.findings import Finding, finding
-from tfcompose.foundation.tool import load
+from tfcompose.foundation.findings import Finding
+from tfcompose.foundation.tool import run_hook
 from tfcompose.model.robot import Section
 from tfcompose.spec.language.tool_keys import keys_in
 
@@ -60,7 +62,12 @@ def sections_of(draft: Draft) -> list[ToolSection]:
 def as_sections(draft: Draft) -> dict[str, Section]:
     """Return the sections as rules find them in ``Robot.sections``."""
     return {
-        section.key.name: Section(section.key.name, section.value, section.spec.at)
+        section.key.name: Section(
+            section.key.name,
+            section.value,
+            section.spec.at,
+            planned=to_jsonable_python(section.value) if section.key.in_plan else None,
+        )
         for section in sections_of(draft)
     }
 
@@ -96,10 +103,8 @@ def _hook(section: ToolSection, reference: str, *more: Any) -> Finds[list[Any]]:
     """
     if not reference:
         return []
-    try:
-        return list(load(reference)(section, *more))
-    except Exception as error:  # noqa: BLE001 (a tool's fault must not hide the others' findings)
-        message = f"{reference} of {section.key.name} crashed: {type(error).__name__}: {error}"
-        advice = "this is a bug in the tool: please report it"
-        yield finding("TF903", message, section.at_key(), help=advice)
+    values = run_hook(reference, section.key.name, section.at_key(), section, *more)
+    if isinstance(values, Finding):
+        yield values
         return []
+    return values

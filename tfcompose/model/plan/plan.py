@@ -487,7 +487,8 @@ class Plan:
     ``external``. None is the whole plan, and empty the share of the machine that the plan does not
     name. ``args`` are the values of the robot file's arguments that it was built with,
     ``environment`` those of the variables that the file names. ``hosts`` are the computers that
-    processes may name; empty: the file does not say how they are reached.
+    processes may name; empty: the file does not say how they are reached. ``sections`` are
+    those of tools, by the names of their keys.
     """
 
     version: Literal[2] = field(default=VERSION, kw_only=True)
@@ -504,6 +505,7 @@ class Plan:
     args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
     environment: dict[str, str] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
     hosts: dict[str, PlanHost] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
+    sections: dict[str, Any] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
 
     def process(self, name: str) -> PlanProcess:
         """Return the process of that name.

@@ -116,12 +116,14 @@ class SourceNumbers:
 class Section:
     """A tool's section of the robot file.
 
-    What it says, as its model has it, and where that stands.
+    What it says, as its model has it, and where that stands. ``planned`` is the same as JSON, None
+    where the plan does not have it.
     """
 
     name: str
     value: Any
     place: Callable[[tuple[str | int, ...]], Span] = field(compare=False, repr=False)
+    planned: Any = None
 
     def at(self, *path: str | int) -> Span:
         """Return the place of a value in the section, or of the nearest around it."""

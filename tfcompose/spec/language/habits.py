@@ -80,7 +80,6 @@ _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
         ),
         ("publisher broadcaster published_by publish", (("owner", _OWNER),)),
         ("frequency hz fps", (("rate", "how often is rate: 50 Hz"),)),
-        ("tfcompose", (("shared_frames", "a fleet's file begins with fleet: 1"),)),
         (
             "color colour rgb rgba",
             (

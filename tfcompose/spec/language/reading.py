@@ -227,12 +227,13 @@ def _unknown_key(
 
     One that is there already, or is meant by two, is not proposed.
     """
-    name, known = str(path[-1]), list(fields_of(mapping_at(model, path[:-1])))
+    holder = mapping_at(model, path[:-1])
+    name, known = str(path[-1]), list(fields_of(holder))
     slip = _slip(model, path)
     around = data
     for step in path[:-1]:
         around = around[step]
-    usual = habit(name, known, around.get(path[-1]))
+    usual = habit(name, known, around.get(path[-1])) or getattr(holder, "HABITS", {}).get(name, "")
     if not slip and not usual and _is_a_section(model, path):
         message = f"{path[1]} is a section of its own, not one of {path[0]}"
         return Refusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)

@@ -1,8 +1,8 @@
 """Recognition of this language's files by their text, before anything in it is repeated to people.
 
-A robot file names others: what it includes, its parts, its fleet. Named by a stranger these can be
-a file of passwords, and findings about it would print it. So nothing of a text is repeated unless
-half of the keys at the begin of its lines are keys of this language.
+A robot file names others: what it includes, its parts, what its tools read. Named by a stranger
+these can be a file of passwords, and findings about it would print it. So nothing of a text is
+repeated unless half of the keys at the begin of its lines are keys of this language.
 """
 
 from __future__ import annotations
@@ -25,8 +25,13 @@ if TYPE_CHECKING:
 
 #: A key at the begin of a line, or the first one of a mapping in braces.
 _KEY = re.compile(r"""^(?:\{\s*)?["']?([A-Za-z_][\w-]*)["']?\s*:(?=[\s{\[]|$)""", re.MULTILINE)
-#: What only files of this language say, wherever it stands.
-_SURE = re.compile(r"""^\s*\{?\s*["']?(?:tfcompose|preset|fleet)["']?\s*:\s*\d""", re.MULTILINE)
+#: Versions of the core's language and of tools', which only their files say, wherever that is.
+_SURE = re.compile(
+    r"""^\s*\{?\s*["']?(?:"""
+    + "|".join(("tfcompose", "preset", *shipped().languages()))
+    + r""")["']?\s*:\s*\d""",
+    re.MULTILINE,
+)
 #: Text that says nothing: blank lines, comments, an empty mapping.
 _NOTHING = re.compile(r"(?:\s|#[^\n]*(?:\n|\Z)|---|\{\s*\})*")
 
@@ -35,12 +40,11 @@ _NOTHING = re.compile(r"(?:\s|#[^\n]*(?:\n|\Z)|---|\{\s*\})*")
 def _keys() -> frozenset[str]:
     """Return the keys at the top of robot files and presets."""
     models = (RobotSpec, PresetSpec, NodePresetSpec)
-    keys = frozenset(name for model in models for name in model.model_fields)
-    return keys | shipped().keys().keys()
+    return frozenset().union(*(model.model_fields for model in models), shipped().keys())
 
 
 def is_recognized(text: str, keys: Collection[str] = ()) -> bool:
-    """Return whether a text is that of a robot file, a preset or a fleet, however broken.
+    """Return whether a text is that of a robot file, a preset or a tool's file, however broken.
 
     ``keys`` are others.
     """

@@ -49,7 +49,6 @@ _PROBE = """
 import os, sys
 sys.path.sort(key=["", os.getcwd()].__contains__)
 import json
-from importlib.util import find_spec
 try:
     from tfcompose import __version__ as version
 except ImportError:
@@ -57,8 +56,7 @@ except ImportError:
 names = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE",
          "ROS_LOCALHOST_ONLY", "ROS_DISTRO")
 env = {name: os.environ[name] for name in names if os.environ.get(name)}
-print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env,
-                  "zenoh": find_spec("zenoh") is not None}))
+print(json.dumps({"tfcompose": version, "executable": sys.executable, "env": env}))
 """
 
 
@@ -109,7 +107,6 @@ class Agent:
         found: dict[str, Any] = {
             "tfcompose": None,
             "executable": sys.executable,
-            "zenoh": False,
             "env": {},
         }
         found["problems"] = []

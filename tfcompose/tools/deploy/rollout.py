@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.foundation.text import counted, duration, listed
 from tfcompose.model.plan.file import read_plan
-from tfcompose.model.plan.fleet import INSTALL, is_fleet_share
 from tfcompose.model.plan.hosts import hosts_of, share_of, without_computer
 from tfcompose.tools.deploy.agent import UNIT
 from tfcompose.tools.deploy.connection import Host, LostError, RefusedError, connected, settings_of
@@ -158,14 +157,6 @@ class Rollout:
             yield finding(
                 "TF914", f"{name} has no tfcompose for {probe['executable']}", at, help=advice
             )
-        elif not probe["zenoh"] and not probe["problems"] and not share.unit.has_wheels:
-            for process in self.target.plan.managed:
-                if process.host == name and is_fleet_share(process):
-                    message = (
-                        f"{name} has no eclipse-zenoh for {probe['executable']}, and"
-                        f" {process.name} needs it"
-                    )
-                    yield finding("TF914", message, at, help=f"there: {INSTALL}")
 
     async def compare(self, release: Release) -> None:
         """Learn what each host has, and what it would have with this release."""

@@ -109,10 +109,10 @@ def refuse_without_zenoh() -> None:
         SystemExit: after saying so.
     """
     from tfcompose.foundation.findings import finding
+    from tfcompose.tools.fleet.preflight import INSTALL
 
     if find_spec("zenoh") is None:
-        help_ = "pip install 'tfcompose[fleet]'"
-        reject([finding("TF920", "eclipse-zenoh is not installed", None, help=help_)])
+        reject([finding("TF920", "eclipse-zenoh is not installed", None, help=INSTALL)])
 
 
 def _read(file: str) -> tuple[FleetSpec | None, list[Finding]]:

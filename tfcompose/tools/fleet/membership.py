@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.foundation.text import listed
-from tfcompose.model.plan.fleet import SHARE_COMMAND
 from tfcompose.model.robot import Process
 from tfcompose.spec.language.recognition import load_named
 from tfcompose.spec.load import path_named
 from tfcompose.tools.fleet.check import check_fleet
+from tfcompose.tools.fleet.preflight import SHARE_COMMAND
 from tfcompose.tools.fleet.spec import FleetSpec, validate_fleet
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ Robots, their Zenoh routers, and which edges leave them.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator
 
@@ -98,6 +98,8 @@ class FleetRobot(Spec):
 
 class FleetSpec(Spec):
     """A fleet."""
+
+    HABITS: ClassVar[dict[str, str]] = {"tfcompose": "a fleet's file begins with fleet: 1"}
 
     fleet: Literal[1] = key(..., "the version of this language", 1)
     name: Name = key("fleet", "its name; fleets of different names do not mix", "warehouse")

@@ -29,4 +29,5 @@ TOOL = Tool(
         Language("fleet", "tfcompose.tools.fleet.spec:FleetSpec", "The language of fleet files"),
     ),
     extra="fleet",
+    preflight="tfcompose.tools.fleet.preflight:missing_zenoh",
 )

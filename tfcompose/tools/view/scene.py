@@ -289,10 +289,6 @@ class RobotScene:
         """Show or hide the edges of an owner."""
         self._lines[owner].visible = visible
 
-    def is_owner_shown(self, owner: str) -> bool:
-        """Return whether the scene shows the edges of an owner."""
-        return bool(self._lines[owner].visible)
-
     def bounds(self, frame: str) -> tuple[Vector, Vector]:
         """Return the bounds of a frame's shown body, in the frame, in metres."""
         columns = list(zip(*self._corners[frame], strict=True))
@@ -302,12 +298,6 @@ class RobotScene:
     def is_shown(self, frame: str) -> bool:
         """Return whether the scene shows the body of a frame."""
         return bool(self._bodies[frame].visible)
-
-    def body_pose(self, frame: str) -> Pose:
-        """Return where the scene has the body of a frame."""
-        w, x, y, z = (float(value) for value in self._bodies[frame].wxyz)
-        px, py, pz = (float(value) for value in self._bodies[frame].position)
-        return Pose((px, py, pz), (x, y, z, w))
 
 
 class Ghosts:

@@ -1,4 +1,4 @@
-"""The section acme of a robot file, the process that it adds, and a file of beepers."""
+"""The section acme of a robot file, what it adds to the plan, and a file of beepers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.units import Size
+from tfcompose.model.plan import PROGRAM
 from tfcompose.model.robot import Process, Robot
 from tfcompose.spec.language.spec import Spec, key
 from tfcompose.spec.language.values import Text
@@ -29,7 +30,7 @@ def beeper(section: ToolSection) -> Iterator[Process]:
         "beeper",
         "run",
         at=section.at_key(),
-        argv=("sleep", f"{section.value.reach:g}"),
+        argv=(PROGRAM, "beep", "${plan}"),
         required=False,
     )
 

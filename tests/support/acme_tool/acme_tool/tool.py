@@ -5,7 +5,10 @@ from tfcompose.foundation.tool import Command, Key, Language, Option, Tool, Topi
 TOOL = Tool(
     name="acme",
     package="acme_tool",
-    commands=(Command("acme", "List the frames that hear a robot's beeper", "acme_tool.command"),),
+    commands=(
+        Command("acme", "List the frames that hear a robot's beeper", "acme_tool.command"),
+        Command("beep", "Beep as the robot's plan says", "acme_tool.beep"),
+    ),
     codes="acme_tool",
     topics=(Topic("acme", "beepers, and who hears them"),),
     keys=(
@@ -17,8 +20,10 @@ TOOL = Tool(
             processes="acme_tool.spec:beeper",
             check="acme_tool.spec:far_beeper",
             rules="acme_tool.rules",
+            in_plan=True,
         ),
     ),
     languages=(Language("beepers", "acme_tool.spec:BeepersSpec", "The language of beepers"),),
+    preflight="acme_tool.preflight:muted",
     options=(Option(("tree",), ("--beeper",), "acme_tool.option"),),
 )

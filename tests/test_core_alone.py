@@ -13,6 +13,7 @@ import pytest
 from tests.support.core import copy_core, run_with
 from tests.support.house import ROOT
 from tests.support.names import FILE, names
+from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tool import shipped
 
 if TYPE_CHECKING:
@@ -75,14 +76,38 @@ def test_a_command_of_an_absent_tool_says_what_installs_it(
         assert f"pip install '{install}'" in done.stderr
 
 
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ("help", "fleet"),
+        ("help", "fleet.robot"),
+        ("help", "deploy"),
+        ("explain", "TF881"),
+        ("explain", "tf881"),
+        ("explain", CATALOGUE["TF881"].name),
+        ("lint", "--select", "TF881"),
+    ],
+    ids=" ".join,
+)
+def test_a_topic_and_a_code_of_an_absent_tool_say_what_installs_it(
+    argv: tuple[str, ...], core: Path, tmp_path: Path
+) -> None:
+    done = run_with(core, tmp_path, *argv)
+    tool = "deploy" if "deploy" in argv else "fleet"
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"belongs to the tool {tool}" in done.stderr
+    assert f"pip install 'tfcompose[{tool}]'" in done.stderr
+
+
 def test_an_option_and_a_key_of_an_absent_tool_say_what_installs_it(
     core: Path, tmp_path: Path
 ) -> None:
     done = run_with(core, tmp_path, "ps", "--all-hosts")
     assert (done.returncode, "tfcompose[deploy]" in done.stderr) == (2, True)
     (tmp_path / "robot.yaml").write_text(
-        "tfcompose: 1\nrobot: r\nframes: {base_link: {}}\nfleet: fleet.yaml\n"
+        "tfcompose: 1\nrobot: r\nframes: {base_link: {}} # tfcompose: allow TF887 because x\n"
+        "fleet: fleet.yaml\nrules: {TF881: off}\n"
     )
     done = run_with(core, tmp_path, "lint")
     assert "robot.yaml:4:1: error[TF101] unknown key fleet" in done.stdout
-    assert "tfcompose[fleet]" in done.stdout
+    assert done.stdout.count("tfcompose[fleet]") == 3

@@ -16,6 +16,7 @@ from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.documentation import TOPICS
 from tfcompose.cli.parser import COMMANDS
 from tfcompose.cli.schemas import LANGUAGES
+from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tool import shipped
 from tfcompose.spec.language.robot import RobotSpec
 
@@ -39,6 +40,7 @@ def names() -> str:
         kinds: dict[str, list[str]] = {}
         for kind, name in tool.names():
             kinds.setdefault(kind, []).append(name)
+        kinds["rule"] = [CATALOGUE[code].name for code in tool.code_names()]
         install = f"tfcompose[{tool.extra}]" if tool.extra else "tfcompose"
         rows[tool.name] = {"install": install, "names": kinds}
     return json.dumps(rows, indent=1) + "\n"

@@ -252,7 +252,7 @@ def _unknown(command: str) -> int:
     from tfcompose.foundation.tool import absent
 
     tool_commands.report_problems()
-    if missing := absent("command", command):
+    if missing := absent(command, "command"):
         sys.stderr.write(f"tfcompose: {missing}\n")
         return UNREADABLE
     near = difflib.get_close_matches(command, all_commands(), 1, cutoff=0.7)

@@ -148,7 +148,7 @@ def _refuse_absent(parser: Parser, argv: Sequence[str]) -> None:
     if not parser.lacks_option(argv):
         return
     for argument in argv:
-        if missing := absent("option", argument.partition("=")[0]):
+        if missing := absent(argument.partition("=")[0], "option"):
             fail(missing, UNREADABLE)
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
-from tfcompose.foundation.tool import code_folders
+from tfcompose.foundation.tool import absent, code_folders
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -227,6 +227,11 @@ def code_of(word: str) -> str | None:
     if upper in CATALOGUE:
         return upper
     return next((code.code for code in CATALOGUE.values() if code.name == word), None)
+
+
+def absent_code(word: str) -> str:
+    """Return what installs the tool that has a code, by that or by its name; empty if none has."""
+    return absent(word.upper(), "code") or absent(word, "rule")
 
 
 def similar_words(word: str) -> list[str]:

@@ -288,12 +288,13 @@ def code_folders() -> Iterator[Path]:
         yield from filter(None, (tool.code_folder for tool in toolset().tools))
 
 
-def absent(kind: str, name: str) -> str:
-    """Return what installs the tool that ships and has this command, key or option.
+def absent(name: str, *kinds: str) -> str:
+    """Return what installs the tool that ships and has this name, of one of these kinds.
 
     Empty if none has.
     """
-    tool, extra = _reserved().get((kind, name), ("", ""))
+    entries = (_reserved().get((kind, name)) for kind in kinds)
+    tool, extra = next(filter(None, entries), ("", ""))
     if not extra or any(other.name == tool for other in shipped().tools):
         return ""
     return f"{name} belongs to the tool {tool}, which is not installed: pip install '{extra}'"

@@ -68,13 +68,13 @@ def _explain_frames(file: str, a: str, b: str, arguments: Namespace) -> None:
 
 
 def _explain_code(word: str) -> None:
-    from tfcompose.foundation.catalogue import CATALOGUE, code_of, similar_words
+    from tfcompose.foundation.catalogue import CATALOGUE, absent_code, code_of, similar_words
     from tfcompose.foundation.findings import did_you_mean
 
     code = code_of(word)
     if code is None:
         advice = did_you_mean(word, similar_words(word), "lint prints codes: TF301")
-        fail(f"no code {word}; {advice}", UNREADABLE)
+        fail(absent_code(word) or f"no code {word}; {advice}", UNREADABLE)
     sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{CATALOGUE.page(code)}\n")
 
 

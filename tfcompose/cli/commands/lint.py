@@ -122,14 +122,14 @@ def codes(text: str) -> list[str]:
     Raises:
         ArgumentTypeError: if there is no such code, or none that may be silenced.
     """
-    from tfcompose.foundation.catalogue import CATALOGUE
+    from tfcompose.foundation.catalogue import CATALOGUE, absent_code
 
     beginnings = [one.strip() for one in text.split(",")]
     for one in beginnings:
         named = [CATALOGUE[code] for code in CATALOGUE if one and code.startswith(one)]
         if not named:
             raise ArgumentTypeError(
-                f"there is no code {one}; tfcompose explain --table lists them"
+                absent_code(one) or f"there is no code {one}; tfcompose explain --table lists them"
             )
         if not any(code.can_be_allowed for code in named):
             raise ArgumentTypeError(

@@ -50,13 +50,15 @@ def run(arguments: Namespace) -> int:
         return 0
     text = page(arguments.word, commands)
     if text is None:
+        from tfcompose.foundation.tool import absent
         from tfcompose.spec.language.reference import keys
 
         known = [*topics(), *commands, *keys()]
         advice = did_you_mean(
             arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(topics())}"
         )
-        fail(f"no topic, command or key {arguments.word}; {advice}", UNREADABLE)
+        missing = absent(arguments.word.partition(".")[0], "command", "topic", "key", "language")
+        fail(missing or f"no topic, command or key {arguments.word}; {advice}", UNREADABLE)
     columns = table_width(sys.stdout)
     pydoc.pager(text if columns is None else for_terminal(text, columns))
     return 0

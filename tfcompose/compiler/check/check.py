@@ -26,7 +26,13 @@ from tfcompose.compiler.check import (
     tree,
 )
 from tfcompose.compiler.check.rule import Rule
-from tfcompose.foundation.catalogue import CATALOGUE, can_be_allowed, code_of, similar_words
+from tfcompose.foundation.catalogue import (
+    CATALOGUE,
+    absent_code,
+    can_be_allowed,
+    code_of,
+    similar_words,
+)
 from tfcompose.foundation.findings import Allow, Finding, Note, Span, did_you_mean, finding
 from tfcompose.foundation.tool import load
 from tfcompose.spec.language.tool_keys import keys_in
@@ -191,7 +197,7 @@ def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     for word, at in rules.items():
         code = code_of(word)
         if code is None:
-            advice = did_you_mean(
+            advice = absent_code(word) or did_you_mean(
                 word, similar_words(word), "write a code that lint prints, such as TF401"
             )
             found.append(finding("TF017", f"unknown code {word} under rules", at, help=advice))
@@ -236,11 +242,9 @@ def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
             elif (allow, code) not in used:
                 message = f"unused allow {code}: there is no {CATALOGUE[code].name} here"
             if message:
-                advice = (
-                    did_you_mean(code, CATALOGUE, "remove it")
-                    if code not in CATALOGUE
-                    else "remove it"
-                )
+                advice = "remove it"
+                if code not in CATALOGUE:
+                    advice = absent_code(code) or did_you_mean(code, CATALOGUE, advice)
                 found.append(finding("TF012", message, allow.at, help=advice))
         if allow.codes and not allow.reason:
             message = f"allow {', '.join(allow.codes)} without a reason"

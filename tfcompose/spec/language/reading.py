@@ -239,7 +239,7 @@ def _unknown_key(
         return Refusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
     is_safe = slip not in around and meant[path[:-1], slip] == 1 and not usual
     advice = (
-        (absent("key", name) if len(path) == 1 else "")
+        (absent(name, "key") if len(path) == 1 else "")
         or usual
         or (f"did you mean {slip}?" if slip else "")
         or _indented_too_little(path, around, known)

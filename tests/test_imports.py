@@ -86,7 +86,7 @@ ONLY_IN: dict[str, set[str]] = {
     "diagnostic_msgs": {"guard"},
     "rosidl_generator_py": {"tf.ros"},
     "rosidl_parser": {"tf.ros"},
-    "ament_index_python": {"tf.ros"},
+    "ament_index_python": {"tf.ros", "tools.importers"},
 }
 
 

@@ -139,14 +139,14 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
     "foundation": 1_714,
-    "model": 2_108,
+    "model": 2_091,
     "spec": 4_753,
-    "compiler": 9_275,
+    "compiler": 9_184,
     "tf": 5_264,
     "guard": 4_041,
     "launcher": 3_804,
-    "cli": 5_318,
-    "tools": 11_188,
+    "cli": 5_303,
+    "tools": 11_006,
 }
 
 

@@ -1,6 +1,7 @@
 """Importing what starts a robot, and compiling what import writes."""
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,10 @@ from tfcompose.model.robot import AsInFile, Robot
 from tfcompose.spec.language import Given, GivenArg
 from tfcompose.spec.load import load
 
+#: ROS's own launch reads launch files, and comes with a distribution only.
+needs_launch = pytest.mark.skipif(
+    find_spec("launch_ros") is None, reason="launch is not installed"
+)
 #: What a build writes of the parameters of a process.
 _PARAMETER_FILE = re.compile(r"/[^ ]*/params/\w+\.yaml")
 

@@ -203,9 +203,9 @@ def script(data: bytes, folder: Path) -> None:
 
 
 def launch_file(data: bytes, folder: Path) -> None:
-    """A launch file in XML."""
-    (folder / "robot.launch.xml").write_bytes(data)
-    _run(["import", "robot.launch.xml"], folder)
+    """A launch file of ROS 1, which needs no launch."""
+    (folder / "robot.launch").write_bytes(data)
+    _run(["import", "robot.launch"], folder)
 
 
 def arguments(data: bytes, folder: Path) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable
 
 from _pytest.reports import BaseReport
 
+_LAUNCH = "launch comes with a distribution only, and reads launch files"
 #: The beginning of a test's id, and why nothing is lost.
 NEEDS_STOCK_ROS = {
     "tests/tf/tf2/test_tf2_oracle.py": (
@@ -21,9 +22,10 @@ NEEDS_STOCK_ROS = {
     "test_the_containers_of_rclcpp_components_load_a_component": (
         "stock containers come with a distribution only; a stand-in loads components"
     ),
-    "tests/tools/importers/test_real_launch.py": (
-        "launch comes with a distribution only; test_launch.py claims the same of the stand-in"
-    ),
+    "tests/tools/importers/test_real_launch.py": _LAUNCH,
+    "tests/tools/importers/test_launch.py": _LAUNCH,
+    "tests/tools/importers/test_confined_launch.py": _LAUNCH,
+    "tests/tools/importers/test_exported.py": _LAUNCH,
 }
 ACCEPTED = NEEDS_STOCK_ROS | {
     "tests/launcher/test_components_ros.py": "the services are built with a C compiler",

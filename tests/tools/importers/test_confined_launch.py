@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.support.bringups import import_of, places, printed_errors
+from tests.support.bringups import import_of, needs_launch, places, printed_errors
 from tfcompose.cli import main
 from tfcompose.tools.importers import launch
 
@@ -24,8 +24,7 @@ def generate_launch_description():
 
 
 @pytest.fixture(autouse=True)
-def _stand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(launch, "has_launch", lambda: False)
+def _in_a_tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "secret.yaml").write_text(HIDDEN, "utf-8")
     (tmp_path / "tree").mkdir()
     monkeypatch.chdir(tmp_path / "tree")
@@ -53,6 +52,7 @@ except OSError as error:
 """
 
 
+@needs_launch
 @pytest.mark.parametrize(
     "call",
     [
@@ -91,6 +91,7 @@ for file in ("/etc/passwd", "../secret.yaml", "/proc/self/environ", os.path.expa
 """
 
 
+@needs_launch
 @pytest.mark.skipif(
     platform.machine() not in {"x86_64", "aarch64"}, reason="the kernel confines on these two"
 )
@@ -98,6 +99,7 @@ def test_the_kernel_opens_nothing_outside() -> None:
     assert set(map(tuple, made_by(NATIVE).values())) == {(-1, 13)}
 
 
+@needs_launch
 def test_environment_modules_and_neighbours_are_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,6 +117,7 @@ made = [os.environ["SETTING"], text, sorted(os.listdir(folder)), os.path.exists(
     assert made == ["set", "kept", ["config", "package.xml"], True]
 
 
+@needs_launch
 def test_a_folder_for_compiled_files_is_no_finding(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -124,6 +127,7 @@ def test_a_folder_for_compiled_files_is_no_finding(
     assert "may not read" not in printed_errors(capsys)
 
 
+@needs_launch
 def test_a_launch_file_that_lies_outside_is_not_included(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -140,6 +144,7 @@ def test_a_launch_file_that_lies_outside_is_not_included(
     assert set(data["processes"]) == {"away", "b"}
 
 
+@needs_launch
 def test_parameters_of_a_file_outside_are_not_read(tmp_path: Path) -> None:
     write("/hidden_node: {ros__parameters: {a: 1}}\n", str(tmp_path / "far/a.yaml"))
     write("/seen_node: {ros__parameters: {a: 1}}\n", "b.yaml")
@@ -152,6 +157,7 @@ def test_parameters_of_a_file_outside_are_not_read(tmp_path: Path) -> None:
     assert "hidden_node" not in data["processes"]
 
 
+@needs_launch
 @pytest.mark.parametrize("file", ["/dev/zero", "pipe"])
 def test_a_parameter_file_that_has_no_end_is_not_waited_for(file: str) -> None:
     os.mkfifo("pipe")
@@ -167,6 +173,7 @@ if c.__name__ == '_wrap_close'][0].__init__.__globals__['system']('touch made'))
 """
 
 
+@needs_launch
 @pytest.mark.parametrize(
     "text",
     [
@@ -193,6 +200,7 @@ def test_a_launch_file_does_not_get_out_through_a_xacro_file(
     assert not Path("made").exists()
 
 
+@needs_launch
 def test_what_it_prints_is_shown_without_control_characters(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -207,11 +215,13 @@ def test_what_it_prints_is_shown_without_control_characters(
     ]
 
 
+@needs_launch
 def test_a_flood_of_output_is_bounded(capsys: pytest.CaptureFixture[str]) -> None:
     made_by('made = 1\nfor _ in range(10_000):\n    print("x" * 1000)')
     assert 1_000_000 < len(capsys.readouterr().err) < 1_200_000
 
 
+@needs_launch
 def test_with_trust_it_reads_what_its_user_reads() -> None:
     made = made_by(READ.format(call="open('../secret.yaml').read()"), "--trust")
     assert made == {"text": HIDDEN}
@@ -292,16 +302,14 @@ HOSTILE: dict[str, Any] = {
         _record(
             package="robot_state_publisher",
             executable="robot_state_publisher",
-            params=[{"robot_description": '\x02{"file": "../secret.urdf", "args": {}}\x03'}],
+            params=[{"robot_description": {"parts": [{"file": "../secret.urdf", "args": {}}]}}],
         )
     ),
-    "a mark that is none": _answer(
-        _record(
-            package="robot_state_publisher",
-            executable="robot_state_publisher",
-            params=[{"robot_description": '\x02{"file": 7}\x03'}],
-            argv=["\x02[]\x03", "\x02{\x03"],
-        )
+    "a text of parts that are none": _answer(_record(argv=[{"parts": [{"file": 7}]}])),
+    "a text of no parts": _answer(_record(argv=[{"parts": []}, {"parts": [""]}])),
+    "a text without parts": _answer(_record(argv=[{"text": "a"}])),
+    "an argument that is not declared": _answer(
+        _record(argv=[{"parts": [{"argument": "}${a\nlinks: {evil: {}}", "value": "b"}]}])
     ),
 }
 
@@ -311,6 +319,7 @@ def test_a_process_that_was_taken_over_shows_no_other_file(
     line: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(launch, "PROCESS", "tests.support.hostile_child")
+    monkeypatch.setattr(launch, "has_launch", lambda: True)
     robot = f"<robot name='r'><link name='{HIDDEN}'/></robot>\n"
     Path("../secret.urdf").write_text(robot, "utf-8")
     program = f"HIDDEN = '{HIDDEN}'\ndef generate_launch_description():\n    pass\n"

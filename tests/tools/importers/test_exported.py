@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
-from tests.support.bringups import compiled, exported, import_of, started_with
+from tests.support.bringups import compiled, exported, import_of, needs_launch, started_with
 from tfcompose.foundation.geometry import angle_between
 from tfcompose.model.robot import Robot
 
+pytestmark = needs_launch
 #: All but the fleet: its export starts tfcompose's own publishers, whose edges stand in the plan
 #: alone.
 ROBOTS = sorted(

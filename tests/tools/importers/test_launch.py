@@ -1,6 +1,5 @@
-"""Launch files in Python, XML and YAML, imported."""
+"""Launch files of ROS 2 in Python, XML and YAML, imported: read by ROS's own launch."""
 
-import io
 import os
 import platform
 import random
@@ -14,14 +13,18 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.support.bringups import compiled, import_of, places, printed_errors, started_with
+from tests.support.bringups import (
+    compiled,
+    import_of,
+    needs_launch,
+    places,
+    printed_errors,
+    started_with,
+)
 from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
 from tfcompose.foundation import confined
 from tfcompose.spec.load import load
-from tfcompose.tools.importers import launch
-from tfcompose.tools.importers import launch_actions as actions
-from tfcompose.tools.importers.launch_substitutions import Context
 
 PYTHON = """
 import os
@@ -67,7 +70,7 @@ def generate_launch_description():
                  }],
                  remappings=[("odom", "odometry")], ros_arguments=["--log-level", "debug"]),
         ]),
-        LifecycleNode(package="map", executable="server", name="map_server", namespace="", autostart=True),
+        LifecycleNode(package="map", executable="server", name="map_server", namespace=""),
         calibrate,
         RegisterEventHandler(OnProcessExit(target_action=calibrate, on_exit=[
             Node(package="slam", executable="slam", name="mapper")])),
@@ -82,12 +85,12 @@ def generate_launch_description():
 """  # noqa: E501 (a text as its reader has it)
 
 
+pytestmark = needs_launch
+
+
 @pytest.fixture(autouse=True)
 def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiling, "library", lambda: PRESETS)
-    monkeypatch.setattr(
-        launch, "has_launch", lambda: False
-    )  # test_real_launch claims the same of ROS's own
 
 
 @pytest.fixture
@@ -152,7 +155,6 @@ def test_each_action_of_a_python_launch_file_has_its_entry(
         "always",
         "debug",
     )
-    assert processes["map_server"]["lifecycle"] == "active"
     assert processes["mapper"]["after"] == {"calibrate": "done"}
     (gate,) = processes["late"]["after"]
     assert processes[gate]["ready"] == {"time": "5 s"}
@@ -315,7 +317,8 @@ def test_a_description_of_an_installed_package_is_addressed_by_its_package(
     (share / "rover_description/urdf/rover.xacro").write_text(
         '<robot name="rover"><link name="base_link"/></robot>', encoding="utf-8"
     )
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(share.parent))
+    prefixes = f"{share.parent}:{os.environ.get('AMENT_PREFIX_PATH', '')}"
+    monkeypatch.setenv("AMENT_PREFIX_PATH", prefixes)
     _, data = import_of(source(tmp_path, "a.launch.xml", INSTALLED))
     assert data["parts"]["rover"]["xacro"] == "package://rover_description/urdf/rover.xacro"
 
@@ -444,7 +447,6 @@ XML = """<launch>
   <executable cmd="echo $(env NO_SUCH_NAME 'a b') 'c d'" name="words"/>
   <timer period="2.0"><node pkg="late" exec="late" name="late"/></timer>
   <include file="$(dirname)/more.launch.xml"><arg name="name" value="rear"/></include>
-  <bogus/>
 </launch>
 """
 YAML = """launch:
@@ -463,7 +465,7 @@ YAML = """launch:
       name: drive
       if: "$(eval '1 < 2')"
       launch-prefix: gdb -ex run
-      respawn: true
+      respawn: "true"
       respawn_delay: 3.0
       param:
       - {name: rate, value: 20}
@@ -475,7 +477,6 @@ YAML = """launch:
 - executable: {cmd: "echo $(env NO_SUCH_NAME 'a b') 'c d'", name: words}
 - timer: {period: 2.0, children: [{node: {pkg: late, exec: late, name: late}}]}
 - include: {file: $(dirname)/more.launch.xml, arg: [{name: name, value: rear}]}
-- bogus: {}
 """
 MORE = '<launch><arg name="name"/><node pkg="scan" exec="scan" name="$(var name)_scan"/></launch>'
 
@@ -488,7 +489,6 @@ def test_xml_and_yaml_say_the_same(
     text: str,
     package: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(package)
     source(package, "more.launch.xml", MORE)
@@ -517,9 +517,6 @@ def test_xml_and_yaml_say_the_same(
     assert processes["words"]["run"] == ["echo", "a b", "c d"]
     (gate,) = processes["late"]["after"]
     assert processes[gate]["ready"] == {"time": "2 s"}
-    lines = text.splitlines()
-    wanted = [number for number, line in enumerate(lines, start=1) if "bogus" in line]
-    assert f"{name}:{wanted[0]}" in places(printed_errors(capsys), "TF020")
 
 
 BOXES_IN = {
@@ -707,13 +704,12 @@ PUBLISHERS = """<launch>
       <param name="rotation.w" value="0.0"/>
       <param name="frame_id" value="base_link"/><param name="child_frame_id" value="laser"/>
     </composable_node>
-    <composable_node pkg="p" plugin="p::Bogus" name="bogus" bogus="1"/>
     <composable_node pkg="p" plugin="p::Moves" name="moves"><param name="robot_description" value="&lt;robot/>"/>
     </composable_node>
-    <composable_node pkg="p" name="nameless"/>
   </node_container>
-  <composable_node pkg="p" plugin="p::Alone" name="alone"/>
-  <load_composable_node><composable_node pkg="p" plugin="p::Lost" name="lost"/></load_composable_node>
+  <load_composable_node target="">
+    <composable_node pkg="p" plugin="p::Lost" name="lost"/>
+  </load_composable_node>
 </launch>
 """  # noqa: E501 (a text as its reader has it)
 
@@ -727,13 +723,11 @@ def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_n
         "xyz": [0.5, 0, 0],
         "rpy": [0, 0, "180 deg"],
     }
-    assert list(data["processes"]) == ["bogus", "moves"]
+    assert list(data["processes"]) == ["moves"]
     wanted = [
         number
         for number, line in enumerate(PUBLISHERS.splitlines(), start=1)
-        if any(
-            word in line for word in ("p::Bogus", "p::Moves", "nameless", "p::Alone", "p::Lost")
-        )
+        if "p::Moves" in line or 'target=""' in line
     ]
     assert set(places(printed_errors(capsys), "TF020")) == {
         f"a.launch.xml:{line}" for line in wanted
@@ -742,16 +736,18 @@ def test_a_component_that_publishes_a_fixed_edge_is_a_frame_and_wrong_ones_are_n
 
 ODD = """
 from launch import LaunchDescription
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import ComposableNodeContainer, LoadComposableNodes, Node
 from launch_ros.descriptions import ComposableNode
 def generate_launch_description():
     return LaunchDescription([
-        ComposableNodeContainer(name=None, package="a", executable="b", composable_node_descriptions=[None, 3]),
-        LoadComposableNodes(target_container=None, composable_node_descriptions=None),
+        ComposableNodeContainer(name="bad", namespace="", package="a", executable="b",
+            composable_node_descriptions=[None, 3]),
         Node(package="a", executable="b", output={"both": 3}),
         Node(package="a", executable="b", output="bogus"),
-        Node(package="a", executable="b", arguments=3, parameters=[7], remappings=[1]),
+        Node(package="a", executable=LaunchConfiguration("gone")),
         LoadComposableNodes(target_container="", composable_node_descriptions=[ComposableNode(package="a", plugin="")]),
+        3,
         Node(package="a", executable="c", name="sound", sigkill_timeout="-1", respawn=True, respawn_delay=float("nan")),
         ComposableNodeContainer(name="box", namespace="", package="a", executable="b", composable_node_descriptions=[
             ComposableNode(package="a", plugin="a::B::", name="odd")]),
@@ -759,7 +755,7 @@ def generate_launch_description():
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_an_action_that_is_given_nonsense_does_not_end_the_others(
+def test_an_action_that_launch_would_refuse_later_does_not_end_the_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _, data = import_of(source(tmp_path, "odd.launch.py", ODD), code=None)
@@ -769,7 +765,68 @@ def test_an_action_that_is_given_nonsense_does_not_end_the_others(
     }
     assert data["processes"]["odd"] == {"component": "a/a::B::", "container": "box"}
     found = places(printed_errors(capsys), "TF020")
-    assert {f"odd.launch.py:{line}" for line in (9, 10, 11, 12, 13)} <= set(found)
+    assert {f"odd.launch.py:{line}" for line in (8, 10, 11, 12, 13)} <= set(found)
+
+
+REFUSED = {
+    "a.launch.xml": ("<launch>\n<group>\n<bogus/>\n</group></launch>\n", 3),
+    "b.launch.xml": ('<launch>\n<node pkg="p"\n name="n"/>\n</launch>\n', 2),
+    "c.launch.xml": ("<launch>\n<node\n</launch>\n", 3),
+    "d.launch.yaml": ("launch:\n- arg: {name: a}\n- node: {pkg: p, exec: e, respawn: true}\n", 3),
+    "e.launch.yaml": ("launch:\n- arg: {name: a\n", 2),
+    "f.launch.py": (
+        (
+            "from launch_ros.actions import Node\n"
+            "def generate_launch_description():\n"
+            "    return [Node(package='p')]\n"
+        ),
+        3,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_launch_refuses_is_its_error_with_its_place(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, line = REFUSED[name]
+    assert main(["import", str(source(tmp_path, name, text))]) == 1
+    assert places(printed_errors(capsys), "TF002") == [f"{name}:{line}"]
+
+
+def test_an_included_file_that_launch_refuses_is_named_and_all_else_is_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source(tmp_path, "bad.launch.xml", REFUSED["a.launch.xml"][0])
+    text = """<launch>
+      <include file="$(dirname)/bad.launch.xml"/>
+      <node pkg="p" exec="e" name="n"/>
+    </launch>"""
+    _, data = import_of(source(tmp_path, "a.launch.xml", text))
+    assert set(data["processes"]) == {"n"}
+    printed = printed_errors(capsys)
+    assert places(printed, "TF020") == ["a.launch.xml:2"]
+    assert "line 3" in printed
+
+
+LIFECYCLE = """
+from launch import LaunchDescription
+from launch.actions import EmitEvent
+from launch.events import matches_action
+from launch_ros.actions import LifecycleNode
+from launch_ros.events.lifecycle import ChangeState
+from lifecycle_msgs.msg import Transition
+def generate_launch_description():
+    node = LifecycleNode(package="map", executable="server", name="map_server", namespace="")
+    change = ChangeState(lifecycle_node_matcher=matches_action(node),
+                         transition_id=Transition.TRANSITION_ACTIVATE)
+    return LaunchDescription([node, EmitEvent(event=change)])
+"""
+
+
+def test_an_event_that_activates_a_lifecycle_node_is_its_state(tmp_path: Path) -> None:
+    _, data = import_of(source(tmp_path, "a.launch.py", LIFECYCLE))
+    assert data["processes"]["map_server"]["lifecycle"] == "active"
 
 
 def test_a_parameter_file_lies_over_the_parameters_before_it(
@@ -874,77 +931,6 @@ def test_bringups_of_moveit_and_turtlebots_are_read(
     assert "remapped" not in printed
     _, data = import_of(tmp_path / "arm.launch.py", "--all-branches", code=None)
     assert data["processes"]["shy"]["when"] == "${not (args.quick)}"
-
-
-ROS1 = """<launch>
-  <arg name="height" default="0.1"/>
-  <node pkg="tf" type="static_transform_publisher" name="a" args="0.2 0 $(arg height) 0 0 0 base_link laser 100"/>
-  <node pkg="tf2_ros" type="static_transform_publisher" name="b" args="0.1 0 0.2 0 0 0 1 base_link camera"/>
-  <node pkg="tf2_ros" type="static_transform_publisher" name="c" args="0 0 0 -1.5707963 0 -1.5707963 camera optical"/>
-  <group ns="front"><node pkg="drive" type="drive.py" name="drive" required="true"/></group>
-</launch>
-"""  # noqa: E501 (a text as its reader has it)
-
-
-def test_launch_files_of_ros_1_are_read(tmp_path: Path) -> None:
-    text, data = import_of(source(tmp_path, "robot.launch", ROS1), "height:=0.4")
-    assert data["frames"] == {
-        "base_link": {},
-        "laser": {"parent": "base_link", "xyz": [0.2, 0, 0.4]},
-        "camera": {"parent": "base_link", "xyz": [0.1, 0, 0.2]},
-        "optical": {"parent": "camera", "rpy": [-1.5707963, 0, -1.5707963]},
-    }
-    assert data["processes"]["drive"] == {
-        "run": {"package": "drive", "executable": "drive.py"},
-        "namespace": "front",
-        "required": True,
-    }
-    robot = compiled(text, tmp_path).robot
-    assert robot
-
-
-ROS1_DESCRIBED = """<launch>
-  <param name="robot_description"
-    command="$(find xacro)/xacro '$(find rover)/rover.xacro' wheels:=4"/>
-  <param name="rate" value="20"/>
-  <node pkg="robot_state_publisher" type="robot_state_publisher" name="robot_state_publisher"/>
-  <node pkg="rviz" type="rviz" name="rviz" args="-d '$(find rover)/rviz/a b.rviz' --fullscreen"/>
-</launch>
-"""
-
-
-def test_a_description_and_quotes_of_ros_1_are_read(
-    package: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (package.parent / "rover.xacro").write_text(
-        '<robot name="rover" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arg name="wheels"'
-        ' default="2"/><link name="base_link"/></robot>',
-        encoding="utf-8",
-    )
-    _, data = import_of(source(package, "rover.launch", ROS1_DESCRIBED))
-    (part,) = data["parts"].values()
-    assert part["args"] == {"wheels": "4"}
-    assert part["xacro"].endswith("rover.xacro")
-    assert data["processes"]["rviz"]["run"]["args"] == [
-        "-d",
-        f"{package.parent}/rviz/a b.rviz",
-        "--fullscreen",
-    ]
-    assert data["processes"]["rviz"]["params"] == {"rate": 20}
-    assert places(printed_errors(capsys), "TF020") == ["rover.launch:5"]  # rate
-
-
-def test_a_launch_file_comes_from_standard_input(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    reading._standard_input.cache_clear()
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(ROS1.encode())))
-    assert main(["import", "-"]) == 0
-    reading._standard_input.cache_clear()
-    assert (
-        "# <stdin>:3: in the order x y z yaw pitch roll frame child period"
-        in capsys.readouterr().out
-    )
 
 
 DISPLAY = """
@@ -1191,7 +1177,6 @@ def test_no_launch_file_makes_a_traceback(
         ("a.launch.py", PYTHON),
         ("b.launch.xml", XML),
         ("c.launch.yaml", YAML),
-        ("d.launch", ROS1),
     ):
         for _ in range(4):
             lines = text.splitlines(keepends=True)
@@ -1313,21 +1298,25 @@ COMPOSED_XML = """<launch>
 """  # noqa: E501 (a text as its reader has it)
 
 
-def test_records_tell_containers_apart_though_the_earlier_ones_are_gone() -> None:
-    """Python gives the ``id`` of an object that is gone to another one.
+def test_components_find_their_container_though_earlier_ones_are_gone(tmp_path: Path) -> None:
+    """Python gives the ``id`` of an object that is gone to another one."""
+    _, data = import_of(source(tmp_path, "a.launch.py", GONE), code=None)
+    containers = {name: one["container"] for name, one in data["processes"].items()}
+    assert containers == {f"in_{count}": f"box_{count}" for count in range(50)}
 
-    Components were in a wrong container then.
-    """
-    context = Context()
-    for count in range(50):
-        inside = [actions.ComposableNode(package="p", plugin="p::C", name=f"in_{count}")]
-        container = {"package": "p", "executable": "e", "name": f"box_{count}", "namespace": ""}
-        actions.ComposableNodeContainer(**container, composable_node_descriptions=inside).visit(
-            context
-        )
-    boxes, components = context.records[::2], context.records[1::2]
-    assert [one["container"] for one in components] == [str(one["id"]) for one in boxes]
-    assert len({one["id"] for one in context.records}) == 100
+
+GONE = """
+from launch import LaunchDescription
+from launch.actions import OpaqueFunction
+from launch_ros.actions import ComposableNodeContainer
+from launch_ros.descriptions import ComposableNode
+def box(context, count):
+    inside = [ComposableNode(package="p", plugin="p::C", name=f"in_{count}")]
+    return [ComposableNodeContainer(package="p", executable="e", name=f"box_{count}", namespace="",
+                                    composable_node_descriptions=inside)]
+def generate_launch_description():
+    return LaunchDescription([OpaqueFunction(function=box, args=[count]) for count in range(50)])
+"""
 
 
 def test_an_argument_that_a_command_makes_is_named(

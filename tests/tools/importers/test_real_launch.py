@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from tests.support.bringups import (
     exported,
     flat,
     import_of,
+    needs_launch,
     places,
     printed_errors,
     started_with,
@@ -28,21 +28,16 @@ from tests.tools.importers.test_launch import (
     COMPOSED,
     COMPOSED_XML,
     MORE,
-    PYTHON,
     WITH_ARGUMENTS,
     XML,
     YAML,
 )
 from tfcompose.model.robot import Robot
-from tfcompose.tools.importers import launch as importing
 
-pytestmark = pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch is not installed")
+pytestmark = needs_launch
 SCRIPT = Path(__file__).parents[2] / "support/real_launch.py"
 #: Each component has a name of the file's.
 NAMED = COMPOSED.replace("early::HTTPServerNode", 'early::HTTPServerNode", name="http_server_node')
-#: XML without what launch refuses.
-SOUND_XML = XML.replace("  <bogus/>\n", "")
-SOUND_YAML = YAML.replace("- bogus: {}\n", "").replace("respawn: true", 'respawn: "true"')
 
 
 def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
@@ -136,28 +131,24 @@ def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     return share
 
 
-@pytest.mark.parametrize("has_launch", [True, False], ids=["launch", "stand-in"])
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("rover.launch.xml", SOUND_XML, ()),
-        ("rover.launch.yaml", SOUND_YAML, ("name:=left",)),
+        ("rover.launch.xml", XML, ()),
+        ("rover.launch.yaml", YAML, ("name:=left",)),
         ("a.launch.py", WITH_ARGUMENTS, ("loud:=false", "mode:=fixed")),
         ("composed.launch.py", NAMED, ("rectify:=true",)),
         ("composed.launch.xml", COMPOSED_XML, ("rectify:=false",)),
         *((name, text, ()) for name, text in BOXES_IN.items()),
     ],
 )
-def test_each_process_is_started_as_launch_would(  # noqa: PLR0913 (fixtures, and cases)
+def test_each_process_is_started_as_launch_would(
     name: str,
     text: str,
     words: tuple[str, ...],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    *,
-    has_launch: bool,
 ) -> None:
-    monkeypatch.setattr(importing, "has_launch", lambda: has_launch)
     share = installed("rover", tmp_path, monkeypatch)
     (share / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
     (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
@@ -174,49 +165,6 @@ def test_each_process_is_started_as_launch_would(  # noqa: PLR0913 (fixtures, an
     assert found.keys() == expected.keys()
     for key, one in expected.items():
         assert found[key] == one, key
-
-
-@pytest.mark.parametrize("words", [(), ("--all-branches",)], ids=["defaults", "all branches"])
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("rover.launch.py", PYTHON.replace(", autostart=True", "")),
-        ("rover.launch.xml", SOUND_XML),
-        ("rover.launch.yaml", SOUND_YAML),
-        ("a.launch.py", WITH_ARGUMENTS),
-        ("composed.launch.py", COMPOSED),
-        ("composed.launch.xml", COMPOSED_XML),
-        *BOXES_IN.items(),
-    ],
-)
-def test_launch_and_the_stand_in_give_the_same_robot_file(
-    name: str, text: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    share = installed("rover", tmp_path, monkeypatch)
-    (share / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
-    (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
-    file = tmp_path / name
-    file.write_text(text, encoding="utf-8")
-    by_launch, _ = import_of(file, *words, code=None)
-    monkeypatch.setattr(importing, "has_launch", lambda: False)
-    by_stand_in, _ = import_of(file, *words, code=None)
-    assert (
-        by_launch.splitlines()[0] == f"# imported from {name} by tfcompose, read by ROS's launch"
-    )
-    assert by_launch.splitlines()[1:] == by_stand_in.splitlines()[1:]
-
-
-def test_what_launch_refuses_the_stand_in_reads_and_a_finding_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "a.launch.xml"
-    file.write_text(
-        '<launch>\n<bogus/>\n<node pkg="p" exec="e" name="n"/>\n</launch>\n', encoding="utf-8"
-    )
-    text, data = import_of(file)
-    assert set(data["processes"]) == {"n"}
-    assert places(printed_errors(capsys), "TF020") == ["a.launch.xml:1", "a.launch.xml:2"]
-    assert "read by ROS's launch" not in text.splitlines()[0]
 
 
 def test_actions_and_substitutions_of_other_packages_do_what_they_do(tmp_path: Path) -> None:

@@ -298,12 +298,12 @@ def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") 
     from tfcompose.tools.importers.urdf import Workshop, add_descriptions
 
     _refuse_more(arguments)
-    read_text(file)  # refuses what is no text
     packages = pairs(arguments.packages, "=")
     known, target = _known_packages(packages, arguments), _target(arguments)
     prefixes = known.disk.prefixes if known.disk else ()
     launch = Launch(
         file,
+        read_text(file),
         arguments.given,
         packages,
         prefixes=prefixes,

@@ -15,7 +15,8 @@ from tfcompose.foundation.geometry import Pose, quat_from_rpy
 from tfcompose.foundation.reading import is_file, is_folder, names_in
 from tfcompose.tools.importers.draft import pose_keys
 from tfcompose.tools.importers.programs import where
-from tfcompose.tools.importers.yaml_text import Expression, argument
+from tfcompose.tools.importers.texts import Argument, Text, concatenated
+from tfcompose.tools.importers.yaml_text import Expression
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -156,8 +157,9 @@ def add_vehicles(
         str(folder),
         "vehicle",
     )
-    word = argument("vehicle_id", vehicle) if len(vehicles) > 1 else vehicle
+    of_vehicle = vehicle
     if len(vehicles) > 1:
+        of_vehicle = Text.of([Argument("vehicle_id", vehicle)])
         draft.sections["args"]["vehicle_id"] = {
             "type": "string",
             "default": vehicle,
@@ -167,7 +169,7 @@ def add_vehicles(
     for name in _CALIBRATIONS:
         files = {one: config / one / kit / name for one in vehicles}
         sources = {one: read(str(file)) for one, file in files.items() if is_file(file)}
-        path = f"{target.from_folder(str(config))}/{word}/{kit}/{name}"
+        path = concatenated([target.from_folder(str(config)), of_vehicle, kit, name], "/")
         for (parent, child), several in _calibrated(draft, sources).items():
             keys: dict[str, Any] = {"calibration": path}
             if len(several) < len(vehicles):

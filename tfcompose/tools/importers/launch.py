@@ -31,7 +31,8 @@ from tfcompose.model.process_keys import (
     Seconds,
     launch_keywords,
 )
-from tfcompose.tools.importers.launch_substitutions import marks, scalar_of, shown, without_marks
+from tfcompose.tools.importers.launch_records import relative, scalar_of
+from tfcompose.tools.importers.launch_ros1 import has_only_transforms, is_of_ros1
 from tfcompose.tools.importers.programs import (
     CONTAINERS,
     JOINT_PUBLISHERS,
@@ -48,7 +49,16 @@ from tfcompose.tools.importers.programs import (
 )
 from tfcompose.tools.importers.static_transforms import PLUGIN as STATIC_PLUGIN
 from tfcompose.tools.importers.static_transforms import PROGRAM, static_words
-from tfcompose.tools.importers.yaml_text import Expression, arguments_in, with_values
+from tfcompose.tools.importers.texts import SHAPE as TEXT
+from tfcompose.tools.importers.texts import (
+    FileText,
+    Text,
+    arguments_in,
+    files_in,
+    fill,
+    from_json,
+)
+from tfcompose.tools.importers.yaml_text import Expression
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -65,6 +75,10 @@ _LARGEST = 1e9
 #: Programs whose arguments are read: they have their values.
 _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
+_INSTALL = (
+    "source a distribution's setup file, such as /opt/ros/jazzy/setup.bash: launch comes with it"
+    " (apt install ros-jazzy-ros-base), and not with pip"
+)
 #: The programs that are components, too, by their classes.
 _PUBLISHERS = {
     STATIC_PLUGIN: PROGRAM,
@@ -74,7 +88,7 @@ _PUBLISHERS = {
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """A launch file to be read.
+    """A launch file to be read, and its text.
 
     ``arguments`` are its launch arguments, ``packages`` folders of packages that are not
     installed, ``prefixes`` those of AMENT_PREFIX_PATH. With ``every_branch`` conditions do not
@@ -83,6 +97,7 @@ class Launch:
     """
 
     file: str
+    text: str
     arguments: Mapping[str, str] = field(default_factory=dict)
     packages: Mapping[str, str] = field(default_factory=dict)
     prefixes: tuple[str, ...] = ()
@@ -103,13 +118,21 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     Return what its robot_state_publishers are given.
 
     Raises:
-        RejectedError: if it is no launch file, or takes too long or too much memory.
+        RejectedError: if it is no launch file, takes too long or too much memory, or needs ROS's
+            launch, which is not installed.
     """
     draft.reach = _reach_of(launch)
-    answer = _read(draft, launch)
-    draft.head[-1] += ", a launch file of ROS 1" if _is_of_ros1(answer) else ""
-    work = _Work(draft, launch, target, answer["records"])
-    for record in answer["records"]:
+    of_ros1 = is_of_ros1(launch.text, launch.file)
+    of_launch = not of_ros1 and has_launch()
+    if not of_ros1 and not of_launch and not has_only_transforms(launch.text, launch.file):
+        message = "ROS's launch, which reads launch files of ROS 2, is not installed"
+        raise RejectedError([finding("TF901", message, launch.span(), help=_INSTALL)])
+    draft.head[-1] += ", a launch file of ROS 1" if of_ros1 else ""
+    draft.head[-1] += ", read by ROS's launch" if of_launch else ""
+    answer = _answered(launch, draft.reach, "launch" if of_launch else "xml")
+    records = [_with_texts(record) for record in answer["records"]]
+    work = _Work(draft, launch, target, records)
+    for record in records:
         work.add(record)
     work.finish(answer["decided"])
     if answer["stopped"]:
@@ -120,35 +143,6 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
             raise RejectedError([finding("TF002", answer["stopped"], at), *draft.found])
         draft.todo(f"the launch file is not read to its end: {answer['stopped']}", at)
     return work.descriptions
-
-
-def _read(draft: Draft, launch: Launch) -> dict[str, Any]:
-    """Return what ROS's launch records of the file, or else the stand-in.
-
-    Raises:
-        RejectedError: if neither can read it.
-    """
-    if not has_launch():
-        return _answered(launch, draft.reach, with_launch=False)
-    try:
-        answer = _answered(launch, draft.reach, with_launch=True)
-        reason, line = answer["stopped"], answer["line"]
-    except RejectedError as error:
-        reason, line = error.findings[0].message, 0
-    if not reason:
-        draft.head[-1] += ", read by ROS's launch"
-        return answer
-    answer = _answered(launch, draft.reach, with_launch=False)
-    if not answer["stopped"] and not _is_of_ros1(answer):
-        draft.todo(
-            f"ROS's launch does not read it, tfcompose's own reader does: {reason}",
-            launch.span(line),
-        )
-    return answer
-
-
-def _is_of_ros1(answer: dict[str, Any]) -> bool:
-    return any(record.get("ros1") for record in answer["records"])
 
 
 def has_launch() -> bool:
@@ -173,7 +167,7 @@ def _reach_of(launch: Launch) -> Reach:
     return reach
 
 
-def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, Any]:
+def _answered(launch: Launch, reach: Reach, reader: str) -> dict[str, Any]:
     trusted = launch.is_trusted
     wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
@@ -184,7 +178,7 @@ def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, A
         },
         "prefixes": list(launch.prefixes),
         "every_branch": launch.every_branch,
-        "with_launch": with_launch,
+        "reader": reader,
         "readable": None if trusted else reach.grants(),
         "temporary": tempfile.gettempdir(),
         "wall_s": wall_s,
@@ -209,8 +203,9 @@ def _answered(launch: Launch, reach: Reach, *, with_launch: bool) -> dict[str, A
 
 
 _NUMBER, _OPTIONAL = (int, float), (str, None)
-_SCALAR = (str, bool, int, float, None)
+_SCALAR = (*TEXT, bool, int, float, None)
 _PARAMETERS = [(str, {"*": (*_SCALAR, [_SCALAR])})]
+_TEXTS = {"*": TEXT}
 _AT: dict[str, Any] = {"at": [(str, int)], "when?": [str], "only_when?": str}
 _KINDS: dict[KeywordKind, Any] = {
     "text": str,
@@ -222,7 +217,7 @@ _KINDS: dict[KeywordKind, Any] = {
 }
 _COMMON = _AT | {
     "id": (str, int),
-    "env": {"*": str},
+    "env": _TEXTS,
     "period": _NUMBER,
     "after": {"*": str},
     "shell?": bool,
@@ -234,7 +229,7 @@ _OF_NODE = {
     "name": _OPTIONAL,
     "namespace": _OPTIONAL,
     "params": _PARAMETERS,
-    "remap": [[str]],
+    "remap": [[TEXT]],
 }
 _NODE = (
     _COMMON
@@ -242,7 +237,7 @@ _NODE = (
     | {
         "executable": str,
         "label": _OPTIONAL,
-        "argv": [str],
+        "argv": [TEXT],
         "lifecycle?": _OPTIONAL,
         "ros1?": bool,
     }
@@ -251,7 +246,7 @@ _NODE = (
 _RECORDS: dict[str, Any] = {
     "node": _NODE,
     "container": _NODE,
-    "process": _COMMON | {"argv": [str], "label": _OPTIONAL},
+    "process": _COMMON | {"argv": [TEXT], "label": _OPTIONAL},
     "component": _AT
     | _OF_NODE
     | {
@@ -265,9 +260,9 @@ _RECORDS: dict[str, Any] = {
     "include": _AT
     | {
         "file": str,
-        "args": {"*": str},
+        "args": _TEXTS,
         "namespace": _OPTIONAL,
-        "env": {"*": str},
+        "env": _TEXTS,
         "period": _NUMBER,
         "after": {"*": str},
     },
@@ -278,7 +273,7 @@ _RECORDS: dict[str, Any] = {
         "value": str,
         "choices": [str],
         "description": str,
-        "env": str,
+        "variable": str,
     },
     "lifecycle": _AT | {"node": (str, int), "state": str},
     "required": _AT | {"node": (str, int)},
@@ -301,6 +296,35 @@ def _is_record(record: dict[str, Any]) -> bool:
         and abs(record.get("period", 0)) <= _LARGEST
         and all(isinstance(value, float) or abs(value) <= _LARGEST for value in counts)
     )
+
+
+def _with_texts(record: dict[str, Any]) -> dict[str, Any]:
+    """Return a record with texts in the place of what JSON has for them."""
+    texts: dict[str, Callable[[Any], Any]] = {
+        "argv": lambda words: list(map(from_json, words)),
+        "remap": lambda rules: [list(map(from_json, rule)) for rule in rules],
+        "env": _values_with_texts,
+        "args": _values_with_texts,
+        "params": _params_with_texts,
+        EXTRA_ARGUMENTS.name: _params_with_texts,
+    }
+    found = {name: read(record[name]) for name, read in texts.items() if name in record}
+    return record | found
+
+
+def _params_with_texts(params: list[Any]) -> list[Any]:
+    """Return parameters with texts; names of files are plain."""
+    return list(map(_values_with_texts, params))
+
+
+def _values_with_texts(values: Any) -> Any:
+    if not isinstance(values, dict):
+        return values
+    return {name: _value_with_texts(value) for name, value in values.items()}
+
+
+def _value_with_texts(value: Any) -> Any:
+    return list(map(from_json, value)) if isinstance(value, list) else from_json(value)
 
 
 def _ended(outcome: Outcome) -> str:
@@ -442,11 +466,11 @@ class _Work:
                     if record["description"].strip()
                     else {}
                 )
-                keys |= {"env": record["env"]} if record["env"] else {}
+                keys |= {"env": record["variable"]} if record["variable"] else {}
                 self.draft.sections["args"][name] = keys
                 self.draft.note(at, where(span))
             if name in decided:
-                fixed[f"{name}:={shown(value) or repr('')}"] = span
+                fixed[f"{name}:={relative(value) or repr('')}"] = span
                 if name in used:
                     self.draft.note(
                         at,
@@ -551,8 +575,8 @@ class _Work:
         keys = self._keys(record, todo)
         argv = tuple(record.get("argv", ()))
         if record.get("executable") in _READ:
-            self._read |= arguments_in(list(argv))
-            argv = tuple(map(with_values, argv))
+            self._read |= arguments_in(argv)
+            argv = tuple(map(str, argv))
         else:
             argv = tuple(_without_texts(word, todo) for word in argv)
         reader = None if record["kind"] == "process" else "ros2"
@@ -600,7 +624,7 @@ class _Work:
         return {
             name: value
             for name, value in record.get("env", {}).items()
-            if not is_setting(self.draft, name, value)
+            if isinstance(value, Text) or not is_setting(self.draft, name, value)
         }
 
     def _keys(self, record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
@@ -758,12 +782,12 @@ def _seconds(value: float) -> Bare:
 
 def _without_texts(word: str, todo: list[str]) -> str:
     """Return a command's word with files in place of xacro output and file texts."""
-    plain, files = without_marks(word)
     todo += [
-        f"an argument is what is made of {shown(file)}, or its text: here it is the file's name"
-        for file in files
+        f"an argument is what is made of {relative(part.file)}, or its text: here it is the"
+        " file's name"
+        for part in files_in(word)
     ]
-    return plain
+    return fill(word, FileText)
 
 
 def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], Description | None]:
@@ -778,10 +802,8 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
         for key, value in one.items():
             if key == "robot_description" and isinstance(value, str):
                 description = _description(value)
-            elif isinstance(value, str) and marks(value):
-                todo.append(
-                    f"the parameter {key}, which is the text of {_description(value).file}"
-                )
+            elif files := files_in(value):
+                todo.append(f"the parameter {key}, which is the text of {files[0].file}")
             elif value is None or value == [] or not _is_finite(value) or not _is_uniform(value):
                 todo.append(f"the parameter {key}: {value!r}")
             else:
@@ -794,7 +816,9 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
 def _is_uniform(value: Any) -> bool:
     if not isinstance(value, list):
         return True
-    return len({type(one) for one in value}) == 1 and isinstance(value[0], (bool, int, float, str))
+    if all(isinstance(item, str) for item in value):
+        return True
+    return len({type(item) for item in value}) == 1 and isinstance(value[0], (bool, int, float))
 
 
 def _is_finite(value: Any) -> bool:
@@ -803,5 +827,5 @@ def _is_finite(value: Any) -> bool:
 
 
 def _description(value: str) -> Description:
-    found = marks(value)
-    return Description(found[0]["file"], found[0]["args"]) if found else Description(text=value)
+    files = files_in(value)
+    return Description(files[0].file, files[0].args) if files else Description(text=value)

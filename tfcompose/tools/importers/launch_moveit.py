@@ -1,6 +1,4 @@
-"""A stand-in for ``moveit_configs_utils``.
-
-The parameters that MoveIt's builder reads from a configuration package.
+"""MoveIt's builder of configurations, which reads parameters from a configuration package.
 
 What it reads, and under which names it hands it on, was read in MoveIt's sources. Files that are
 not there are named.
@@ -13,19 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from tfcompose.tools.importers.launch_substitutions import (
-    PACKAGE,
-    FailedError,
-    marked,
-    place,
-    text_of,
-    with_package,
-)
+from tfcompose.tools.importers.launch_objects import here
+from tfcompose.tools.importers.launch_parameters import text_of
+from tfcompose.tools.importers.launch_records import PACKAGE, FailedError, placeholder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.tools.importers.launch_substitutions import Context
+    from tfcompose.tools.importers.launch_context import RecordingContext
 
 #: What a method of the builder reads unless it is told a file, and the parameter that it is, if it
 #: is one.
@@ -87,7 +80,7 @@ class MoveItConfigsBuilder:
     def __init__(
         self,
         find: Callable[[str], str],
-        context: Context,
+        context: RecordingContext,
         robot_name: str = "",
         robot_description: str = "robot_description",
         *,
@@ -188,7 +181,7 @@ class MoveItConfigsBuilder:
                 for file in self._config("*_planning.yaml")
             ]
             self._context.todo(
-                place(), "planning pipelines that are MoveIt's own, beside the package's"
+                here(), "planning pipelines that are MoveIt's own, beside the package's"
             )
         names = names or ["ompl"]
         first = default_planning_pipeline or ("ompl" if "ompl" in names else names[0])
@@ -232,8 +225,8 @@ class MoveItConfigsBuilder:
             try:
                 args[str(name)] = text_of(value, self._context)
             except FailedError as error:
-                self._context.todo(place(), f"the argument {name} of {path}: {error}")
-        return marked(file=with_package(path), args=args)
+                self._context.todo(here(), f"the argument {name} of {path}: {error}")
+        return placeholder(path, args)
 
     def _read(self, file: str) -> dict[str, Any]:
         path = file if file.startswith("/") else f"{self._folder}/{file}"
@@ -242,6 +235,6 @@ class MoveItConfigsBuilder:
         try:
             values = yaml.safe_load(Path(path).read_text("utf-8"))
         except (OSError, UnicodeDecodeError, yaml.YAMLError):
-            self._context.todo(place(), f"parameters of {path}, which cannot be read")
+            self._context.todo(here(), f"parameters of {path}, which cannot be read")
             return {}
         return values if isinstance(values, dict) else {}

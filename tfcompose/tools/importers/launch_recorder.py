@@ -1,225 +1,77 @@
-"""Records what ROS's own ``launch`` would start, where it is installed, without starting anything.
+"""Records what ROS's own ``launch`` would start, without starting anything.
 
 Launch parses the file, checks what its actions are given, and evaluates its substitutions,
-conditions and groups, those of other packages included. Each of its objects keeps what it was made
-of, and the line; when one is visited that starts something, its counterpart of the stand-in
-records it. So both readers give the same records.
+conditions and groups, those of other packages included. An action that would start something is
+recorded when it is visited.
 
 This runs in the process that reads launch files (``launch_process``).
 """
 
 from __future__ import annotations
 
-import contextlib
-import functools
-import importlib
 import logging
 import os
+import shlex
 import sys
 import tempfile
-import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import launch
+import launch.actions
 import launch.frontend
 import launch.logging
+import launch_ros.actions
 import launch_ros.descriptions
-import launch_xml.parser
-import launch_yaml.parser
-import yaml
+from launch import event_handlers, substitutions
 from launch.events import Shutdown, matches_action
 from launch.launch_description_source import LaunchDescriptionSource
+from launch.launch_description_sources import get_launch_description_from_python_launch_file
+from launch_ros.event_handlers import OnStateTransition
+from launch_ros.events.lifecycle import ChangeState
+from launch_ros.substitutions import ExecutableInPackage
+from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
-from tfcompose.tools.importers import launch_actions as actions
-from tfcompose.tools.importers import launch_conditions as conditions
-from tfcompose.tools.importers import launch_substitutions as substitutions
-from tfcompose.tools.importers.launch_substitutions import Context, FailedError, place, text_of
-from tfcompose.tools.importers.launch_texts import Entity, of_xml
-
-_MODULES = (
-    "launch.actions",
-    "launch.conditions",
-    "launch.event_handlers",
-    "launch.events",
-    "launch.events.process",
-    "launch.launch_description_sources",
-    "launch.substitutions",
-    "launch_ros.actions",
-    "launch_ros.descriptions",
-    "launch_ros.event_handlers",
-    "launch_ros.events.lifecycle",
-    "launch_ros.parameter_descriptions",
-    "launch_ros.substitutions",
+from tfcompose.model.process_keys import Keyword, KeywordKind, launch_keywords
+from tfcompose.tools.importers import launch_objects as objects
+from tfcompose.tools.importers.launch_context import RecordingContext
+from tfcompose.tools.importers.launch_objects import arguments_of, id_of, place_of
+from tfcompose.tools.importers.launch_parameters import (
+    describe,
+    describe_condition,
+    evaluated,
+    is_true,
+    kept_text,
+    optional_text,
+    parameter_value,
+    parameters_of,
+    text_of,
+    when_of,
 )
-#: What launch evaluates or does itself, though the stand-in has a counterpart.
-_OWN_WORK = frozenset({"GroupAction", "ParameterSubstitution", "LocalSubstitution"})
-#: Substitutions whose result is not launch's: packages that are not found, commands that are not
-#: run, arguments.
-_REPLACED = frozenset(
-    {
-        "LaunchConfiguration",
-        "LaunchConfigAsBool",
-        "EnvironmentVariable",
-        "PathJoinSubstitution",
-        "FindPackageShare",
-        "FindPackagePrefix",
-        "FindPackage",
-        "FindExecutable",
-        "ExecutableInPackage",
-        "Command",
-        "FileContent",
-        "AnonName",
-        "LaunchLogDir",
-        "ThisLaunchFile",
-        "ThisLaunchFileDir",
-    }
+from tfcompose.tools.importers.launch_records import (
+    PACKAGE,
+    FailedError,
+    of_command,
+    relative,
+    with_package,
 )
-_ALIASES = {
-    "PushROSNamespace": "PushRosNamespace",
-    "RosTimer": "TimerAction",
-    "FindPackage": "FindPackageShare",
-}
-_STAND_INS: dict[str, Any] = {
-    name: one
-    for module in (substitutions, conditions, actions)
-    for name, one in vars(module).items()
-    if isinstance(one, type) and one.__module__ == module.__name__
-}
-#: The lines of elements of XML and of mappings and lists of YAML, by their ids; they live as long
-#: as this process.
-_LINES: dict[int, int] = {}
-_ALIVE: list[Any] = []
-#: The files and lines of the entities that are being parsed.
-_PLACES: list[tuple[str, int]] = []
-
-
-class RecordingContext(launch.LaunchContext, Context):  # type: ignore[misc]
-    """Launch's context, with what the stand-in records beside it."""
-
-    def __init__(self, find: Callable[[str, str], str | None], *, every_branch: bool) -> None:
-        launch.LaunchContext.__init__(self, noninteractive=True)
-        Context.__init__(self, find, every_branch=every_branch)
-        self._scopes: list[tuple[Any, ...]] = []
-
-    @property
-    def configurations(self) -> dict[str, str]:
-        """The launch configurations, which groups of launch replace."""
-        values: dict[str, str] = self.launch_configurations
-        return values
-
-    @configurations.setter
-    def configurations(self, values: dict[str, str]) -> None:
-        kept = dict(values)
-        self.launch_configurations.clear()
-        self.launch_configurations.update(kept)
-
-    def perform_substitution(self, substitution: Any) -> str:
-        """Return the text of a substitution."""
-        return text_of(converted(substitution), self)
-
-    def _push_launch_configurations(self) -> None:
-        super()._push_launch_configurations()
-        self._scopes.append((self.namespace, list(self.params), list(self.remaps)))
-
-    def _pop_launch_configurations(self) -> None:
-        super()._pop_launch_configurations()
-        self.namespace, self.params, self.remaps = self._scopes.pop()
-
-    def _push_environment(self) -> None:
-        super()._push_environment()
-        self._scopes.append((dict(self.variables),))
-
-    def _pop_environment(self) -> None:
-        super()._pop_environment()
-        (self.variables,) = self._scopes.pop()
-
-    def _reset_environment(self) -> None:
-        super()._reset_environment()
-        self.variables = {}
-
-
-# What launch's objects are made of
-
-
-def _here() -> tuple[str, int]:
-    """Return where a launch file makes something.
-
-    The line of a program, or that of the entity that is parsed.
-    """
-    return place() if not _PLACES or place()[0] else _PLACES[-1]
-
-
-def _keep(kind: type) -> None:
-    """Let the objects of a class keep what they were made of, and where."""
-    init = kind.__init__  # type: ignore[misc]
-
-    @functools.wraps(init)
-    def kept(self: Any, *args: Any, **kwargs: Any) -> None:
-        vars(self).setdefault("_made_of", []).append((kind.__name__, args, kwargs))
-        vars(self).setdefault("_made_at", _here())
-        init(self, *args, **kwargs)
-
-    kind.__init__ = kept  # type: ignore[misc]
-
-
-def _replace(kind: type) -> None:
-    """Let the counterpart give the text of a substitution."""
-    performed = kind.perform  # type: ignore[attr-defined]
-
-    def perform(self: Any, context: Any) -> Any:
-        if type(self) is kind and isinstance(context, RecordingContext):
-            return text_of(converted(self), context)
-        return performed(self, context)
-
-    kind.perform = perform  # type: ignore[attr-defined]
-
-
-def _classes() -> Iterator[type]:
-    known = {
-        launch.Action: None,
-        launch.Substitution: None,
-        launch.Condition: None,
-        LaunchDescriptionSource: None,
-    }
-    for name in _MODULES:
-        try:
-            module = importlib.import_module(name)
-        except ImportError:  # of another version
-            continue
-        for one in vars(module).values():
-            if isinstance(one, type) and one.__module__.partition(".")[0] in {
-                "launch",
-                "launch_ros",
-            }:
-                known[one] = None
-    yield from known
+from tfcompose.tools.importers.texts import argument_of
 
 
 def attach() -> None:
-    """Let launch's classes keep what the recorder needs, and record instead of starting anything.
+    """Let launch record instead of starting anything.
 
     Nothing is logged: launch would make a folder for its log, which it may not.
     """
     config = launch.logging.launch_config
     config.log_dir = tempfile.gettempdir()
     config.log_handler_factory = lambda *_args, **_kwargs: logging.NullHandler()
-    for kind in _classes():
-        if kind.__init__ is not object.__init__:  # type: ignore[misc]
-            _keep(kind)
-        if kind.__name__ in _REPLACED and issubclass(kind, launch.Substitution):
-            _replace(kind)
-    launch.Action.visit = lambda self, context: converted(self).visit(context)
-    launch.frontend.Parser.parse_action = _placed(launch.frontend.Parser.parse_action)
-    component = launch_ros.descriptions.ComposableNode
-    component.parse = classmethod(_placed_component(component.parse.__func__))
-    launch.frontend.Parser.load_parser_implementations()
-    launch.frontend.Parser.load_launch_extensions()
-    launch_xml.parser.ET = types.SimpleNamespace(
-        parse=_xml_with_lines, **_names_of(launch_xml.parser.ET)
-    )
-    launch_yaml.parser.yaml = types.SimpleNamespace(safe_load=_yaml_with_lines)
+    objects.attach()
+    launch.Action.visit = _visit
+    for kind, perform in _PERFORMED.items():
+        kind.perform = perform
+    _note_decisions(substitutions.LaunchConfiguration)
 
     def matching(target_action: Any) -> Any:
         matches = matches_action(target_action)
@@ -233,280 +85,634 @@ def attach() -> None:
             vars(module)["matches_action"] = matching
 
 
-def _placed(parse: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a method that parses its last argument, an entity, whose line what it makes has."""
-
-    @functools.wraps(parse)
-    def parsed(*args: Any) -> Any:
-        with _at(args[-1]):
-            return parse(*args)
-
-    return parsed
-
-
-def _placed_component(parse: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the same for components, of which parsing gives the class and what one is made of."""
-
-    @functools.wraps(parse)
-    def parsed(*args: Any) -> Any:
-        kind, kwargs = parse(*args)
-
-        def make(**kwargs: Any) -> Any:
-            with _at(args[-1]):
-                return kind(**kwargs)
-
-        return make, kwargs
-
-    return parsed
-
-
-@contextlib.contextmanager
-def _at(entity: Any) -> Iterator[None]:
-    """Let what is made meanwhile have the line of an entity."""
-    element = vars(entity).get("_Entity__xml_element", vars(entity).get("_Entity__element"))
-    file, line = _PLACES[-1] if _PLACES else ("", 1)
-    _PLACES.append((file, _LINES.get(id(element), line)))
-    try:
-        yield
-    finally:
-        _PLACES.pop()
-
-
-def _names_of(module: Any) -> dict[str, Any]:
-    return {
-        name: one
-        for name, one in vars(module).items()
-        if name != "parse" and not name.startswith("__")
-    }
-
-
-def _xml_with_lines(file: Any) -> Any:
-    """Return the tree of an XML file whose elements have lines."""
-    text = file.read()
-    root = ET.fromstring(text)  # noqa: S314 (as launch does; this process is confined)
-
-    def walk(entities: list[Entity]) -> Iterator[Entity]:
-        for one in entities:
-            yield one
-            yield from walk(one.children)
-
-    if root.tag == "launch":
-        several = walk(of_xml(text, getattr(file, "name", "")))
-        _LINES.update(
-            zip(map(id, list(root.iter())[1:]), (one.at[1] for one in several), strict=False)
-        )
-    _ALIVE.append(root)
-    return ET.ElementTree(root)
-
-
-class _Loader(yaml.SafeLoader):
-    """Keeps the lines of what stands under a key."""
-
-
-def _mapping(loader: _Loader, node: Any) -> Any:
-    made = loader.construct_mapping(node, deep=True)
-    _LINES[id(made)] = node.start_mark.line + 1
-    for key, _ in node.value:
-        value = made.get(loader.construct_object(key))
-        if isinstance(value, (dict, list)):
-            _LINES[id(value)] = key.start_mark.line + 1
-    return made
-
-
-_Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
-
-
-def _yaml_with_lines(file: Any) -> Any:
-    """Return the data of a YAML file whose mappings and lists have lines."""
-    data = yaml.load(file, Loader=_Loader)  # noqa: S506 (it is a safe one)
-    _ALIVE.append(data)
-    return data
-
-
-def parsed_text(path: str) -> Any:
-    """Return the launch description of an XML or YAML file.
+def description_of(path: str) -> Any:
+    """Return the launch description of a file.
 
     Raises:
         FailedError: if launch refuses it.
     """
-    _PLACES.append((path, 1))
     try:
-        root, parser = launch.frontend.Parser.load(path)
-        return parser.parse_description(root)
-    except FailedError:
+        if path.endswith(".py"):
+            return get_launch_description_from_python_launch_file(path)
+        with objects.parsing(path):
+            root, parser = _parsed(path)
+            return parser.parse_description(root)
+    except (FailedError, MemoryError):
         raise
-    except Exception as error:  # noqa: BLE001 (launch raises what it likes)
-        raise FailedError(_reason(error)) from None
-    finally:
-        _PLACES.pop()
+    except SyntaxError as error:
+        # that of XML has its line elsewhere
+        line = error.lineno or objects.line_of(error, path)
+        raise FailedError(str(error.msg), line) from None
+    except BaseException as error:  # noqa: BLE001 (any can come out of it)
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        raise FailedError(text, objects.line_of(error, path)) from None
 
 
-def _reason(error: BaseException) -> str:
-    """Return what an exception of launch's says, in one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
+def _parsed(path: str) -> tuple[Any, Any]:
+    """Return the root of a launch file in another language, and its parser.
 
-
-# Counterparts
-
-
-def converted(value: Any) -> Any:
-    """Return the stand-in's counterpart of what launch was given.
-
-    Of objects, and of lists and mappings of them.
+    Launch tries all its parsers, and tells of all their errors; here it is that of the language.
     """
-    if isinstance(value, (str, int, float, bool, os.PathLike)) or value is None:
+    parsers = launch.frontend.Parser.get_parsers_from_filename(path)
+    with Path(path).open(encoding="utf-8-sig") as file:
+        if len(parsers) != 1:
+            kind = "xml" if file.read().lstrip().startswith("<") else "yaml"
+            file.seek(0)
+            parsers = [launch.frontend.Parser.frontend_parsers[kind]]
+        loaded: tuple[Any, Any] = parsers[0].load(file)
+        return loaded
+
+
+# Substitutions whose text would be this machine's, or that of a program that is not run
+
+
+def _command(self: Any, context: Any) -> str:
+    text = text_of(self.command, context)
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise FailedError(f"the command {text}: {error}") from None
+    return of_command(words, text)
+
+
+_PERFORMED: dict[Any, Callable[[Any, Any], str]] = {
+    substitutions.Command: _command,
+    substitutions.FindExecutable: lambda self, context: text_of(self.name, context),
+    substitutions.AnonName: lambda self, context: text_of(arguments_of(self)["name"], context),
+    substitutions.LaunchLogDir: lambda _self, _context: "~/.ros/log",
+    ExecutableInPackage: lambda self, context: text_of(self.executable, context),
+}
+
+
+def _note_decisions(kind: Any) -> None:
+    """Let arguments whose value launch asks for be known as those that decide."""
+    performed = kind.perform
+
+    def perform(self: Any, context: Any) -> Any:
+        value = performed(self, context)
+        if isinstance(context, RecordingContext):
+            name = text_of(self.variable_name, context)
+            context.decided |= {name} & context.declared.keys()
         return value
-    if isinstance(value, Mapping):
-        return {converted(key): converted(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return (
-            type(value)(map(converted, value))
-            if type(value) in {list, tuple}
-            else list(map(converted, value))
-        )
-    if isinstance(value, substitutions.Substitution | actions.Action):
-        return value
-    attributes = getattr(value, "__dict__", {})
-    if "_counterpart" not in attributes:
-        if "_made_of" not in attributes and not isinstance(
-            value, launch.Action | launch.Substitution
-        ):
-            return _other(value)
-        attributes["_counterpart"] = _counterpart(value)
-    return attributes["_counterpart"]
+
+    kind.perform = perform
 
 
-def _other(value: Any) -> Any:
-    """Return what has no counterpart; of a matcher of an action, the action's."""
-    action = getattr(value, "action", None)
-    return actions.Matcher(converted(action)) if isinstance(action, launch.Action) else value
+# Visiting
 
 
-def _counterpart(value: Any) -> Any:
-    made_of = getattr(value, "_made_of", [])
-    if stand_in := getattr(type(value), "STAND_IN", None):
-        made = stand_in(*converted(made_of[0][1]), **converted(made_of[0][2]))
-        made.at = value._made_at  # noqa: SLF001 (the recorder's own)
-        return made
-    name, args, kwargs = next(
-        (one for one in made_of if _name(one[0]) in _STAND_INS and one[0] not in _OWN_WORK),
-        ("", (), {}),
-    )
-    if isinstance(value, launch.Event):
-        return _event(value, name, args, kwargs)
-    if isinstance(value, launch.Substitution):
-        return _substitution(value, name, args, kwargs)
-    if isinstance(value, launch.Condition):
-        return _condition(value, name, args, kwargs)
-    if isinstance(value, LaunchDescriptionSource):
-        _, args, kwargs = next(one for one in made_of if one[0] != "LaunchDescriptionSource")
-        return actions.LaunchDescriptionSource(*converted(args), **converted(kwargs))
-    is_base = _STAND_INS.get(_name(name)) in {None, actions.Action}
-    if is_base:
-        made = _Own(value)
-    elif name == "OpaqueFunction":  # what its function is given, it gives to launch
-        made = actions.OpaqueFunction(*args, **kwargs)
-    else:
-        made = _STAND_INS[_name(name)](*converted(args), **converted(kwargs))
-    made.at = getattr(value, "_made_at", ("", 1))
-    if isinstance(value, launch.Action):
-        made.condition = converted(value.condition)
-    return made
+def visit_all(entities: Any, context: RecordingContext) -> None:
+    """Visit what launch would visit, in order."""
+    if entities is None:
+        return
+    for entity in entities if isinstance(entities, (list, tuple)) else [entities]:
+        if isinstance(entity, (list, tuple)):
+            visit_all(entity, context)
+        elif hasattr(entity, "visit"):
+            visit_all(entity.visit(context), context)
+        elif entity is not None:
+            context.todo(context.at, f"{type(entity).__name__} is no action")
 
 
-def _name(name: str) -> str:
-    return _ALIASES.get(name, name)
+def _visit(action: Any, context: RecordingContext) -> None:
+    """Do what an action does, if its condition holds."""
+    handler = next((_HANDLERS[kind] for kind in type(action).__mro__ if kind in _HANDLERS), None)
+    condition = getattr(action, "condition", None)
+    _if_holds(action, condition, lambda: (handler or _let_launch)(action, context), context)
 
 
-class _Own(actions.Action):
-    """An action that launch does itself, or that is another package's.
-
-    What it gives is visited.
-    """
-
-    def __init__(self, action: Any) -> None:
-        super().__init__()
-        self.action = action
-
-    def execute(self, context: Context) -> None:
-        if isinstance(self.action, launch.actions.ExecuteLocal):
-            raise FailedError("it starts a process in a way that is not known here")
-        if isinstance(self.action, launch.actions.ResetLaunchConfigurations):
-            context.namespace, context.params, context.remaps = None, [], []
+def _if_holds(
+    made: Any, condition: Any, execute: Callable[[], None], context: RecordingContext
+) -> None:
+    """Execute what launch would if its condition holds; with every branch, in any case."""
+    at = context.at = place_of(made)
+    if condition is None:
+        _executed(made, execute, context)
+        return
+    when = when_of(condition, context) if context.every_branch else None
+    if when:
+        context.whens.append(f"({when})" if " or " in when or " and " in when else when)
         try:
-            made = self.action.execute(context)
-        except FailedError:
-            raise
-        except Exception as error:  # noqa: BLE001 (an action of any package)
-            raise FailedError(_reason(error)) from None
-        actions.visit_all(made, context)
-
-    def described(self, context: Context) -> str:
-        for name, args, kwargs in getattr(self.action, "_made_of", ()):
-            if name == "GroupAction":
-                return actions.GroupAction(*converted(args), **converted(kwargs)).described(
-                    context
-                )
-        return type(self.action).__name__
-
-
-def _substitution(value: Any, name: str, args: Any, kwargs: Any) -> Any:
-    stand_in = _STAND_INS.get(_name(name), substitutions.Substitution)
-    if (
-        stand_in.__init__ is substitutions.Substitution.__init__
-    ):  # which has what it is made of in order
-        args, kwargs = (*args, *kwargs.values()), {}
-    made = stand_in(*converted(args), **converted(kwargs))
-    made.at = getattr(value, "_made_at", ("", 1))
-    if stand_in.__name__ in _REPLACED:
-        return made
-    made.perform = functools.partial(_evaluated, value.perform)
-    if stand_in is substitutions.Substitution:
-        made.describe = value.describe
-    return made
-
-
-def _evaluated(evaluate: Callable[[Any], Any], context: Any) -> Any:
+            _executed(made, execute, context)
+        finally:
+            context.whens.pop()
+        return
+    text = describe_condition(condition)
     try:
-        return evaluate(context)
-    except FailedError:
-        raise
-    except Exception as error:  # noqa: BLE001 (launch's, or another package's)
-        raise FailedError(_reason(error)) from None
+        holds = bool(evaluated(condition.evaluate, context))
+        if isinstance(condition, launch.conditions.LaunchConfigurationEquals):
+            name = describe(arguments_of(condition)["launch_configuration_name"])
+            context.decided |= {name} & context.declared.keys()
+    except FailedError as error:
+        context.todo(at, f"{described(made)} if {text}: {error}")
+        return
+    if not holds and not context.every_branch:
+        context.record("skipped", at, text=f"{described(made)} only if {text}")
+        return
+    if context.every_branch:
+        context.todo(at, f"the condition of {described(made)}: {text}")
+    context.conditions.append(text if holds else f"{text}, which does not hold")
+    try:
+        _executed(made, execute, context)
+    finally:
+        context.conditions.pop()
 
 
-def _condition(value: Any, name: str, args: Any, kwargs: Any) -> Any:
-    stand_in = _STAND_INS.get(name, conditions.Condition)
-    made = (
-        stand_in(*converted(args), **converted(kwargs)) if name else stand_in(type(value).__name__)
+def _executed(made: Any, execute: Callable[[], None], context: RecordingContext) -> None:
+    at = place_of(made)
+    try:
+        execute()
+    except FailedError as error:
+        context.todo(at, f"{described(made)}: {error}")
+    except (TypeError, ValueError, AttributeError, LookupError) as error:
+        # what it was given is of another kind
+        context.todo(at, f"{described(made)}: {type(error).__name__}: {error}")
+
+
+def _let_launch(action: Any, context: RecordingContext) -> None:
+    """Let an action do what it does, and visit what it gives."""
+    if isinstance(action, launch.actions.ExecuteLocal):
+        raise FailedError("it starts a process in a way that is not known here")
+    visit_all(evaluated(action.execute, context), context)
+
+
+def described(made: Any) -> str:
+    """Return what an action is, for people."""
+    for kind, describe_it in _DESCRIBED:
+        if isinstance(made, kind):
+            return describe_it(arguments_of(made))
+    if isinstance(made, launch.actions.IncludeLaunchDescription):
+        return f"the included {_shown_location(made)}"
+    if isinstance(made, launch.actions.EmitEvent):
+        return f"the event {type(made.event).__name__}"
+    return str(getattr(made, "NAME", type(made).__name__))
+
+
+def _describe_components(given: Mapping[str, Any]) -> str:
+    container = given["target_container"]
+    if isinstance(container, launch.Action):
+        container = arguments_of(container).get("name")
+    count = len(list(given["composable_node_descriptions"] or ()))
+    return f"{count} component{'' if count == 1 else 's'} for {describe(container)}"
+
+
+def _describe_node(given: Mapping[str, Any]) -> str:
+    return f"the node {describe(given.get('package'))}/{describe(given['executable'])}"
+
+
+#: What actions are for people, by their classes, a derived one before its base.
+_DESCRIBED: tuple[tuple[type, Callable[[Mapping[str, Any]], str]], ...] = (
+    (
+        launch.actions.DeclareLaunchArgument,
+        lambda given: f"the launch argument {describe(given['name'])}",
+    ),
+    (launch.actions.GroupAction, lambda given: f"a group of {len(list(given['actions']))}"),
+    (
+        launch.actions.TimerAction,
+        lambda given: f"a timer with {len(list(given['actions']))} actions",
+    ),
+    (
+        launch.actions.OpaqueFunction,
+        lambda given: f"the function {getattr(given['function'], '__name__', '')}",
+    ),
+    (launch_ros.actions.Node, _describe_node),
+    (launch.actions.ExecuteProcess, lambda given: f"the process {describe(given['cmd'])}"),
+    (launch_ros.actions.LoadComposableNodes, _describe_components),
+    (
+        launch_ros.descriptions.ComposableNode,
+        lambda given: f"the component {describe(given['plugin'])}",
+    ),
+)
+
+
+# Arguments and settings
+
+
+def _declare(action: Any, context: RecordingContext) -> None:
+    evaluated(action.execute, context)
+    if context.depth > 1:
+        return
+    given, name = arguments_of(action), str(action.name)
+    value = str(context.launch_configurations[name])
+    context.declare(name, value)
+    context.record(
+        "argument",
+        place_of(action),
+        name=name,
+        default=optional_text(given.get("default_value"), context),
+        value=value,
+        choices=list(action.choices or ()),
+        description=str(given.get("description") or ""),
+        variable=_variable_of(given.get("default_value"), context),
     )
-    if stand_in in {conditions.IfCondition, conditions.UnlessCondition, conditions.Condition}:
-        made.evaluate = functools.partial(_evaluated, value.evaluate)
-    return made
 
 
-def _event(value: Any, name: str, args: Any, kwargs: Any) -> Any:
-    if isinstance(value, Shutdown):
-        return actions.ShutdownEvent()
-    if name == "ChangeState":
-        return actions.ChangeState(*converted(args), **converted(kwargs))
-    return type(type(value).__name__, (), {})()
+def _variable_of(default: Any, context: RecordingContext) -> str:
+    """Return the environment variable that is an argument's default, or nothing."""
+    only = default[0] if isinstance(default, (list, tuple)) and len(default) == 1 else default
+    if not isinstance(only, substitutions.EnvironmentVariable):
+        return ""
+    given = arguments_of(only)
+    return text_of(given["name"], context) if given.get("default_value") is not None else ""
 
 
-def as_substitution(stand_in: type) -> type:
-    """Return a substitution of launch's whose counterpart is that one.
+def _set_configuration(action: Any, context: RecordingContext) -> None:
+    evaluated(action.execute, context)
+    given = arguments_of(action)
+    context.declared.pop(text_of(given.get("name", ""), context), None)
 
-    For packages that are not installed.
+
+def _unset_variable(action: Any, context: RecordingContext) -> None:
+    name = text_of(arguments_of(action)["name"], context)
+    if context.is_inherited(name) or name not in os.environ:
+        context.todo(place_of(action), f"the environment variable {name} is unset")
+    evaluated(action.execute, context)
+
+
+def _append_variable(action: Any, context: RecordingContext) -> None:
+    given = arguments_of(action)
+    name = text_of(given["name"], context)
+    if name in context.variables:
+        evaluated(action.execute, context)
+        return
+    value = relative(with_package(text_of(given["value"], context)))
+    context.todo(place_of(action), f"{value} is appended to the environment's {name}")
+
+
+def _set_parameter(action: Any, context: RecordingContext) -> None:
+    given = arguments_of(action)
+    evaluated(action.execute, context)
+    name = text_of(given["name"], context)
+    context.params.append({name: parameter_value(given["value"], context)})
+
+
+def _set_sim_time(action: Any, context: RecordingContext) -> None:
+    evaluated(action.execute, context)
+    context.params.append({"use_sim_time": is_true(arguments_of(action)["value"], context)})
+
+
+def _set_parameter_file(action: Any, context: RecordingContext) -> None:
+    context.params.append(with_package(text_of(arguments_of(action)["filename"], context)))
+
+
+def _reset_configurations(action: Any, context: RecordingContext) -> None:
+    context.params = []
+    _let_launch(action, context)
+
+
+# Events
+
+
+_STATES = {1: "inactive", 3: "active"}
+
+
+def _emit(action: Any, context: RecordingContext) -> None:
+    if isinstance(action.event, ChangeState):
+        given = arguments_of(action.event)
+        node = getattr(given.get("lifecycle_node_matcher"), "action", None)
+        state = _STATES.get(int(given.get("transition_id") or 0))
+        if isinstance(node, launch.Action) and state:
+            context.record("lifecycle", place_of(action), node=id_of(node), state=state)
+            return
+    _leave_out(action, context)
+
+
+def _leave_out(action: Any, context: RecordingContext) -> None:
+    context.todo(place_of(action), described(action))
+
+
+def _ignore(_action: Any, _context: RecordingContext) -> None:
+    pass
+
+
+#: The event handlers that a robot file has a word for, with the parameters that name the action
+#: and what happens then.
+_AFTER: dict[type, tuple[str, str, str]] = {
+    event_handlers.OnProcessExit: ("done", "target_action", "on_exit"),
+    event_handlers.OnExecutionComplete: ("done", "target_action", "on_completion"),
+    event_handlers.OnProcessStart: ("started", "target_action", "on_start"),
+    OnStateTransition: ("ready", "target_lifecycle_node", "entities"),
+}
+
+
+def _register(action: Any, context: RecordingContext) -> None:
+    handler = arguments_of(action)["event_handler"]
+    given, at = arguments_of(handler), place_of(action)
+    word, of_target, of_entities = _AFTER.get(type(handler), ("", "", ""))
+    target, entities = given.get(of_target), given.get(of_entities)
+    entities = entities if isinstance(entities, (list, tuple)) else [entities]
+    if not isinstance(target, launch.Action) or any(map(callable, entities)):
+        context.todo(at, f"what happens {type(handler).__name__}")
+        return
+    for entity in entities:
+        if word == "done" and _ends_all(entity):
+            context.record("required", at, node=id_of(target))
+            continue
+        before = dict(context.after)
+        context.after[str(id_of(target))] = word
+        try:
+            visit_all([entity], context)
+        finally:
+            context.after = before
+
+
+def _ends_all(action: Any) -> bool:
+    return isinstance(action, launch.actions.EmitEvent) and isinstance(action.event, Shutdown)
+
+
+def _wait(action: Any, context: RecordingContext) -> None:
+    given = arguments_of(action)
+    text = text_of(given["period"], context)
+    try:
+        period_s = float(text)
+    except ValueError:
+        raise FailedError(f"{text!r} is no time") from None
+    before = context.period_s
+    context.period_s += period_s
+    try:
+        visit_all(list(given["actions"]), context)
+    finally:
+        context.period_s = before
+
+
+# Included files
+
+
+def _location_of(action: Any) -> Any:
+    """Return where an included file is, or the description that is given in its place."""
+    source = arguments_of(action)["launch_description_source"]
+    if not isinstance(source, LaunchDescriptionSource):
+        return source
+    given = arguments_of(source)
+    return given.get("launch_file_path") or given.get("launch_description") or source
+
+
+def _shown_location(action: Any) -> str:
+    location = _location_of(action)
+    parts = location if isinstance(location, (list, tuple)) else [location]
+    return relative("".join(map(describe, parts)))
+
+
+def _include(action: Any, context: RecordingContext) -> None:
+    location = _location_of(action)
+    if isinstance(location, LaunchDescriptionSource):
+        raise FailedError("its source is not known here")
+    given = _given_arguments(action, context)
+    if isinstance(location, launch.LaunchDescription):
+        visit_all([location], context)
+        return
+    path = with_package(text_of(location, context))
+    if path.startswith(PACKAGE):
+        context.record(
+            "include",
+            place_of(action),
+            file=path,
+            args=given,
+            namespace=_namespace(None, context),
+            env=context.variables,
+            period=context.period_s,
+            after=dict(context.after),
+        )
+        return
+    include(os.path.abspath(path), context)  # noqa: PTH100 (pathlib keeps ..)
+
+
+def _given_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
+    """Set the arguments of an included file; return them with those that stand for themselves."""
+    given: dict[str, str] = {}
+    pairs = arguments_of(action).get("launch_arguments") or ()
+    for name, value in pairs.items() if isinstance(pairs, Mapping) else pairs:
+        try:
+            argument, kept = text_of(name, context), kept_text(value, context)
+            text = text_of(value, context)
+        except FailedError as error:
+            # the file has a default for it, or says what it cannot do without
+            context.todo(
+                place_of(action), f"the argument {describe(name)} of {described(action)}: {error}"
+            )
+            continue
+        given[argument] = kept
+        context.launch_configurations[argument] = text
+        same = argument_of(kept)
+        if not same or same.name != argument:
+            context.declared.pop(argument, None)
+    return given
+
+
+def include(path: str, context: RecordingContext) -> None:
+    """Visit what a launch file describes.
+
+    Raises:
+        FailedError: if launch refuses it.
     """
-    kind = type(
-        stand_in.__name__,
-        (launch.Substitution,),
-        {"STAND_IN": stand_in, "__init__": _no_arguments},
+    with context.within(path):
+        visit_all([description_of(path)], context)
+
+
+# Processes
+
+
+def _process(action: Any, context: RecordingContext) -> None:
+    given = arguments_of(action)
+    context.record(
+        "process",
+        place_of(action),
+        argv=[kept_text(word, context) for word in given["cmd"]],
+        label=optional_text(given.get("name"), context),
+        **_common(action, given, context),
     )
-    _keep(kind)
-    kind.perform = lambda self, context: text_of(converted(self), context)  # type: ignore[attr-defined]
-    return kind
 
 
-def _no_arguments(self: Any, *_args: Any, **_kwargs: Any) -> None:
-    launch.Substitution.__init__(self)
+def _node(action: Any, context: RecordingContext) -> None:
+    _record_node(action, "node", context)
+
+
+def _lifecycle_node(action: Any, context: RecordingContext) -> None:
+    automatic = arguments_of(action).get("autostart") in (True, "true", "True")
+    _record_node(action, "node", context, lifecycle="active" if automatic else None)
+
+
+def _container(action: Any, context: RecordingContext) -> None:
+    _record_node(action, "container", context)
+    components = arguments_of(action).get("composable_node_descriptions")
+    _load(action, components, str(id_of(action)), context)
+
+
+def _record_node(action: Any, kind: str, context: RecordingContext, **more: Any) -> None:
+    """Record a node with all that it is told."""
+    given = arguments_of(action)
+    argv = [kept_text(word, context) for word in given.get("arguments") or ()]
+    ros_argv = [text_of(word, context) for word in given.get("ros_arguments") or ()]
+    context.record(
+        kind,
+        place_of(action),
+        executable=text_of(given["executable"], context),
+        label=optional_text(given.get("exec_name"), context),
+        argv=argv + (["--ros-args", *ros_argv] if ros_argv else []),
+        **_of_node(action, given, context),
+        **_common(action, given, context),
+        **more,
+    )
+
+
+def _of_node(action: Any, given: Mapping[str, Any], context: RecordingContext) -> dict[str, Any]:
+    """Return what a node has, in its own process or in a container's."""
+    global_rules = context.launch_configurations.get("ros_remaps", ())
+    rules = [
+        (text_of(old, context), kept_text(new, context))
+        for old, new in given.get("remappings") or ()
+    ]
+    params = parameters_of(given.get("parameters"), context, place_of(action))
+    return {
+        "package": optional_text(given.get("package"), context),
+        "name": optional_text(given.get("name"), context),
+        "namespace": _namespace(given.get("namespace"), context),
+        "params": [*context.params, *params],
+        "remap": [*global_rules, *rules],
+    }
+
+
+def _namespace(namespace: Any, context: RecordingContext) -> str | None:
+    """Return a node's namespace, absolute; None where nothing is said of it."""
+    base = context.launch_configurations.get("ros_namespace")
+    full: str | None = make_namespace_absolute(
+        prefix_namespace(base, optional_text(namespace, context))
+    )
+    return full
+
+
+def _common(action: Any, given: Mapping[str, Any], context: RecordingContext) -> dict[str, Any]:
+    """Return what any process can be told."""
+    variables = [given.get(keyword.name) for keyword in launch_keywords("variables")]
+    env = context.variables
+    for values in variables:
+        env |= _texts(values, context)
+    what: dict[str, Any] = {
+        "id": id_of(action),
+        "env": env,
+        "period": context.period_s,
+        "after": dict(context.after),
+    }
+    if variables[-1] is not None:
+        what["only_env"] = True
+    for keyword in (*launch_keywords(*_READERS), Keyword("shell", "switch")):
+        if given.get(keyword.name) is not None:
+            what[keyword.name] = _READERS[keyword.kind](given[keyword.name], context)
+    for keyword in launch_keywords("shutdown"):
+        follows = given.get(keyword.name)
+        follows = follows if isinstance(follows, (list, tuple)) else [follows]
+        follows = [entity for entity in follows if entity is not None]
+        if not all(map(_ends_all, follows)):
+            context.todo(place_of(action), f"{keyword.name} of a process")
+        what[keyword.name] = any(map(_ends_all, follows))
+    return what
+
+
+def _texts(values: Any, context: RecordingContext) -> dict[str, str]:
+    items = values.items() if isinstance(values, Mapping) else values or ()
+    return {text_of(key, context): kept_text(value, context) for key, value in items}
+
+
+_OUTPUTS = frozenset({"screen", "log", "both", "own_log", "full"})
+
+
+def _output(value: Any, context: RecordingContext) -> str | list[str]:
+    """Return launch's word for where the output goes.
+
+    The places where the word is not one of launch's but a mapping.
+
+    Raises:
+        FailedError: if launch has no such word.
+    """
+    if isinstance(value, Mapping):
+        outputs: set[str] = set()
+        for places in value.values():
+            outputs.update([places] if isinstance(places, str) else places)
+        return sorted(outputs)
+    word = text_of(value, context)
+    if word not in _OUTPUTS:
+        raise FailedError(f"output={word!r}")
+    return word
+
+
+#: What reads a keyword's value, by its kind.
+_READERS: dict[KeywordKind, Callable[[Any, RecordingContext], Any]] = {
+    "text": text_of,
+    "switch": is_true,
+    "number": lambda value, context: float(text_of(value, context)),
+    "output": _output,
+}
+
+
+# Components
+
+
+def _load_into(action: Any, context: RecordingContext) -> None:
+    given = arguments_of(action)
+    container = given["target_container"]
+    if isinstance(container, launch.Action):
+        target = str(id_of(container))
+    else:
+        target = f"/{text_of(container, context).strip('/')}"
+    if target == "/":
+        raise FailedError("it names no container")
+    _load(action, given["composable_node_descriptions"], target, context)
+
+
+def _load(action: Any, components: Any, container: str, context: RecordingContext) -> None:
+    """Record components; ``container`` is their action's id or its node's full name."""
+    for component in components or ():
+        if not isinstance(component, launch_ros.descriptions.ComposableNode):
+            context.todo(place_of(action), f"{type(component).__name__} is no component")
+            continue
+        condition = arguments_of(component).get("condition")
+        _if_holds(
+            component,
+            condition,
+            lambda component=component: _component(component, container, context),  # type: ignore[misc]
+            context,
+        )
+
+
+def _component(component: Any, container: str, context: RecordingContext) -> None:
+    given = arguments_of(component)
+    at = place_of(component)
+    more = {
+        keyword.name: parameters_of(given.get(keyword.name), context, at)
+        for keyword in launch_keywords("parameters")
+    }
+    context.record(
+        "component",
+        at,
+        id=id_of(component),
+        container=container,
+        plugin=text_of(given["plugin"], context),
+        period=context.period_s,
+        after=dict(context.after),
+        **_of_node(component, given, context),
+        **more,
+    )
+
+
+#: What is recorded, by the class of an action or the nearest that it is derived from.
+_HANDLERS: dict[type, Callable[[Any, RecordingContext], None]] = {
+    launch.actions.DeclareLaunchArgument: _declare,
+    launch.actions.SetLaunchConfiguration: _set_configuration,
+    launch.actions.ResetLaunchConfigurations: _reset_configurations,
+    launch.actions.UnsetEnvironmentVariable: _unset_variable,
+    launch.actions.AppendEnvironmentVariable: _append_variable,
+    launch.actions.EmitEvent: _emit,
+    launch.actions.RegisterEventHandler: _register,
+    launch.actions.TimerAction: _wait,
+    launch.actions.IncludeLaunchDescription: _include,
+    launch.actions.ExecuteProcess: _process,
+    launch.actions.LogInfo: _ignore,
+    launch_ros.actions.Node: _node,
+    launch_ros.actions.LifecycleNode: _lifecycle_node,
+    launch_ros.actions.ComposableNodeContainer: _container,
+    launch_ros.actions.LoadComposableNodes: _load_into,
+    launch_ros.actions.LifecycleTransition: _leave_out,
+    launch_ros.actions.SetParameter: _set_parameter,
+    launch_ros.actions.SetUseSimTime: _set_sim_time,
+    launch_ros.actions.SetParametersFromFile: _set_parameter_file,
+}

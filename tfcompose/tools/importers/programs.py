@@ -23,7 +23,8 @@ from tfcompose.tools.importers.static_transforms import (
     reader_of,
     static_transform,
 )
-from tfcompose.tools.importers.yaml_text import Expression, argument, arguments_in, with_values
+from tfcompose.tools.importers.texts import Text, argument_of, concatenated, partition
+from tfcompose.tools.importers.yaml_text import Expression
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -125,16 +126,15 @@ def add_program(draft: Draft, program: Program, target: Target) -> str | None:
 def one_clock(draft: Draft) -> None:
     """Set the robot's clock from node parameters or their argument, if all agree."""
     several = [process["params"] for process in draft.started().values() if "params" in process]
-    found = {params["use_sim_time"] for params in several if "use_sim_time" in params}
-    if found == {True}:
+    clocks = [params["use_sim_time"] for params in several if "use_sim_time" in params]
+    arguments = {argument_of(clock) for clock in clocks}
+    if clocks and all(clock is True for clock in clocks):
         draft.sections["ros"]["clock"] = "sim"
         for process in draft.started().values():
             if process.get("params", {}).pop("use_sim_time", None) and not process["params"]:
                 del process["params"]
-    elif len(found) == 1 and isinstance(text := found.pop(), str):
-        for name in arguments_in(text):
-            if text == argument(name, with_values(text)):
-                draft.sections["ros"]["clock"] = Expression(f"'sim' if args.{name} else 'wall'")
+    elif len(arguments) == 1 and (argument := arguments.pop()):
+        draft.sections["ros"]["clock"] = Expression(f"'sim' if args.{argument.name} else 'wall'")
 
 
 def is_setting(draft: Draft, name: str, value: str) -> bool:
@@ -221,7 +221,7 @@ def _without_ros_arguments(program: Program) -> Program:
                 own.append(word)
             continue
         value = next(words, "") if word in _WITH_VALUE else ""
-        left, _, right = value.partition(":=")
+        left, _, right = partition(value, ":=")
         if word in {"-r", "--remap"} and right:
             rule = {"__node": "name", "__name": "name", "__ns": "namespace"}.get(left)
             found |= {rule: right} if rule else {}
@@ -230,7 +230,7 @@ def _without_ros_arguments(program: Program) -> Program:
             params.append({left: _yaml_value(right)})
         elif word == "--params-file":
             params.append(value)
-        elif word == "--log-level" and with_values(value) in _LEVELS:
+        elif word == "--log-level" and value in _LEVELS:
             keys["log_level"] = value
         else:
             kept += [word, value] if value else [word]
@@ -255,6 +255,8 @@ _LEVELS = frozenset({"debug", "info", "warn", "error", "fatal"})
 
 def _yaml_value(text: str) -> Any:
     """Return a parameter of the command line, which ROS reads as YAML."""
+    if isinstance(text, Text):
+        return text
     plain = {"true": True, "false": False}
     if text.lower() in plain:
         return plain[text.lower()]
@@ -472,7 +474,7 @@ def _texts(words: Sequence[Any]) -> list[str]:
 def _run(program: Program) -> Any:
     """Return what ``run`` says of the program."""
     if program.shell:
-        return " ".join(program.argv)
+        return concatenated(program.argv, " ")
     if program.package is not None:
         run: dict[str, Any] = {"package": program.package, "executable": program.executable}
         return run | ({"args": list(program.argv)} if program.argv else {})
@@ -483,7 +485,8 @@ def _run(program: Program) -> Any:
             and not package.startswith("-")
         ):
             run = {"launch": f"{package}/{file}"}
-            return run | ({"args": dict(word.split(":=", 1) for word in words)} if words else {})
+            args = {left: right for left, _, right in (partition(word, ":=") for word in words)}
+            return run | ({"args": args} if args else {})
     return list(program.argv)
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.yaml_text import Bare, entry
+from tfcompose.tools.importers.texts import Argument, FileText, Text, parts_of, texts_in
+
+if TYPE_CHECKING:
+    from tfcompose.tools.importers.texts import Part
 
 
 class Expression(str):
@@ -18,42 +21,15 @@ def without_expressions(
     sections: dict[str, dict[str, Any]],
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
     """Return sections without accidental expressions, and the variable they need."""
-    lines = (
-        entry("vars", {"dollar": "$"}) if any("${" in value for value in _texts(sections)) else []
+    literals = (
+        part
+        for text in texts_in(sections)
+        if not isinstance(text, Expression)
+        for part in parts_of(text)
+        if isinstance(part, str)
     )
+    lines = entry("vars", {"dollar": "$"}) if any("${" in part for part in literals) else []
     return _escaped(sections), lines
-
-
-#: What stands for an argument of the robot file among texts that may hold anything: its name, and
-#: its value.
-_ARGUMENT = re.compile("\x04([^\x05]*)\x05([^\x06]*)\x06")
-
-
-def argument(name: str, value: str) -> str:
-    """Return what stands for an argument that has this value.
-
-    ``${args.name}`` in the written file.
-    """
-    return f"\x04{name}\x05{value}\x06"
-
-
-def arguments_in(value: Any) -> set[str]:
-    """Return the names of the arguments in data."""
-    return {found[1] for one in _texts(value) for found in _ARGUMENT.finditer(one)}
-
-
-def with_values(value: str) -> str:
-    """Return a text with the values of its arguments."""
-    return _ARGUMENT.sub(r"\2", value)
-
-
-def _texts(value: Any) -> list[str]:
-    """Return the texts in which expressions are looked for: in a key none is."""
-    if isinstance(value, dict):
-        return [one for item in value.values() for one in _texts(item)]
-    if isinstance(value, (list, tuple)):
-        return [one for item in value for one in _texts(item)]
-    return [value] if isinstance(value, str) and not isinstance(value, Expression) else []
 
 
 def _escaped(value: Any) -> Any:
@@ -65,5 +41,16 @@ def _escaped(value: Any) -> Any:
         return value
     if isinstance(value, Expression):
         return f"${{{value}}}"
-    text = _ARGUMENT.sub(lambda found: f"${{args.{found[1]}}}", value.replace("${", "${dollar}{"))
+    if isinstance(value, Text):
+        return "".join(map(_escaped_part, value.parts))
+    text = value.replace("${", "${dollar}{")
     return Bare(f'"{text}"') if text != value and isinstance(value, Bare) else type(value)(text)
+
+
+def _escaped_part(part: Part) -> str:
+    match part:
+        case Argument(name=name):
+            return f"${{args.{name}}}"
+        case FileText(file=file):
+            return file.replace("${", "${dollar}{")
+    return part.replace("${", "${dollar}{")

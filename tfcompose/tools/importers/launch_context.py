@@ -1,0 +1,89 @@
+"""Launch's context, with what is recorded beside it.
+
+This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import launch
+
+from tfcompose.tools.importers.launch_objects import here
+from tfcompose.tools.importers.launch_records import FailedError, Recording, with_package
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+#: How deep launch files include each other.
+_DEEPEST = 30
+
+
+class RecordingContext(launch.LaunchContext, Recording):  # type: ignore[misc]
+    """Launch's context, with what is recorded beside it."""
+
+    def __init__(self, find: Callable[[str, str], str | None], *, every_branch: bool) -> None:
+        launch.LaunchContext.__init__(self, noninteractive=True)
+        Recording.__init__(self, find, every_branch=every_branch)
+        #: Parameters of all nodes: mappings, and names of files.
+        self.params: list[Any] = []
+        #: What loads the components that are visited: the id of its action, or the full name of
+        #: its node.
+        self.container: str | None = None
+        self._environment = dict(os.environ)
+        self._scopes: list[tuple[list[Any], dict[str, str]]] = []
+
+    @property
+    def file(self) -> str:
+        """The launch file that is read."""
+        return str(self.get_locals_as_dict().get("current_launch_file_path", ""))
+
+    def here(self) -> tuple[str, int]:
+        """Return the file and line that is read now."""
+        place = here()
+        return place if place[0] else self.at
+
+    @property
+    def variables(self) -> dict[str, str]:
+        """The variables that launch files have set."""
+        return {
+            name: with_package(value)
+            for name, value in os.environ.items()
+            if self._environment.get(name) != value
+        }
+
+    def is_inherited(self, name: str) -> bool:
+        """Return whether a variable is there, as the import was started with it."""
+        return name in os.environ and self._environment.get(name) == os.environ[name]
+
+    @contextlib.contextmanager
+    def within(self, path: str) -> Iterator[None]:
+        """Let another launch file be the one that is read.
+
+        Raises:
+            FailedError: if they include each other.
+        """
+        if self.depth >= _DEEPEST:
+            raise FailedError("launch files include each other")
+        self._push_locals()
+        folder = str(Path(path).parent)
+        self.extend_locals(
+            {"current_launch_file_path": path, "current_launch_file_directory": folder}
+        )
+        self.depth += 1
+        try:
+            yield
+        finally:
+            self.depth -= 1
+            self._pop_locals()
+
+    def _push_launch_configurations(self) -> None:
+        super()._push_launch_configurations()
+        self._scopes.append((list(self.params), dict(self.declared)))
+
+    def _pop_launch_configurations(self) -> None:
+        super()._pop_launch_configurations()
+        self.params, self.declared = self._scopes.pop()

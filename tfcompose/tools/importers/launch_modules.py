@@ -1,0 +1,288 @@
+"""Modules that launch files import, in the place of others or of what is not installed.
+
+``ament_index_python`` finds packages around the launch file too, xacro and MoveIt keep which files
+they read, and nav2_common names what it would change in a parameter file. Modules that are not
+installed give values that do nothing, and are named.
+
+This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.abc
+import importlib.machinery
+import sys
+import types
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import ament_index_python.packages
+import launch
+import launch_ros.substitutions.find_package
+import yaml
+from launch.substitutions import LaunchConfiguration
+
+from tfcompose.tools.importers.launch_moveit import MoveItConfigsBuilder
+from tfcompose.tools.importers.launch_objects import here
+from tfcompose.tools.importers.launch_parameters import text_of
+from tfcompose.tools.importers.launch_records import (
+    PACKAGE,
+    FailedError,
+    placeholder,
+    with_package,
+)
+
+if TYPE_CHECKING:
+    from tfcompose.tools.importers.launch_context import RecordingContext
+
+
+def attach(context: RecordingContext) -> None:
+    """Let launch files import these modules."""
+    _find_in_index(context)
+    replaced = _replaced(context)
+    for name in [name for name in sys.modules if name.partition(".")[0] in replaced]:
+        del sys.modules[name]
+    sys.meta_path.insert(0, _Replaced(replaced))
+    sys.meta_path.append(_NotInstalled(context))
+
+
+def _find_in_index(context: RecordingContext) -> None:
+    """Let packages be found around the launch file too; one that is not found has an address."""
+
+    def share(name: str, **_more: Any) -> str:
+        return context.find(name, context.file) or f"{PACKAGE}{name}"
+
+    def prefix(name: str) -> str:
+        found = context.find(name, context.file)
+        return str(Path(found).parents[1]) if found else f"{PACKAGE}{name}"
+
+    index = (ament_index_python, ament_index_python.packages)
+    for module in (*index, launch_ros.substitutions.find_package):
+        vars(module).update(
+            get_package_share_directory=share,
+            get_package_prefix=prefix,
+            get_package_share_path=lambda name, **_: Path(share(name)),
+            get_packages_with_prefixes=dict,
+        )
+
+
+def _replaced(context: RecordingContext) -> dict[str, dict[str, Any]]:
+    """Return what the modules of packages have that are replaced, by the packages' names."""
+
+    def share(name: str) -> str:
+        return ament_index_python.packages.get_package_share_directory(name)
+
+    return {
+        "xacro": {
+            "process_file": _Document,
+            "process": lambda file, **more: _Document(file, **more).text,
+            "parse": _Document,
+            "process_doc": lambda *_args, **_more: None,
+        },
+        "nav2_common": {
+            "RewrittenYaml": _Rewritten,
+            "ReplaceString": _Rewritten,
+            "HasNodeParams": _HasNode,
+            "LaunchConfigAsBool": _AsBool,
+            "ParseMultiRobotPose": functools.partial(_RobotPoses, context),
+        },
+        "moveit_configs_utils": {
+            "MoveItConfigsBuilder": functools.partial(MoveItConfigsBuilder, share, context)
+        },
+    }
+
+
+class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Makes modules in the place of those that are looked for."""
+
+    def exec_module(self, module: Any) -> None:
+        """Nothing has to be run."""
+
+
+class _Replaced(_Finder):
+    """Finds the modules that are replaced, before those that are installed."""
+
+    def __init__(self, replaced: dict[str, dict[str, Any]]) -> None:
+        self._replaced = replaced
+
+    def find_spec(self, fullname: str, _path: Any = None, _target: Any = None) -> Any:
+        if fullname.partition(".")[0] not in self._replaced:
+            return None
+        return importlib.machinery.ModuleSpec(fullname, self, is_package=True)
+
+    def create_module(self, spec: Any) -> Any:
+        module = _Module(spec.name)
+        vars(module).update(self._replaced[spec.name.partition(".")[0]])
+        return module
+
+
+class _NotInstalled(_Finder):
+    """Finds what launch files import and is not installed, after all others."""
+
+    def __init__(self, context: RecordingContext) -> None:
+        self._context = context
+
+    def find_spec(self, fullname: str, _path: Any = None, _target: Any = None) -> Any:
+        if not _is_from_launch_file():
+            return None
+        return importlib.machinery.ModuleSpec(fullname, self, is_package=True)
+
+    def create_module(self, spec: Any) -> Any:
+        self._context.todo(here(), f"the module {spec.name} is not installed here")
+        return _Module(spec.name)
+
+
+def _is_from_launch_file() -> bool:
+    """Return whether a launch file itself imports what is looked for."""
+    frame: Any = sys._getframe(2)  # noqa: SLF001 (CPython's only way)
+    while frame is not None:
+        name = frame.f_code.co_filename
+        if not name.startswith("<frozen") and name != __file__ and "importlib" not in name:
+            return bool(frame.f_globals.get("__name__") == "python_launch_file")
+        frame = frame.f_back
+    return False
+
+
+class _Module(types.ModuleType):
+    """A module whose names are not known here, but for those that it is given."""
+
+    __path__: list[str] = []  # noqa: RUF012 (as a package has it)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        qualified = f"{self.__name__}.{name}"
+        if name[:1].isupper():
+            found: Any = type(name, (_Unknown,), {"NAME": qualified})
+        else:
+            found = _Unknown()
+            found.NAME = qualified
+        setattr(self, name, found)
+        return found
+
+
+class _Unknown(launch.Action, launch.Substitution):  # type: ignore[misc]
+    """What a module that is not installed here would give: an action, a substitution, a value.
+
+    Whatever is done with it gives the same.
+    """
+
+    NAME = ""
+
+    def __init__(self, *_args: Any, **_kwargs: Any) -> None:
+        launch.Action.__init__(self)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        found = _Unknown()
+        found.NAME = f"{self.NAME}.{name}"
+        return found
+
+    def __call__(self, *_args: Any, **_kwargs: Any) -> Any:
+        return self
+
+    def __getitem__(self, key: Any) -> Any:
+        return self
+
+    def __iter__(self) -> Any:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+    def __str__(self) -> str:
+        return ""
+
+    def execute(self, _context: Any) -> None:
+        raise FailedError(f"{self.NAME} is not known here")
+
+    def perform(self, _context: Any) -> str:
+        raise FailedError(f"{self.NAME} is not known here")
+
+    def describe(self) -> str:
+        return self.NAME
+
+
+class _Document:
+    """What xacro makes of a file."""
+
+    def __init__(self, file: Any, mappings: Any = None) -> None:
+        args = {str(name): str(value) for name, value in dict(mappings or {}).items()}
+        self.text = placeholder(str(file), args)
+
+    def toxml(self, *_args: Any, **_kwargs: Any) -> str:
+        return self.text
+
+    toprettyxml = toxml
+
+
+class _AsBool(LaunchConfiguration):  # type: ignore[misc]
+    """nav2_common's: an argument as True or False, however it is written."""
+
+    def __init__(self, name: Any) -> None:
+        super().__init__(name)
+
+    def perform(self, context: Any) -> str:
+        text = super().perform(context)
+        return str(text.strip().lower() in {"true", "1", "yes", "on", "y", "t"})
+
+
+class _FromFile(launch.Substitution):  # type: ignore[misc]
+    """A substitution of nav2_common's about a parameter file."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__()
+        self.at, self.given = here(), given
+
+    def _file(self, context: Any) -> str:
+        return with_package(text_of(self.given.get("source_file", ""), context))
+
+
+class _Rewritten(_FromFile):
+    """nav2_common's RewrittenYaml and ReplaceString.
+
+    The file as it is, and what would be changed in it.
+    """
+
+    def perform(self, context: Any) -> str:
+        file = self._file(context)
+        changes = self.given.get("param_rewrites") or self.given.get("replacements") or {}
+        root = text_of(self.given.get("root_key") or "", context).strip("/")
+        several = [f"all is put below {root}"] if root else []
+        several += [
+            f"{text_of(key, context)}: {text_of(value, context)}" for key, value in changes.items()
+        ]
+        if several:
+            context.todo(self.at, f"changes in {Path(file).name}: {', '.join(several)}")
+        return file
+
+
+class _HasNode(_FromFile):
+    """nav2_common's HasNodeParams: whether a parameter file has a node."""
+
+    def perform(self, context: Any) -> str:
+        file, node = self._file(context), text_of(self.given.get("node_name", ""), context)
+        try:
+            data = yaml.safe_load(Path(file).read_text("utf-8"))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise FailedError(f"{file} cannot be read: {error}") from None
+        return str(isinstance(data, dict) and node in data)
+
+
+class _RobotPoses:
+    """nav2_common's ParseMultiRobotPose.
+
+    Poses of robots, which it takes from the command line of ``ros2 launch``.
+    """
+
+    def __init__(self, context: RecordingContext, argument: str) -> None:
+        context.todo(
+            here(),
+            f"the argument {argument}, which ParseMultiRobotPose takes from the command line",
+        )
+
+    def value(self) -> dict[str, Any]:
+        """Return no robots."""
+        return {}

@@ -1,0 +1,487 @@
+"""Texts, parameters and conditions of launch's objects, with arguments that stand for themselves.
+
+This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import launch
+import yaml
+from launch.conditions import IfCondition, LaunchConfigurationEquals, UnlessCondition
+from launch.substitutions import (
+    LaunchConfiguration,
+    PathJoinSubstitution,
+    PythonExpression,
+    TextSubstitution,
+)
+from launch.utilities.type_utils import normalize_typed_substitution, perform_typed_substitution
+from launch_ros.parameter_descriptions import Parameter, ParameterFile, ParameterValue
+
+from tfcompose.tools.importers.launch_objects import arguments_of, class_name, reason
+from tfcompose.tools.importers.launch_records import (
+    FailedError,
+    conjunction,
+    scalar_of,
+    shown,
+    with_files,
+    with_package,
+)
+from tfcompose.tools.importers.texts import (
+    Argument,
+    Part,
+    Text,
+    argument_of,
+    arguments_in,
+    files_in,
+    fill,
+)
+
+if TYPE_CHECKING:
+    from tfcompose.tools.importers.launch_context import RecordingContext
+
+
+# Texts
+
+
+def text_of(value: Any, context: RecordingContext) -> str:
+    """Return the text of a value, a substitution or a list of them, as launch has it.
+
+    Raises:
+        FailedError: if it cannot be evaluated.
+    """
+    if isinstance(value, launch.Substitution):
+        return str(evaluated(value.perform, context))
+    if isinstance(value, (list, tuple)):
+        return "".join(text_of(item, context) for item in value)
+    return with_package(os.fspath(value)) if isinstance(value, os.PathLike) else str(value)
+
+
+def evaluated(evaluate: Callable[[Any], Any], context: RecordingContext) -> Any:
+    """Return what launch, or another package, makes of a context.
+
+    Raises:
+        FailedError: with what it says, if it raises something.
+    """
+    try:
+        return evaluate(context)
+    except FailedError:
+        raise
+    except Exception as error:  # noqa: BLE001 (launch's, or another package's)
+        raise FailedError(reason(error)) from None
+
+
+def optional_text(value: Any, context: RecordingContext) -> str | None:
+    """Return the text of a value, or None where there is none."""
+    return None if value is None else text_of(value, context)
+
+
+def kept_text(value: Any, context: RecordingContext, *, typed: bool = False) -> str:
+    """Return a value's text in which launch arguments stand for themselves.
+
+    ``typed``: where an argument is all of it, it may be 10.0, which texts lose.
+    """
+    return with_package(with_files(Text.of(_parts(value, context, typed=typed))))
+
+
+def _parts(value: Any, context: RecordingContext, *, typed: bool) -> list[Part]:
+    if type(value) is LaunchConfiguration:
+        name = text_of(value.variable_name, context)
+        known = context.launch_configurations.get(name)
+        if isinstance(known, str) and context.argument_kept(name, known, typed=typed):
+            return [Argument(name, known)]
+        return [text_of(value, context)]
+    if isinstance(value, PathJoinSubstitution):
+        return _joined([_parts(part, context, typed=typed) for part in value.substitutions])
+    if isinstance(value, (list, tuple)):
+        return [part for item in value for part in _parts(item, context, typed=typed)]
+    return [text_of(value, context)]
+
+
+def _joined(several: Iterable[list[Part]]) -> list[Part]:
+    """Return the parts of a path, as ``os.path.join`` has it."""
+    path: list[Part] = []
+    for parts in several:
+        before, added = str(Text.of(path)), str(Text.of(parts))
+        if added.startswith("/"):
+            path = []
+        elif before and not before.endswith("/"):
+            path.append("/")
+        path += parts if added else []  # an empty argument is no part of it
+    return path
+
+
+def is_true(value: Any, context: RecordingContext) -> bool:
+    """Return what launch takes for true or false.
+
+    Raises:
+        FailedError: for another text.
+    """
+    if isinstance(value, bool):
+        return value
+    text = text_of(value, context).strip().lower()
+    if text in {"true", "1"}:
+        return True
+    if text in {"false", "0"}:
+        return False
+    raise FailedError(f"{text!r} is neither true nor false")
+
+
+def describe(value: Any) -> str:
+    """Return a value that may have substitutions in it, for people."""
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(describe, value))
+    if not isinstance(value, launch.Substitution):
+        return str(value)
+    described = _DESCRIBED.get(class_name(value))
+    return described(arguments_of(value)) if described else str(value.describe())
+
+
+def _operands(given: Mapping[str, Any]) -> list[Any]:
+    return list(given["args"]) if "args" in given else [given["left"], given["right"]]
+
+
+def _describe_all(given: Mapping[str, Any]) -> str:
+    return " and ".join(map(describe, _operands(given)))
+
+
+def _describe_any(given: Mapping[str, Any]) -> str:
+    return " or ".join(map(describe, _operands(given)))
+
+
+def _describe_equality(given: Mapping[str, Any], sign: str) -> str:
+    return f"{describe(given['left']) or repr('')} {sign} {describe(given['right']) or repr('')}"
+
+
+#: What substitutions are for people, by their classes.
+_DESCRIBED: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "TextSubstitution": lambda given: str(given["text"]),
+    "LaunchConfiguration": lambda given: describe(given["variable_name"]),
+    "PathJoinSubstitution": lambda given: "/".join(map(describe, given["substitutions"])),
+    "PythonExpression": lambda given: " ".join(describe(given["expression"]).split()),
+    "FindPackage": lambda given: describe(given["package"]),
+    "FindPackageShare": lambda given: describe(given["package"]),
+    "FindPackagePrefix": lambda given: describe(given["package"]),
+    "NotSubstitution": lambda given: f"not {describe(given['value'])}",
+    "EqualsSubstitution": lambda given: _describe_equality(given, "=="),
+    "NotEqualsSubstitution": lambda given: _describe_equality(given, "!="),
+    "AndSubstitution": _describe_all,
+    "AllSubstitution": _describe_all,
+    "OrSubstitution": _describe_any,
+    "AnySubstitution": _describe_any,
+}
+
+
+# Parameters
+
+_KINDS: dict[Any, str] = {bool: "bool", int: "int", float: "float", str: "string"}
+
+
+def parameters_of(given: Any, context: RecordingContext, at: Any) -> list[Any]:
+    """Return parameters as mappings and names of files, in order.
+
+    What cannot be resolved is said.
+    """
+    several: list[Any] = []
+    for params in given or ():
+        try:
+            if isinstance(params, Mapping):
+                several.append(dict(_flat(params, context, "", at)))
+            elif isinstance(params, Parameter):
+                made_of = arguments_of(params)
+                several.append({text_of(made_of["name"], context): _described(made_of, context)})
+            else:
+                is_file = isinstance(params, ParameterFile)
+                file = arguments_of(params)["param_file"] if is_file else params
+                several.append(shown(with_package(text_of(file, context))))
+        except FailedError as error:
+            context.todo(at, f"parameters: {error}")
+    return several
+
+
+def _flat(
+    params: Mapping[Any, Any], context: RecordingContext, above: str, at: Any
+) -> Iterator[tuple[str, Any]]:
+    """Yield parameters by full name, without those that cannot be resolved."""
+    for key, value in params.items():
+        name = f"{above}{text_of(key, context)}"
+        if isinstance(value, Mapping):
+            yield from _flat(value, context, f"{name}.", at)
+            continue
+        try:
+            yield name, parameter_value(value, context)
+        except FailedError as error:
+            context.todo(at, f"the parameter {name}: {error}")
+
+
+def parameter_value(value: Any, context: RecordingContext) -> Any:
+    """Return a parameter's value as launch hands it on.
+
+    What a substitution gives is read as YAML.
+
+    Raises:
+        FailedError: if launch would refuse it.
+    """
+    if isinstance(value, ParameterValue):
+        return _described(arguments_of(value), context)
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, launch.Substitution):
+        return _read_as_yaml(value, context)
+    if isinstance(value, (list, tuple)):
+        if any(isinstance(item, launch.Substitution) for item in value):
+            return _read_as_yaml(value, context)
+        items = [parameter_value(item, context) for item in value]
+        numbers = all(
+            isinstance(item, (int, float)) and not isinstance(item, bool) for item in items
+        )
+        if numbers and any(isinstance(item, float) for item in items):
+            return [float(item) for item in items]
+        return items
+    return text_of(value, context)
+
+
+def _described(made_of: Mapping[str, Any], context: RecordingContext) -> Any:
+    """Return the value of what launch calls a description of one, with its type."""
+    value, value_type = made_of["value"], made_of.get("value_type")
+    if isinstance(value, (int, float)) and value_type in (None, type(value)):
+        return value
+    if isinstance(value, list) and not any(
+        isinstance(item, launch.Substitution) for item in value
+    ):
+        kind = (*getattr(value_type, "__args__", ()), None)[0]
+        return [_item(item, kind, context) for item in value]
+    if value_type is None:
+        return _read_as_yaml(value, context)
+    kept = _kept_with_type(value, value_type, context)
+    if kept is not None:
+        return kept
+    if value_type is str:
+        return with_files(text_of(value, context))
+    return evaluated(lambda _: _typed_by_launch(value, value_type, context), context)
+
+
+def _item(item: Any, kind: Any, context: RecordingContext) -> Any:
+    value_type = str if isinstance(item, str) else kind
+    return _described({"value": item, "value_type": value_type}, context)
+
+
+def _typed_by_launch(value: Any, value_type: Any, context: RecordingContext) -> Any:
+    normalized = normalize_typed_substitution(value, value_type)
+    return perform_typed_substitution(context, normalized, value_type)
+
+
+def _kept_with_type(value: Any, value_type: Any, context: RecordingContext) -> str | None:
+    """Return the text with arguments as themselves, if they have the value's type."""
+    text = _parameter_text(value, context)
+    argument = argument_of(text)
+    if argument and context.declared.get(argument.name) == _KINDS.get(value_type):
+        return text
+    names = arguments_in(text)
+    if names and not argument and value_type is str:
+        return text
+    context.decided |= names
+    return None
+
+
+def _parameter_text(value: Any, context: RecordingContext) -> str:
+    text = kept_text(value, context, typed=True)
+    if argument_of(text) or not arguments_in(text):
+        return text
+    return kept_text(value, context)
+
+
+def _read_as_yaml(value: Any, context: RecordingContext) -> Any:
+    """Return the value that YAML reads in a text.
+
+    Arguments stand for themselves where they are read alike.
+    """
+    text = _parameter_text(value, context)
+    if files_in(text):
+        return fill(text, Argument)
+    names = arguments_in(text)
+    typed = _typed(str(text))
+    if not names:
+        return typed
+    expected = scalar_of(str(text)) if argument_of(text) else str(text)
+    if typed == expected and isinstance(typed, (bool, int, float, str)):
+        return text
+    context.decided |= names
+    return typed
+
+
+def _typed(text: str) -> Any:
+    try:
+        value = yaml.safe_load(text) if text else ""
+    except yaml.YAMLError:
+        raise FailedError(f"the value {text!r} of a parameter is no YAML") from None
+    return value if isinstance(value, (bool, int, float, str, list)) else text
+
+
+# Conditions, as an expression of a robot file
+
+
+def when_of(condition: Any, context: RecordingContext) -> str | None:
+    """Return a condition as an expression of a robot file, or None where it cannot be one."""
+    given = arguments_of(condition)
+    if isinstance(condition, IfCondition):
+        inner = expression_of(given["predicate_expression"], context)
+        return inner and f"not ({inner})" if isinstance(condition, UnlessCondition) else inner
+    if isinstance(condition, LaunchConfigurationEquals):
+        sign = "!=" if class_name(condition) == "LaunchConfigurationNotEquals" else "=="
+        name = describe(given["launch_configuration_name"])
+        return _comparison(name, sign, given["expected_value"], context)
+    return None
+
+
+def describe_condition(condition: Any) -> str:
+    """Return a condition for people."""
+    given = arguments_of(condition)
+    if isinstance(condition, UnlessCondition):
+        return f"not {describe(given['predicate_expression'])}"
+    if isinstance(condition, IfCondition):
+        return describe(given["predicate_expression"])
+    if isinstance(condition, LaunchConfigurationEquals):
+        sign = "!=" if class_name(condition) == "LaunchConfigurationNotEquals" else "=="
+        name = describe(given["launch_configuration_name"])
+        return f"{name} {sign} {describe(given['expected_value'])}"
+    return "a condition"
+
+
+def expression_of(value: Any, context: RecordingContext) -> str | None:
+    """Return a truth value as an expression of a robot file, or None."""
+    only = _alone(value)
+    if not isinstance(only, launch.Substitution):
+        return None
+    given = arguments_of(only)
+    match class_name(only):
+        case "LaunchConfiguration":
+            name = describe(given["variable_name"])
+            return f"args.{name}" if context.declared.get(name) == "bool" else None
+        case "NotSubstitution":
+            inner = expression_of(given["value"], context)
+            return inner and f"not ({inner})"
+        case "AndSubstitution" | "AllSubstitution":
+            return conjunction((expression_of(arg, context) for arg in _operands(given)), " and ")
+        case "OrSubstitution" | "AnySubstitution":
+            return conjunction((expression_of(arg, context) for arg in _operands(given)), " or ")
+        case "EqualsSubstitution" | "NotEqualsSubstitution" as name:
+            left = _alone(given["left"])
+            if isinstance(left, LaunchConfiguration):
+                sign = "==" if name == "EqualsSubstitution" else "!="
+                return _comparison(describe(left), sign, given["right"], context)
+        case "PythonExpression":
+            return _of_python_expression(only, context)
+    return None
+
+
+def _alone(value: Any) -> Any:
+    """Return the only item of a list, as the frontends write a value; a text as such."""
+    only = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
+    return str(only.text) if isinstance(only, TextSubstitution) else only
+
+
+_SIGNS: dict[type[ast.cmpop], str] = {
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+}
+
+
+def _of_python_expression(value: PythonExpression, context: RecordingContext) -> str | None:
+    """Return a Python condition as an expression of a robot file, or None."""
+    pieces = arguments_of(value)["expression"]
+    text = _PythonText(context)
+    for piece in pieces if isinstance(pieces, (list, tuple)) else [pieces]:
+        if isinstance(piece, LaunchConfiguration):
+            text.add_argument(describe(piece))
+        elif isinstance(piece, (str, TextSubstitution)):
+            text.add(piece if isinstance(piece, str) else str(piece.text))
+        else:
+            return None
+    return text.expression()
+
+
+class _PythonText:
+    """The text of a Python condition, in which names stand for arguments."""
+
+    def __init__(self, context: RecordingContext) -> None:
+        self._context = context
+        self._text = ""
+        #: The arguments by the names that stand for them; within quotes the name is a text.
+        self._arguments: dict[str, str] = {}
+
+    def add(self, text: str) -> None:
+        self._text += text
+
+    def add_argument(self, name: str) -> None:
+        stands_for = f"argument_{len(self._arguments)}"
+        self._arguments[stands_for] = name
+        self._text += stands_for
+
+    def expression(self) -> str | None:
+        """Return the condition in the robot file's words, or None where it has none for it."""
+        try:
+            return self._of(ast.parse(self._text.strip(), mode="eval").body)
+        except (SyntaxError, ValueError):
+            return None
+
+    def _of(self, node: ast.expr) -> str | None:
+        match node:
+            case ast.BoolOp(op=op, values=values):
+                word = " and " if isinstance(op, ast.And) else " or "
+                return conjunction(map(self._of, values), word)
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                inner = self._of(operand)
+                return inner and f"not ({inner})"
+            case ast.Name(id=word) if word in self._arguments:
+                name = self._arguments[word]
+                return f"args.{name}" if self._context.declared.get(name) == "bool" else None
+            case ast.Compare(left=left, ops=[op], comparators=[ast.Constant(value=value)]) if (
+                type(op) in _SIGNS
+            ):
+                return self._of_comparison(left, _SIGNS[type(op)], value)
+        return None
+
+    def _of_comparison(self, left: ast.expr, sign: str, value: Any) -> str | None:
+        match left:
+            case ast.Call(func=ast.Attribute(value=inner, attr="lower"), args=[]):
+                left = inner
+        is_equality = sign in {"==", "!="}
+        match left:
+            case ast.Constant(value=str(word)) if word in self._arguments and is_equality:
+                if not isinstance(value, str):
+                    return None
+                return _comparison(self._arguments[word], sign, value, self._context)
+            case ast.Name(id=word) if word in self._arguments:
+                name = self._arguments[word]
+            case _:
+                return None
+        if isinstance(value, bool):
+            if not is_equality:
+                return None
+            return _comparison(name, sign, str(value).lower(), self._context)
+        is_known = self._context.declared.get(name) in {"int", "float"}
+        return (
+            f"args.{name} {sign} {value}" if isinstance(value, (int, float)) and is_known else None
+        )
+
+
+def _comparison(name: str, sign: str, value: Any, context: RecordingContext) -> str | None:
+    kind, expected = context.declared.get(name), _alone(value)
+    if kind is None or not isinstance(expected, str) or "'" in expected:
+        return None
+    if kind == "string":
+        return f"args.{name} {sign} '{expected}'"
+    typed = scalar_of(expected)
+    if kind == "bool" and isinstance(typed, bool):
+        return f"args.{name}" if typed is (sign == "==") else f"not args.{name}"
+    is_number = isinstance(typed, (int, float)) and not isinstance(typed, bool)
+    return f"args.{name} {sign} {expected}" if is_number and kind in {"int", "float"} else None

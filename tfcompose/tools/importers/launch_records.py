@@ -1,0 +1,200 @@
+"""Records of what launch files start, whichever reader makes them.
+
+This runs in the process that reads launch files (``launch_process``).
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.tools.importers.texts import FileText, Part, Text, as_json, parts_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+#: As what the folder of a package begins that is not found.
+PACKAGE = "package://"
+#: What tells actions apart in records; Python's ``id`` is given again to another one once an
+#: action is gone.
+IDS = itertools.count(1)
+
+
+class FailedError(Exception):
+    """Something of a launch file cannot be resolved.
+
+    ``line`` is set where it is about a whole file, else 0.
+    """
+
+    def __init__(self, reason: str, line: int = 0) -> None:
+        super().__init__(f"line {line}: {reason}" if line else reason)
+        self.reason, self.line = reason, line
+
+
+class Recording:
+    """What a launch file starts, as far as it is read.
+
+    ``records`` is what came of it, in order.
+    """
+
+    def __init__(
+        self, find: Callable[[str, str], str | None], *, every_branch: bool = False
+    ) -> None:
+        self.find, self.every_branch = find, every_branch
+        self.records: list[dict[str, Any]] = []
+        #: The file and line of what is read now.
+        self.at: tuple[str, int] = ("", 1)
+        self.conditions: list[str] = []
+        self.whens: list[str] = []
+        self.period_s = 0.0
+        self.after: dict[str, str] = {}
+        #: The types of launch arguments that a robot file can have as its own, by name.
+        self.declared: dict[str, str] = {}
+        #: Those whose value decided something that stands in the robot file as it is now.
+        self.decided: set[str] = set()
+        self.depth = 0
+
+    def here(self) -> tuple[str, int]:
+        """Return the file and line that is read now."""
+        return self.at
+
+    def record(self, kind: str, at: Any, **what: Any) -> None:
+        """Keep what an action does."""
+        more: dict[str, Any] = {"when": list(self.conditions)} if self.conditions else {}
+        more |= {"only_when": " and ".join(dict.fromkeys(self.whens))} if self.whens else {}
+        self.records.append({"kind": kind, "at": at, **more, **what})
+
+    def todo(self, at: Any, text: str) -> None:
+        """Say what of a launch file is not resolved."""
+        self.record("todo", at, text=shown(text))
+
+    def declare(self, name: str, value: str) -> None:
+        """Take an argument's value as one that the robot file may have as its own."""
+        kinds = {bool: "bool", int: "int", float: "float", str: "string"}
+        if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+            self.declared[name] = kinds[type(scalar_of(value))]
+
+    def argument_kept(self, name: str, value: str, *, typed: bool = False) -> bool:
+        """Return whether an argument's value can stand for itself.
+
+        Otherwise it is written down, and decides. ``typed``: it may be 10.0, which texts lose.
+        """
+        if name not in self.declared:
+            return False
+        scalar = scalar_of(value)
+        is_kept = str(scalar).lower() == value  # True would become true
+        if isinstance(scalar, float) and scalar.is_integer() and not typed:
+            is_kept = False  # 10.0 would become 10
+        if is_kept or self.declared[name] == "string":
+            return True
+        self.decided.add(name)
+        return False
+
+
+def scalar_of(text: str) -> Any:
+    """Return what a launch argument is: true or false, a number as it is written, or the text."""
+    if text.lower() in {"true", "false"}:
+        return text.lower() == "true"
+    if re.fullmatch(r"-?(0|[1-9][0-9]{0,15})", text) and text != "-0":
+        return int(text)
+    if re.fullmatch(r"-?(0|[1-9][0-9]*)\.[0-9]+", text) and repr(float(text)) == text:
+        return float(text)
+    return text
+
+
+def conjunction(words: Iterable[str | None], separator: str) -> str | None:
+    """Return conditions of a robot file as one, or None where one of them cannot be written."""
+    conditions = list(words)
+    if not all(conditions):
+        return None
+    return separator.join(f"({condition})" for condition in conditions)
+
+
+# Texts of files, while the launch file has them in its hands
+
+_FILES: dict[str, FileText] = {}
+_PLACEHOLDER = re.compile(r'(<robot name="tfcompose_text_\d+"/>)')
+
+
+def placeholder(file: str, args: dict[str, str] | None = None) -> str:
+    """Return a description that a launch file can carry about in the place of a file's text."""
+    text = f'<robot name="tfcompose_text_{len(_FILES)}"/>'
+    _FILES[text] = FileText(with_package(file), args or {})
+    return text
+
+
+def with_files(text: str) -> str:
+    """Return a text with the files for which placeholders stand in it, as parts."""
+    return Text.of(part for known in parts_of(text) for part in _split(known))
+
+
+def _split(part: Part) -> Iterable[Part]:
+    if not isinstance(part, str):
+        return [part]
+    return [_FILES.get(piece, piece) for piece in _PLACEHOLDER.split(part)]
+
+
+def shown(text: str) -> str:
+    """Return a text for people, with the names of files for their texts."""
+    return str(with_files(text))
+
+
+def jsonable(value: Any) -> Any:
+    """Return a record's value as JSON has it."""
+    if isinstance(value, str):
+        return as_json(with_files(value))
+    if isinstance(value, dict):
+        return {str(with_files(str(key))): jsonable(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [jsonable(item) for item in value]
+    return value
+
+
+# Paths and commands
+
+
+def with_package(path: str) -> str:
+    """Return a path below a package that is not found as an address.
+
+    Pathlib takes one slash for two.
+    """
+    if "package:/" not in path or isinstance(path, Text):
+        return path
+    return re.sub(r"^.*?package:/+", PACKAGE, path)
+
+
+def of_command(words: list[str], text: str) -> str:
+    """Return what stands for the output of a command that makes a robot's description.
+
+    Raises:
+        FailedError: for any other command: none is run.
+    """
+    program = Path(words[0]).name if words else ""
+    rest = [with_package(word) for word in words[1:]]
+    if program.startswith("xacro") or words[:3] == ["ros2", "run", "xacro"]:
+        rest = rest[3:] if program == "ros2" else rest
+        files = [word for word in rest if ":=" not in word and not word.startswith("-")]
+        args = dict(word.split(":=", 1) for word in rest if ":=" in word)
+        if files:
+            return placeholder(files[0], args)
+    if program == "cat" and len(rest) == 1:
+        return file_text(rest[0])
+    raise FailedError(f"the command {text.strip()} is not run")
+
+
+def file_text(path: str) -> str:
+    """Return the text of a file, or what stands for it where its package is not found."""
+    if path.startswith(PACKAGE):
+        return placeholder(path)
+    try:
+        return Path(path).read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FailedError(f"{path} cannot be read: {error}") from None
+
+
+def relative(text: str) -> str:
+    """Return a path for people, from the folder of the import."""
+    return os.path.relpath(text) if os.path.isabs(text) and os.path.exists(text) else text  # noqa: PTH110, PTH117

@@ -138,13 +138,13 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_714,
+    "foundation": 1_717,
     "model": 2_091,
-    "spec": 4_753,
-    "compiler": 9_184,
+    "spec": 4_759,
+    "compiler": 9_183,
     "tf": 5_264,
     "guard": 4_041,
-    "launcher": 3_804,
+    "launcher": 3_805,
     "cli": 5_303,
     "tools": 11_006,
 }

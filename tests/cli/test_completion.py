@@ -79,7 +79,7 @@ def completed(monkeypatch: pytest.MonkeyPatch) -> Asking:
             argcomplete, "autocomplete", partial(CompletionFinder(), output_stream=answer)
         )
         monkeypatch.setattr(CompletionFinder, "_init_debug_stream", lambda _: None)  # takes fd 9
-        asked = {
+        variables = {
             "_ARGCOMPLETE": "1",
             "_ARGCOMPLETE_IFS": "\n",
             "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
@@ -87,7 +87,7 @@ def completed(monkeypatch: pytest.MonkeyPatch) -> Asking:
             "COMP_LINE": line,
             "COMP_POINT": str(len(line)),
         }
-        done = tfcompose_in(folder, **asked)
+        done = tfcompose_in(folder, **variables)
         assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
         return set(answer.getvalue().split("\n")) - {""}
 

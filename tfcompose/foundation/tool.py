@@ -20,8 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from tfcompose.foundation.findings import Finding, Span
-
 #: The package with the table of the tools that ship, ``TOOLS``; the only name by which the core
 #: knows it.
 SHIPPED = "tfcompose.tools"
@@ -262,21 +260,6 @@ def _wrong_codes(tool: Tool) -> Iterator[Problem]:
             message = f"the tool {tool.name} is left out: {code} is no code of its own"
             advice = "give its codes a prefix of their own and three digits: ACME101"
             yield Problem("TF922", message, advice)
-
-
-def run_hook(reference: str, owner: str, at: Span | None, *arguments: Any) -> list[Any] | Finding:
-    """Return what a tool's function yields; the finding TF903 where it crashes."""
-    try:
-        return list(load(reference)(*arguments))
-    except Exception as error:  # noqa: BLE001 (a tool's fault must not hide the others' findings)
-        from tfcompose.foundation.findings import finding  # which needs the codes of tools
-
-        return finding(
-            "TF903",
-            f"{reference} of {owner} crashed: {type(error).__name__}: {error}",
-            at,
-            help="this is a bug in the tool: please report it",
-        )
 
 
 def code_folders() -> Iterator[Path]:

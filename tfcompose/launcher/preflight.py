@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
-from tfcompose.foundation.tool import installed, run_hook
+from tfcompose.foundation.hooks import run_hook
+from tfcompose.foundation.tool import installed
 from tfcompose.launcher.child import ChildCommand
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
 from tfcompose.launcher.kernel_settings import refused_settings

@@ -8,13 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from pydantic_core import to_jsonable_python
-
 from tfcompose.compiler.resolve.processes import added, says_how
 from tfcompose.foundation.findings import Finding
-from tfcompose.foundation.tool import run_hook
+from tfcompose.foundation.hooks import run_hook
 from tfcompose.model.robot import Section
-from tfcompose.spec.language.tool_keys import keys_in
+from tfcompose.spec.language.tool_keys import keys_in, planned_data
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -66,7 +64,7 @@ def as_sections(draft: Draft) -> dict[str, Section]:
             section.key.name,
             section.value,
             section.spec.at,
-            planned=to_jsonable_python(section.value) if section.key.in_plan else None,
+            planned=planned_data(section.key, section.value),
         )
         for section in sections_of(draft)
     }

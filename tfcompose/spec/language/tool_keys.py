@@ -11,6 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from pydantic import create_model
+from pydantic_core import to_jsonable_python
 
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.tool import Key, Problem, Toolset, installed, load, shipped
@@ -29,6 +30,13 @@ def robot_model(names: Collection[str]) -> type[RobotSpec]:
 def keys_in(names: Collection[str]) -> list[Key]:
     """Return the sections of tools among those of a robot file."""
     return [section for name, section in _tools_for(names).keys().items() if name in names]
+
+
+def planned_data(section: Key, value: Any) -> Any:
+    """Return a section as the plan holds it, as JSON; None where the plan has none of it."""
+    if section.in_plan:
+        return to_jsonable_python(value)
+    return None
 
 
 def problems_with(names: Collection[str]) -> list[Finding]:

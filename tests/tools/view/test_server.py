@@ -136,7 +136,7 @@ def running_view(file: Path, *options: str, stderr: IO[bytes] | None = None) -> 
     running = processes.start(argv, cwd=file.parent, stdout=subprocess.PIPE, stderr=stderr)
     try:
         assert running.stdout
-        yield running.stdout.readline().partition(";")[0]
+        yield running.stdout.readline().strip()
     finally:
         processes.end(running)
 
@@ -169,7 +169,7 @@ def test_the_browser_is_opened_by_a_file_that_others_cannot_read(
     with pytest.raises(KeyboardInterrupt):
         view.run(parser_of("view").parse_args([str(rover), "--port", "0", "--open"]))
     ((url, mode, text),) = opened
-    address = capsys.readouterr().out.partition(";")[0]
+    address = capsys.readouterr().out.splitlines()[0]
     assert address in text
     assert (address.partition("=")[2] in url, mode) == (False, 0o600)
     assert not Path(url.removeprefix("file://")).exists()

@@ -369,7 +369,7 @@ def test_the_server_answers_until_ctrl_c_and_a_taken_port_names_the_next(rover: 
     running = processes.start(command, cwd=rover.parent, stdout=subprocess.PIPE)
     try:
         assert running.stdout
-        address = running.stdout.readline().partition(";")[0]
+        address = running.stdout.readline().strip()
         with urllib.request.urlopen(address, timeout=30) as answer:  # noqa: S310 (on this machine)
             assert answer.status == 200
         running.send_signal(signal.SIGINT)

@@ -296,7 +296,7 @@ def _announced(address: str, arguments: Namespace) -> Iterator[None]:
     What starts a browser is among the arguments of a process, which every user of the machine can
     read. So the browser gets a file that only this user can read, and that leads to the address.
     """
-    sys.stdout.write(f"{address}; Ctrl-C ends it\n")
+    sys.stdout.write(f"{address}\nCtrl-C ends it\n")
     sys.stdout.flush()
     with ExitStack() as stack:
         if arguments.open:

@@ -10,7 +10,6 @@ import pytest
 
 from tests.support import processes
 from tests.support.house import PACKAGE, ROOT, imports_of, nodes_of, part_of, room_of
-from tests.support.tables import for_each
 
 #: One worker parses all files, once.
 pytestmark = pytest.mark.xdist_group("sources")
@@ -108,7 +107,7 @@ def test_the_arrows_between_wings_lead_downwards() -> None:
     graphlib.TopologicalSorter(MAY_IMPORT).prepare()
 
 
-@for_each(sorted(MAY_IMPORT.keys() - {"tools"}))
+@pytest.mark.parametrize("wing", sorted(MAY_IMPORT.keys() - {"tools"}))
 def test_a_wing_says_what_it_must_not_import(wing: str) -> None:
     """Each wing's "Must not import" sentence agrees with the tables."""
     docstring = ast.get_docstring(ast.parse((PACKAGE / wing / "__init__.py").read_text("utf-8")))
@@ -125,7 +124,7 @@ def test_a_wing_says_what_it_must_not_import(wing: str) -> None:
     assert names <= MAY_IMPORT.keys() | ONLY_IN.keys()
 
 
-@for_each(FILES)
+@pytest.mark.parametrize("file", FILES, ids=room_of)
 def test_a_file_imports_only_what_its_wing_may(file: Path) -> None:
     wing = part_of(file)
     if wing == "__init__":
@@ -157,7 +156,7 @@ def test_every_folder_of_the_tools_is_a_tool() -> None:
     assert folders - {"__pycache__"} == TOOLS
 
 
-@for_each(sorted(PACKAGE.glob("tools/*/**/*.py")))
+@pytest.mark.parametrize("file", sorted(PACKAGE.glob("tools/*/**/*.py")), ids=room_of)
 def test_no_tool_imports_another(file: Path) -> None:
     own = file.relative_to(PACKAGE / "tools").parts[0]
     for name in imports_of(file):
@@ -165,7 +164,7 @@ def test_no_tool_imports_another(file: Path) -> None:
             assert name.split(".")[2] == own, f"{own} imports {name}"
 
 
-@for_each([file for file in FILES if part_of(file) != "tools"])
+@pytest.mark.parametrize("file", [file for file in FILES if part_of(file) != "tools"], ids=room_of)
 def test_the_core_names_its_tools_in_one_place(file: Path) -> None:
     """Neither an import nor a name for one: the loader alone knows where the table is."""
     texts = {
@@ -177,7 +176,7 @@ def test_the_core_names_its_tools_in_one_place(file: Path) -> None:
     assert named <= ({"tfcompose.tools"} if room_of(file) == LOADER else set())
 
 
-@for_each(FILES)
+@pytest.mark.parametrize("file", FILES, ids=room_of)
 def test_a_stage_is_imported_by_its_own_name_from_outside(file: Path) -> None:
     """Outside, ``from tfcompose.compiler.check import check``."""
     if part_of(file) in {"spec", "compiler", "cli", "tools"}:

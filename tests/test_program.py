@@ -4,8 +4,9 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.support import processes
-from tests.support.tables import for_each
 from tests.support.user_files import PYTHON_PATH, write_namesakes
 from tfcompose.launcher.program import HERE, anywhere, without_current_folder
 
@@ -21,7 +22,9 @@ def run(folder: Path, *words: str, python_path: str | None = None) -> tuple[int,
 KINDS = ("static", "joints", "simulate", "guard", "exec")
 
 
-@for_each([*((HERE, kind) for kind in KINDS), (anywhere(sys.executable), "exec")])
+@pytest.mark.parametrize(
+    ("start", "kind"), [*((HERE, kind) for kind in KINDS), (anywhere(sys.executable), "exec")]
+)
 def test_a_process_imports_no_file_of_the_current_folder(
     start: list[str], kind: str, tmp_path: Path
 ) -> None:
@@ -30,12 +33,12 @@ def test_a_process_imports_no_file_of_the_current_folder(
     assert (code, f"usage: tfcompose {kind} " in output) == (2, True), output
 
 
-@for_each([PYTHON_PATH, ":/no/such/folder", ".", "lib/.."])
+@pytest.mark.parametrize("python_path", [PYTHON_PATH, ":/no/such/folder", ".", "lib/.."])
 def test_python_path_does_not_give_a_process_the_current_folder(
     python_path: str, tmp_path: Path
 ) -> None:
     write_namesakes(tmp_path, loaded_first=False)
-    (tmp_path / "tfcompose").mkdir(exist_ok=True)
+    (tmp_path / "tfcompose").mkdir()
     for start in (HERE, anywhere(sys.executable)):
         code, output = run(tmp_path, *start, "guard", python_path=python_path)
         assert (code, "usage: tfcompose guard " in output) == (2, True), output

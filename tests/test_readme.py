@@ -11,7 +11,6 @@ import pytest
 from tests.benchmarks import results
 from tests.support import processes
 from tests.support.cli import tfcompose_in
-from tests.support.tables import for_each
 from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.compiling import library
 from tfcompose.cli.documentation import FOLDER, for_terminal, page, topic, topics
@@ -156,7 +155,7 @@ def test_its_preset_of_ones_own_has_no_findings(tmp_path: Path) -> None:
     assert (done.returncode, "[TF" in done.stdout) == (0, False), done.stdout
 
 
-@for_each(COMMANDS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_each_command_says_what_it_does_and_what_its_arguments_are(command: str) -> None:
     parser = parser_of(command)
     assert parser.description

@@ -7,8 +7,9 @@ import ast
 import re
 from pathlib import Path
 
+import pytest
+
 from tests.support.house import ROOT
-from tests.support.tables import for_each
 
 TEXT = (ROOT / "SECURITY.md").read_text("utf-8")
 #: A line of a table: what is defended, and the test.
@@ -29,7 +30,7 @@ def names_of_tests(file: Path) -> set[str]:
     }
 
 
-@for_each(ROWS)
+@pytest.mark.parametrize(("claim", "cell"), ROWS)
 def test_a_defended_line_names_a_test_that_is_there(claim: str, cell: str) -> None:
     assert claim.endswith(".")
     named = re.fullmatch(r"`(tests/[\w/]+\.py)::(test_\w+)`", cell)

@@ -32,7 +32,6 @@ READ_A_FILE = {
     "tools/exporters/launch_arguments.py",
     "tools/importers/command.py",
     "tools/importers/kits.py",
-    "tools/importers/launch_texts.py",
 }
 
 

@@ -16,8 +16,8 @@ ELSEWHERE = {
     "TF807": "cli/test_hosts_ros.py",
     "TF829": "compiler/presets/test_driver_ros.py",
     "TF850": "guard/test_guard_faults_ros.py",
-    "TF852": "guard/test_liars_ros.py",
-    "TF853": "guard/test_liars_ros.py",
+    "TF852": "guard/test_cleared_environment_ros.py",
+    "TF853": "guard/adversary/test_rogues_ros.py",
     "TF854": "cli/test_up_ros.py",
 }
 

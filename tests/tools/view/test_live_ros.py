@@ -20,11 +20,13 @@ from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.foundation.geometry import Offset, Pose, offset_of
 from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan.file import write_plan
+from tfcompose.tools.view.judgement import Judgement
 from tfcompose.tools.view.live_view import Following, observers_of
 from tfcompose.tools.view.panel import Panel
-from tfcompose.tools.view.reload import ReloadedPanel, WatchedFiles
+from tfcompose.tools.view.reload import WatchedFiles
 from tfcompose.tools.view.server import start_server, stop_server
 from tfcompose.tools.view.session import Session
+from tfcompose.tools.view.windows import Windows
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
@@ -34,13 +36,17 @@ class View:
     """A view that follows a tree."""
 
     server: viser.ViserServer
-    shown: ReloadedPanel
+    windows: Windows
     following: Following
     changed: threading.Event
 
     @property
     def panel(self) -> Panel:
-        return self.shown.panel
+        return self.windows.panels[0].panel
+
+    @property
+    def judgement(self) -> Judgement:
+        return self.following.shown[self.windows.panels[0]].tree.judgement
 
     @property
     def is_red(self) -> bool:
@@ -62,13 +68,14 @@ def following(session: Session, *, joints: bool = False) -> Iterator[View]:
     for file in session.texts:
         files(file)
     server, ending = start_server("127.0.0.1", 0, "test", TOKEN), Stop()
-    shown = ReloadedPanel(server, session, files, edit=False, joints=joints)
-    follows = Following(server, shown, changed, Offset(1e-3, 1e-3), joints=joints)
     observers = observers_of(plan_of(session.robot))
-    thread = threading.Thread(target=follows.run, args=(observers, ending))
+    follows = Following(observers, Offset(1e-3, 1e-3), joints=joints)
+    windows = Windows(server, session, files, edit=False, joints=joints, extend=follows.show_in)
+    windows.add(server, 0)
+    thread = threading.Thread(target=follows.run, args=(windows, changed, ending))
     thread.start()
     try:
-        yield View(server, shown, follows, changed)
+        yield View(server, windows, follows, changed)
     finally:
         ending.request()
         thread.join()
@@ -82,6 +89,21 @@ def view(tmp_path: Path) -> Iterator[View]:
     file.write_text(EXTERNAL, "utf-8")
     with following(session_of(file)) as shown:
         yield shown
+
+
+def test_two_windows_choose_for_themselves(view: View) -> None:
+    second = start_server("127.0.0.1", 0, "second", TOKEN)
+    try:
+        view.windows.add(second, 1)
+        first, other = (shown.panel for shown in view.windows.panels)
+        first.tree.select("lidar")
+        assert (first.selected, other.selected) == ("lidar", "odom")
+        in_first, in_other = (view.following.shown[one] for one in view.windows.panels)
+        in_first.panel.fixed.value = "lidar"
+        assert until(lambda: in_first.tree.fixed == "lidar")
+        assert in_other.tree.fixed != "lidar"
+    finally:
+        stop_server(second)
 
 
 def wheel_process(folder: Path, start: Callable[..., Any]) -> Session:
@@ -146,8 +168,8 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(view: View, nodes:
             assert until(lambda: view.is_red)
             took_s = time.monotonic() - begun
             assert sent()
-            assert [one.code for one in view.following.tree.judgement.found] == ["TF801"]
-            assert f"/rogue{number}" in view.following.tree.judgement.found[0].message
+            assert [one.code for one in view.judgement.found] == ["TF801"]
+            assert f"/rogue{number}" in view.judgement.found[0].message
         return took_s < 1
 
     assert in_one_of_a_few(is_found)
@@ -197,11 +219,11 @@ def test_a_file_that_changes_is_followed_from_then_on(
     moved = EXTERNAL.replace("xyz: [0, 0, 0.3]", "xyz: [0, 0, 0.4]")
     (tmp_path / "rover.yaml").write_text(moved, "utf-8")
     view.changed.set()
-    assert until(lambda: [one.code for one in view.following.tree.judgement.found] == ["TF846"])
+    assert until(lambda: [one.code for one in view.judgement.found] == ["TF846"])
     assert until(lambda: view.server.scene.get_handle_by_name("/ghost/2") is not None)
     (tmp_path / "rover.yaml").write_text(EXTERNAL + "  odom2: [\n", "utf-8")
     view.changed.set()
-    assert until(lambda: "TF" in view.shown.found)
+    assert until(lambda: "TF" in view.windows.panels[0].found)
     (tmp_path / "rover.yaml").write_text(EXTERNAL, "utf-8")
     view.changed.set()
-    assert until(lambda: not view.following.tree.judgement.found and not view.shown.found)
+    assert until(lambda: not view.judgement.found and not view.windows.panels[0].found)

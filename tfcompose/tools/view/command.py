@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.geometry import Offset
     from tfcompose.tools.view.bag_view import BagView
+    from tfcompose.tools.view.live_view import Following
     from tfcompose.tools.view.reload import WatchedFiles
     from tfcompose.tools.view.session import Session
 
@@ -129,47 +130,53 @@ def run(arguments: Namespace) -> int:
 
 def _serve(session: Session, files: WatchedFiles, arguments: Namespace) -> int:
     """Show the session in the browser until Ctrl-C; return the exit code."""
-    from tfcompose.tools.view.reload import ReloadedPanel, Watcher
+    from tfcompose.tools.view.reload import Watcher
     from tfcompose.tools.view.server import new_token, start_server, stop_server
     from tfcompose.tools.view.windows import Windows
 
     bag = _bag_view(session, arguments) if arguments.bag else None
-    if arguments.live:
-        from tfcompose.cli.live import set_up_ros
-        from tfcompose.tools.view.view_session import plan_of_session
-
-        set_up_ros(plan_of_session(session).ros)
+    following = _following(session, arguments) if arguments.live else None
     token = new_token()
     port = _free(arguments.host, arguments.port)
     server = start_server(arguments.host, port, session.robot.name, token)
-    shown: ReloadedPanel | Windows | None = None
+    windows: Windows | None = None
     try:
         address = _address(arguments.host, server.get_port(), token)
-        if arguments.live:
-            from tfcompose.tools.view.live_view import follow
-
-            shown = ReloadedPanel(server, session, files, edit=False, joints=arguments.joints)
-            with _announced(address, arguments), Watcher(files) as watcher:
-                return follow(
-                    server, shown, watcher.changed, _tolerance(arguments), joints=arguments.joints
-                )
-        extend = bag.show if bag is not None else None
-        shown = Windows(
-            server, session, files, edit=arguments.edit, joints=bag is None, extend=extend
+        joints, extend = bag is None, bag.show if bag else None
+        if following:
+            joints, extend = arguments.joints, following.show_in
+        windows = Windows(
+            server, session, files, edit=arguments.edit, joints=joints, extend=extend
         )
         with _announced(address, arguments), Watcher(files) as watcher:
+            if following:
+                from tfcompose.tools.view.live_view import follow
+
+                return follow(following, windows, watcher.changed)
             while True:
                 watcher.changed.wait()
                 watcher.changed.clear()
-                shown.reload()
+                windows.reload()
     finally:
-        if shown is not None:
-            shown.end()
+        if windows is not None:
+            windows.end()
         stop_server(server)
 
 
 def _tolerance(arguments: Namespace) -> Offset:
     return arguments.tolerance or tolerance(TOLERANCE)
+
+
+def _following(session: Session, arguments: Namespace) -> Following:
+    """Return what follows the running tree, after this process is set up for its ROS."""
+    from tfcompose.cli.live import set_up_ros
+    from tfcompose.tools.view.view_session import plan_of_session
+
+    plan = plan_of_session(session)
+    set_up_ros(plan.ros)
+    from tfcompose.tools.view.live_view import Following, observers_of
+
+    return Following(observers_of(plan), _tolerance(arguments), joints=arguments.joints)
 
 
 def _bag_view(session: Session, arguments: Namespace) -> BagView:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import posixpath
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from tfcompose.model.plan import Plan
-    from tfcompose.model.robot import Robot
+    from tfcompose.model.robot import Joint, Robot
 
 #: Who publishes already is found within this time, or almost always; then the graph is asked so
 #: often. Seconds.
@@ -21,6 +22,10 @@ FOUND_S = 2.0
 _ASK_EVERY_S = 0.25
 #: How often positions are sent, in seconds; what they move is seen as often.
 _SEND_EVERY_S = 0.05
+
+
+#: How far a joint without limits is moved, in rad or m.
+_UNLIMITED = math.pi
 
 
 class PositionPublisher(Protocol):
@@ -31,6 +36,25 @@ class PositionPublisher(Protocol):
 
     def close(self) -> None:
         """Leave the topic."""
+
+
+def slider_range(joint: Joint) -> tuple[float, float]:
+    """Return how far a joint is moved, lowest and highest, in rad or m."""
+    lower, upper = -_UNLIMITED, _UNLIMITED
+    if joint.limit and joint.type != "continuous":
+        lower = joint.limit.lower if joint.limit.lower is not None else lower
+        upper = joint.limit.upper if joint.limit.upper is not None else upper
+    return lower, max(lower, upper)
+
+
+def first_positions(robot: Robot) -> dict[str, float]:
+    """Return where sliders begin: each joint at 0, or as near to it as its limits allow."""
+    positions = {}
+    for edge in robot.edges:
+        if edge.joint and edge.joint.mimic is None:
+            lower, upper = slider_range(edge.joint)
+            positions[edge.joint.name] = min(max(0.0, lower), upper)
+    return positions
 
 
 def joint_topics(robot: Robot, plan: Plan) -> dict[str, dict[str, str]]:

@@ -76,10 +76,11 @@ class LiveTree(ShownTree):
         states = {
             topics: state_of(observer, topics) for topics, observer in self._observers.items()
         }
-        self._states = {}
+        edges: dict[str, list[EdgeState]] = {}
         for state in states.values():
             for edge in state.edges:
-                self._states.setdefault(self._pictures.name(edge.child), []).append(edge)
+                edges.setdefault(self._pictures.name(edge.child), []).append(edge)
+        self._states = edges  # at once: a window reads it in a thread of its own
         streams = self._streams()
         self.judgement = self._judge.judge(
             states,

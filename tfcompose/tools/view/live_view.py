@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.cli.process_table import HEAD, row, uptime
 from tfcompose.cli.runs import is_meant, running
@@ -19,21 +19,23 @@ from tfcompose.model.plan.topics import parts_of
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 from tfcompose.tf.live.state import NAMELESS
 from tfcompose.tf.ros.environment import RosError
-from tfcompose.tools.view.joints import JointSender, joint_topics
+from tfcompose.tools.view.joints import JointSender, first_positions, joint_topics
 from tfcompose.tools.view.live import LiveTree
 from tfcompose.tools.view.live_panel import LivePanel
 from tfcompose.tools.view.view_session import plan_of_session
 
 if TYPE_CHECKING:
     import threading
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    import viser
     from rclpy.node import Node
 
     from tfcompose.foundation.geometry import Offset
     from tfcompose.model.plan import Plan
+    from tfcompose.model.robot import Robot
     from tfcompose.tools.view.reload import ReloadedPanel
+    from tfcompose.tools.view.session import Session
+    from tfcompose.tools.view.windows import Windows
 
     Topics = tuple[str, str]
 
@@ -50,33 +52,49 @@ def observers_of(plan: Plan) -> dict[Topics, TreeObserver]:
     return {topics: TreeObserver(_WINDOW_S, SETTLE_S) for topics in parts_of(plan)}
 
 
+class LiveWindow(NamedTuple):
+    """What shows a running tree in a window."""
+
+    tree: LiveTree
+    panel: LivePanel
+
+
 class Following:
-    """Moves the scene, judges and asks, each as often as it is due.
+    """Moves the scenes of all windows, judges and asks, each as often as it is due.
 
-    Of a file that changed it shows the new robot.
+    With ``joints`` sliders publish joint states: those of the window in which one was moved last.
 
-    With ``joints`` the panel's sliders publish joint states.
+    Args:
+        observers: by topics (moving, fixed): those of the plan.
+        tolerance: how far a pose may be off.
+        joints: whether sliders publish.
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        shown: ReloadedPanel,
-        changed: threading.Event,
-        tolerance: Offset,
-        *,
-        joints: bool,
+        self, observers: Mapping[Topics, TreeObserver], tolerance: Offset, *, joints: bool
     ) -> None:
-        self._server = server
-        self._shown = shown
-        self._changed = changed
+        self._observers = observers
         self._tolerance = tolerance
         self._joints = joints
         self._meter = UsageMeter()
+        self.shown: dict[ReloadedPanel, LiveWindow] = {}
+        self._judge_at = self._ask_at = 0.0
+        #: Where sliders were moved last, and where each window had them the last time.
+        self._positions: dict[str, float] = {}
+        self._positions_in: dict[ReloadedPanel, dict[str, float]] = {}
+        self._first_positions: dict[str, float] = {}
         self.senders: list[JointSender] = []
 
-    def run(self, observers: Mapping[Topics, TreeObserver], stop: Stop) -> None:
-        """Follow the tree on the topics (moving, fixed) until ``stop`` is requested.
+    def show_in(self, shown: ReloadedPanel) -> None:
+        """Show the tree in a window, beside the panel of its robot."""
+        robot, plan = shown.session.robot, plan_of_session(shown.session)
+        known = {pair: self._observers.get(pair) or TreeObserver() for pair in parts_of(plan)}
+        tree = LiveTree(robot, plan, known, self._tolerance)
+        self.shown[shown] = LiveWindow(tree, LivePanel(shown.server, shown.panel, tree))
+        self._judge_at = self._ask_at = 0.0
+
+    def run(self, windows: Windows, changed: threading.Event, stop: Stop) -> None:
+        """Follow the tree until ``stop`` is requested; of files that changed show the new robot.
 
         Raises:
             RosError: if ROS cannot start a node, or take messages.
@@ -88,10 +106,11 @@ class Following:
 
         with open_node("tfcompose_view", "") as node:
             listeners = [
-                TreeListener(node, observer, topics) for topics, observer in observers.items()
+                TreeListener(node, observer, topics)
+                for topics, observer in self._observers.items()
             ]
             begun, show_at = time.monotonic(), 0.0
-            self._follow(observers, node)
+            self._follow(windows.session, node)
             while not stop.requested:
                 for listener in listeners:
                     listener.listen(_SHOW_EVERY_S / len(listeners), stop)
@@ -101,63 +120,85 @@ class Following:
                 if now < show_at:
                     continue
                 show_at = now + _SHOW_EVERY_S
-                if self._changed.is_set():
-                    self._changed.clear()
-                    if self._shown.reload():
-                        self._follow(observers, node)
-                self._show(now, now - begun)
-                self._send(now, next((one.clock_ns for one in listeners), None))
+                if changed.is_set():
+                    changed.clear()
+                    if windows.reload():
+                        self._follow(windows.session, node)
+                shown = self._open(windows)
+                self._show(shown, now, now - begun)
+                if self.senders:
+                    self._take_positions(windows.panels)
+                    clock_ns = next((one.clock_ns for one in listeners), None)
+                    self._send(shown, now, clock_ns, windows.session.robot)
             for sender in self.senders:
                 sender.close()
 
-    def _follow(self, observers: Mapping[Topics, TreeObserver], node: Node) -> None:
+    def _follow(self, session: Session, node: Node) -> None:
         """Follow the robot that the session has now."""
-        session = self._shown.session
-        plan = plan_of_session(session)
-        known = {topics: observers.get(topics) or TreeObserver() for topics in parts_of(plan)}
-        self.tree = LiveTree(session.robot, plan, known, self._tolerance)
-        self._panel = LivePanel(self._server, self._shown.panel, self.tree)
-        self._plan = plan
-        self._judge_at = self._ask_at = 0.0
+        self._plan = plan_of_session(session)
         for sender in self.senders:
             sender.close()
         self.senders = []
         if self._joints:
-            topics = joint_topics(session.robot, plan)
+            first = self._first_positions = first_positions(session.robot)
+            self._positions = {name: self._positions.get(name, first[name]) for name in first}
+            topics = joint_topics(session.robot, self._plan)
             self.senders = [_sender(node, topic, names) for topic, names in topics.items()]
 
-    def _show(self, now: float, listened_s: float) -> None:
+    def _open(self, windows: Windows) -> list[LiveWindow]:
+        """Return what shows the tree in windows that are open, and forget the others."""
+        known = list(self.shown)  # before: what is opened meanwhile is not forgotten
+        panels = windows.panels
+        for closed in set(known) - set(panels):
+            del self.shown[closed]
+            self._positions_in.pop(closed, None)
+        return [self.shown[panel] for panel in panels if panel in self.shown]
+
+    def _show(self, shown: Sequence[LiveWindow], now: float, listened_s: float) -> None:
         """Show what came since the last time."""
         if now >= self._judge_at:
-            self.tree.judge(listened_s)
-            self._panel.show_text()
-            self._judge_at = time.monotonic() + _JUDGE_EVERY_S
-        self._panel.show()
+            self._judge_at = now + _JUDGE_EVERY_S
+            for tree, panel in shown:
+                tree.judge(listened_s)
+                panel.show_text()
+        for _, panel in shown:
+            panel.show()
         if now >= self._ask_at:
             self._ask_at = now + _ASK_EVERY_S
-            self._show_processes()
+            title, rows = self._processes()
+            for _, panel in shown:
+                panel.show_processes(title, rows)
 
-    def _send(self, now: float, clock_ns: int | None) -> None:
+    def _take_positions(self, windows: Sequence[ReloadedPanel]) -> None:
+        """Take where sliders are from a window in which one was moved."""
+        for shown in windows:
+            positions = dict(shown.panel.positions)
+            if positions != self._positions_in.get(shown, self._first_positions):
+                self._positions = positions
+            self._positions_in[shown] = positions
+
+    def _send(
+        self, shown: Sequence[LiveWindow], now: float, clock_ns: int | None, robot: Robot
+    ) -> None:
         """Let sliders publish, by the plan's clock."""
         stamp_ns = clock_ns if self._plan.ros.clock == "sim" else time.time_ns()
-        panel = self._shown.panel
         for sender in self.senders:
             before = sender.text
-            sender.step(now, stamp_ns, panel.session.robot, panel.positions)
+            sender.step(now, stamp_ns, robot, self._positions)
             if (
                 sender.others_found
                 and sender.text != before
                 and NAMELESS not in sender.others_found
             ):
                 warn(sender.text)
-        if self.senders:
-            self._panel.show_joints([sender.text for sender in self.senders])
+        for _, panel in shown:
+            panel.show_joints([sender.text for sender in self.senders])
 
-    def _show_processes(self) -> None:
+    def _processes(self) -> tuple[str, list[list[str]]]:
+        """Return the state of the robot that runs, and a row for each of its processes."""
         status = _status(self._plan.robot)
         if status is None:
-            self._panel.show_processes(f"no robot {self._plan.robot} runs here", [])
-            return
+            return f"no robot {self._plan.robot} runs here", []
         used = self._meter.usage([one.pid for one in status.processes if one.pid])
         state = (
             "stopping"
@@ -169,9 +210,7 @@ class Following:
         columns = [HEAD.index(name) for name in _COLUMNS]
         table = [HEAD, *(row(process, used) for process in status.processes)]
         rows = [[cells[column] for column in columns] for cells in table]
-        self._panel.show_processes(
-            f"{self._plan.robot}: {state}, since {uptime(status.uptime)}", rows
-        )
+        return f"{self._plan.robot}: {state}, since {uptime(status.uptime)}", rows
 
 
 def _status(name: str) -> RobotStatus | None:
@@ -208,14 +247,7 @@ def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
     return JointSender(topic, names, make, others)
 
 
-def follow(
-    server: viser.ViserServer,
-    shown: ReloadedPanel,
-    changed: threading.Event,
-    tolerance: Offset,
-    *,
-    joints: bool,
-) -> int:
+def follow(following: Following, windows: Windows, changed: threading.Event) -> int:
     """Show the running tree until a signal comes, in a process that is set up for its ROS.
 
     Return the exit code.
@@ -223,11 +255,9 @@ def follow(
     Raises:
         SystemExit: after saying why ROS cannot be started.
     """
-    plan = plan_of_session(shown.session)
-    following = Following(server, shown, changed, tolerance, joints=joints)
     with Stop() as stop:
         try:
-            following.run(observers_of(plan), stop)
+            following.run(windows, changed, stop)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
     return INTERRUPTED

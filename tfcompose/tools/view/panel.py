@@ -20,6 +20,7 @@ from tfcompose.tools.view.choices import Choices
 from tfcompose.tools.view.edit import ImmovableError
 from tfcompose.tools.view.facts import facts_of, numbers
 from tfcompose.tools.view.findings import paragraphs, saved_html
+from tfcompose.tools.view.joints import slider_range
 from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.scene import RobotScene, wxyz
 from tfcompose.tools.view.tree_panel import TreePanel
@@ -32,9 +33,7 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Joint, Robot
     from tfcompose.tools.view.session import Session
 
-#: How far a joint without limits can be moved, in radians or metres, and the step of the gizmo in
-#: millimetres, degrees.
-_UNLIMITED = math.pi
+#: The step of the gizmo in millimetres, degrees.
 _SNAP_MM, _SNAP_DEG = 1.0, 1.0
 #: The gizmo of a robot whose largest body is 1 m long, in metres.
 _GIZMO_M = 0.25
@@ -274,11 +273,7 @@ class Panel:
 
     def _slider(self, joint: Joint) -> Any:
         slides = joint.type == "prismatic"
-        lower, upper = -_UNLIMITED, _UNLIMITED
-        if joint.limit and joint.type != "continuous":
-            lower = joint.limit.lower if joint.limit.lower is not None else lower
-            upper = joint.limit.upper if joint.limit.upper is not None else upper
-        upper = max(lower, upper)
+        lower, upper = slider_range(joint)
         scale, unit = (1000.0, "mm") if slides else (math.degrees(1), "deg")
         start = min(max(self.positions.get(joint.name, 0.0), lower), upper)
         slider = self._gui.add_slider(

@@ -44,7 +44,7 @@ class Windows:
         files: what the session was read with.
         edit: as for ``Panel``.
         joints: as for ``Panel``.
-        extend: adds to a panel that was made, as ``view --bag`` does.
+        extend: adds to a panel that was made, as ``view --bag`` and ``view --live`` do.
     """
 
     def __init__(  # noqa: PLR0913 (options of the view)
@@ -68,7 +68,7 @@ class Windows:
         self._found: tuple[Finding, ...] = ()
         files.look_at(meshes_of(session.robot))
         server.scene.world_axes.visible = False
-        server.on_client_connect(self._add)
+        server.on_client_connect(lambda client: self.add(client, client.client_id))
         server.on_client_disconnect(self._remove)
 
     @property
@@ -82,30 +82,35 @@ class Windows:
         for shown in self.panels:
             shown.end()
 
-    def reload(self) -> None:
-        """Read the files again if they have changed, and show them in all windows."""
+    def reload(self) -> bool:
+        """Read the files again if they have changed, and show them in all windows.
+
+        Return whether there is another robot.
+        """
         with self._lock:
             if not self.files.differ():
-                return
+                return False
             texts, state = self.session.read_again(self.files)
             for shown in self._open.values():
                 if shown.accept(texts, state):
                     self._extend(shown)
             self._found = state.found
-            if self.session.accepts(state):
-                self._found = state.found if state.errors else ()
-                self._replace(texts, state)
+            if not self.session.accepts(state):
+                return False
+            self._found = state.found if state.errors else ()
+            self._replace(texts, state)
+            return True
 
     def _replace(self, texts: dict[str, str], state: Compiled) -> None:
         for session in (self.session, *(session for session, _ in self._left)):
             session.replace(texts, state)
 
-    def _add(self, client: viser.ClientHandle) -> None:
+    def add(self, place: viser.ViserServer | viser.ClientHandle, number: int) -> None:
+        """Make a panel for the window with this number, in its place."""
         with self._lock:
             session, choices = self._left.pop() if self._left else (self.session.fork(), None)
-            number = client.client_id
             shown = ReloadedPanel(
-                client,
+                place,
                 session,
                 self.files,
                 edit=self._edit,

@@ -230,6 +230,7 @@ class Computers:
                 start_new_session=True,
                 text=True,
             )
+        processes.share(process)
         assert process.stdout is not None
         line = process.stdout.readline()
         if computer is not None:

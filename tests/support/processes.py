@@ -19,6 +19,8 @@ from tests.support.waiting import TIMEOUT_S, until
 #: inherit that.
 _IGNORABLE = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _started: list[subprocess.Popen[str]] = []
+#: Processes of fixtures that outlive a test in which they are started.
+_shared: set[int] = set()
 
 
 def start(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[str]:
@@ -157,13 +159,21 @@ def default_signal_actions() -> Iterator[None]:
             signal.signal(number, before[number])
 
 
+def share(process: subprocess.Popen[str]) -> None:
+    """Let a process outlive the test that starts it: a fixture of the module ends it."""
+    _shared.add(process.pid)
+
+
 def children() -> set[int]:
-    """Return the process ids of this process's children that have not ended."""
+    """Return the process ids of this process's children that have not ended.
+
+    Without those that are shared.
+    """
     pids: set[int] = set()
     for task in Path("/proc/self/task").iterdir():  # one may end meanwhile
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):
             pids |= set(map(int, (task / "children").read_text("ascii").split()))
-    return {pid for pid in pids if command_line(pid)}
+    return {pid for pid in pids - _shared if command_line(pid)}
 
 
 def command_line(pid: int) -> str:

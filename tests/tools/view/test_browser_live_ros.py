@@ -67,7 +67,7 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(tmp_path: Path, no
     )
     with (
         sending("diff_drive", "odom", "base_link", rate=20),
-        following(session_of(tmp_path / "r.yaml")) as view,
+        following(session_of(tmp_path / "r.yaml"), in_browser=True) as view,
         page_of(address_of(view.server)) as page,
     ):
         page.get_by_text("all edges as expected").wait_for()
@@ -92,7 +92,7 @@ def test_a_slider_in_the_browser_moves_the_wheel_as_a_tf_listener_has_it(
 ) -> None:
     session = wheel_process(tmp_path, start)
     with (
-        following(session, joints=True) as view,
+        following(session, joints=True, in_browser=True) as view,
         TransformListener(buffer := Buffer()),
         page_of(address_of(view.server)) as page,
     ):

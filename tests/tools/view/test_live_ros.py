@@ -62,8 +62,10 @@ joints: {w: {type: continuous, parent: base_link, child: wheel, xyz: [0, 0.2, 0]
 
 
 @contextmanager
-def following(session: Session, *, joints: bool = False) -> Iterator[View]:
-    """Show the robot that runs in the test's domain."""
+def following(
+    session: Session, *, joints: bool = False, in_browser: bool = False
+) -> Iterator[View]:
+    """Show the robot that runs in the test's domain, in a window of its own or a browser's."""
     files, changed = WatchedFiles(lambda one: Path(one).read_text("utf-8")), threading.Event()
     for file in session.texts:
         files(file)
@@ -71,7 +73,8 @@ def following(session: Session, *, joints: bool = False) -> Iterator[View]:
     observers = observers_of(plan_of(session.robot))
     follows = Following(observers, Offset(1e-3, 1e-3), joints=joints)
     windows = Windows(server, session, files, edit=False, joints=joints, extend=follows.show_in)
-    windows.add(server, 0)
+    if not in_browser:
+        windows.add(server, 0)
     thread = threading.Thread(target=follows.run, args=(windows, changed, ending))
     thread.start()
     try:

@@ -271,10 +271,11 @@ def test_clocks_that_are_apart_are_found_before_the_start(computers: Computers) 
     shifted = computers.folder / "shifted"
     venv.create(shifted, symlinks=True)
     (packages,) = shifted.glob("lib/python*/site-packages")
-    (packages / "sitecustomize.py").write_text(SHIFTED)
+    # Debian's Python has a sitecustomize of its own.
+    (packages / "shifted_clock.py").write_text(SHIFTED)
     here = [sysconfig.get_path("purelib"), str(Path(__file__).parents[3])]
     lines = [f"import site; site.addsitedir({folder!r})\n" for folder in here]
-    (packages / "here.pth").write_text("".join(lines))
+    (packages / "here.pth").write_text("".join(["import shifted_clock\n", *lines]))
     python = shifted / "python"
     python.write_text(f'#!/bin/sh\necho welcome\nexec {shifted}/bin/python "$@"\n')
     python.chmod(0o755)

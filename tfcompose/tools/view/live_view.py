@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.cli.process_table import HEAD, row, uptime
@@ -104,6 +105,8 @@ class Following:
         )
         from tfcompose.tf.ros.node import open_node
 
+        # A window may close between two looks at which are open: viser warns of what it then gets.
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         with open_node("tfcompose_view", "") as node:
             listeners = [
                 TreeListener(node, observer, topics)

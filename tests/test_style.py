@@ -142,11 +142,11 @@ MOST_STATEMENTS = {
     "model": 2_091,
     "spec": 4_759,
     "compiler": 9_183,
-    "tf": 5_264,
+    "tf": 5_297,
     "guard": 4_041,
     "launcher": 3_805,
     "cli": 5_303,
-    "tools": 11_062,
+    "tools": 11_063,
 }
 
 

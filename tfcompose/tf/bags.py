@@ -230,7 +230,7 @@ class _Replay:
         try:
             self._give(*self._query.pose_in(self._buffer))
         except TransformException as error:
-            return NoPose(str(error))
+            return NoPose(str(error.detail))
         return None
 
     def _give(self, pose: Pose, stamp_ns: int | None) -> None:

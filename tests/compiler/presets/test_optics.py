@@ -172,3 +172,20 @@ def test_a_scanner_has_no_height_and_a_t265_views_backward() -> None:
     eye = optics("realsense/t265")["fisheye1"]
     assert (eye.backward, eye.projection, eye.horizontal) == (True, "fisheye", None)
     assert eye.diagonal == pytest.approx(math.radians(163))
+
+
+@pytest.mark.parametrize(
+    ("preset", "rate_hz", "samples"),
+    [
+        ("hokuyo/utm-30lx", 40, 1081),
+        ("livox/mid360", 10, None),
+        ("robotis/pi-camera", 21, None),
+        ("sick/microscan3", None, None),
+        ("sick/nanoscan3", None, 1618),
+    ],
+)
+def test_a_rate_is_the_makers_and_not_a_simulations(
+    preset: str, rate_hz: float | None, samples: int | None
+) -> None:
+    (stream,) = optics(preset).values()
+    assert (stream.rate, stream.samples) == (rate_hz, samples)

@@ -1,9 +1,10 @@
 """Claims of geometry2's own Python tests about the tf2 packages.
 
-What their tests say of an exception's text is not repeated: the texts here
-are others.
+What their tests say of an exception's text is asserted of its begin; more follows here.
 """
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -406,3 +407,76 @@ def test_a_cloud_is_moved_by_the_buffer_and_its_other_fields_stay() -> None:
     assert moved.header.frame_id == "base_footprint"
     assert np.allclose(points_of(moved), np.hstack([POINTS - (0, 0, 100), [[9], [9]]]))
     assert bytes(given.data) == before
+
+
+@pytest.mark.parametrize(
+    ("target", "source", "second", "text"),
+    [
+        ("odom", "lasr", 1, '"lasr" passed to lookupTransform argument source_frame does not'),
+        ("lasr", "odom", 1, '"lasr" passed to lookupTransform argument target_frame does not'),
+        (
+            "",
+            "base",
+            1,
+            'Invalid argument "" passed to lookupTransform argument target_frame - in',
+        ),
+        ("odom", "/base", 1, 'Invalid argument "/base" passed to lookupTransform argument source'),
+        ("odom", "table", 2, "Could not find a connection between 'odom' and 'table' because"),
+        ("a", "loop", 1, "The tf tree is invalid because it contains a loop"),
+        (
+            "odom",
+            "base",
+            4,
+            "Lookup would require extrapolation into the future.  Requested time 4.000000 but ",
+        ),
+        (
+            "odom",
+            "base",
+            1,
+            "Lookup would require extrapolation into the past.  Requested time 1.000000 but the",
+        ),
+        (
+            "world",
+            "table",
+            1,
+            "Lookup would require extrapolation at time 1.000000, but only time 2.000000 is in",
+        ),
+    ],
+)
+def test_an_exception_begins_with_the_words_of_tf2(
+    target: str, source: str, second: int, text: str
+) -> None:
+    buffer = BufferCore()
+    for parent, child, seconds in (
+        ("odom", "base", (2, 3)),
+        ("world", "table", (2,)),
+        ("b", "loop", (1, 2)),
+        ("loop", "b", (1, 2)),
+        ("c", "a", (1, 2)),
+    ):
+        for sample_s in seconds:
+            sample = TransformStamped(child_frame_id=child)
+            sample.header.frame_id = parent
+            sample.header.stamp.sec = sample_s
+            sample.transform.rotation.w = 1.0
+            buffer.set_transform(sample, "test")
+    with pytest.raises(TransformException) as caught:
+        buffer.lookup_transform_core(target, source, Time(seconds=second))
+    assert str(caught.value).startswith(text)
+    assert caught.value.detail
+    assert buffer.can_transform_core(target, source, Time(seconds=second)) == (
+        False,
+        str(caught.value),
+    )
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "import rclpy; from tfcompose.tf.tf2 import BufferCore; rclpy.time.Time()",
+        "from tfcompose.tf.tf2 import BufferCore; import rclpy; BufferCore(); rclpy.time.Time()",
+        "import rclpy; from tfcompose.tf.tf2 import Buffer; rclpy.duration.Duration(seconds=1)",
+    ],
+)
+def test_rclpy_alone_has_its_times_as_with_tf2_ros(program: str) -> None:
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)

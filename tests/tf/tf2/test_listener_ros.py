@@ -106,9 +106,7 @@ def running(changed: Callable[[str], Path]) -> Callable[..., None]:
 def test_a_listener_program_runs_after_changing_its_imports(program: Callable[..., str]) -> None:
     """Its wait for the next sample is in a timer callback, which blocks the executor."""
     output = [
-        line
-        for line in program("listener").splitlines()
-        if not line.startswith("not yet: no frame")
+        line for line in program("listener").splitlines() if not line.startswith("not yet: ")
     ]
     assert output[0] == "laser_link in base_link: (0.000, 0.000, 0.300) base_link laser_link"
     assert output[-3:] == [
@@ -243,7 +241,7 @@ def test_a_wait_ends_when_the_transform_comes_or_when_the_time_is_over_and_not_m
     buffer.lookup_transform("odom", "base_link", Time(), timeout=Duration(seconds=60))
     assert 0.2 <= time.monotonic() - begun < 30
     begun = time.monotonic()
-    with pytest.raises(LookupException, match="no frame laser"):
+    with pytest.raises(LookupException, match='"laser" passed to'):
         buffer.lookup_transform("odom", "laser", Time(), timeout=Duration(seconds=0.3))
     assert 0.25 < time.monotonic() - begun < 30
     timer.join()

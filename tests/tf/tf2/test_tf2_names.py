@@ -209,7 +209,7 @@ def test_a_future_that_is_given_up_is_forgotten_and_a_name_that_cannot_be_ends_i
     buffer = rover()
     assert buffer.wait_for_transform_async("odom", "arm", Time()).cancel()
     assert not buffer.on_insert
-    with pytest.raises(InvalidArgumentException, match="starts with a slash"):
+    with pytest.raises(InvalidArgumentException, match="cannot start with a '/'"):
         buffer.wait_for_transform_async("/odom", "arm", Time()).result(0)
 
 

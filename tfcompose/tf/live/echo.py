@@ -54,7 +54,7 @@ def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
             try:
                 pose, stamp_ns = query.pose_in(listened.buffer)
             except TransformException as error:
-                reason = str(error)
+                reason = str(error.detail)
             else:
                 if stamp_ns is None or stamp_ns != given_ns:
                     on_pose(pose, stamp_ns)

@@ -47,7 +47,13 @@ from tfcompose.tf.tf2.exceptions import (
     TypeException,
 )
 from tfcompose.tf.tf2.listener import TransformListener
-from tfcompose.tf.tf2.messages import ConvertRegistration, Stamped, TransformRegistration, convert
+from tfcompose.tf.tf2.messages import (
+    ConvertRegistration,
+    Stamped,
+    TransformRegistration,
+    complete_rclpy,
+    convert,
+)
 
 __all__ = ["Buffer", "BufferClient", "BufferCore", "BufferInterface"]
 __all__ += ["StaticTransformBroadcaster", "TransformBroadcaster", "TransformListener"]
@@ -59,3 +65,5 @@ __all__ += [
 ]
 __all__ += ["NotImplementedException", "TimeoutException", "TransformException", "TypeException"]
 __all__ += ["ConvertRegistration", "Stamped", "TransformRegistration", "convert"]
+
+complete_rclpy()

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Literal
 
 from tfcompose.tf.tf2 import exceptions
 from tfcompose.tf.tf2.exceptions import (
-    ConnectivityException,
     ExtrapolationException,
-    LookupException,
     milliseconds,
     seconds,
+    tf2_time,
 )
 from tfcompose.tf.tf2.poses import (
     IDENTITY,
@@ -309,7 +308,7 @@ def newest_chain(caches: Mapping[str, TimeCache], target: str, source: str) -> P
     """
     up, down, tops = _meet(caches, target, source, lambda cache: cache.parent)
     if tops:
-        raise ConnectivityException(exceptions.two_trees(caches, target, source, *tops))
+        raise exceptions.not_connected(caches, target, source, tops)
     return PoseChain(up, down)
 
 
@@ -328,9 +327,9 @@ def chain_at(
     up, down, tops = _meet(caches, target, source, lambda cache: cache.parent_at(stamp_ns))
     for top in tops:
         if top in caches:
-            raise ExtrapolationException(outside(caches[top], stamp_ns))
+            raise outside(caches[top], stamp_ns)
     if tops:
-        raise ConnectivityException(exceptions.two_trees(caches, target, source, *tops))
+        raise exceptions.not_connected(caches, target, source, tops)
     return PoseChain(up, down)
 
 
@@ -371,45 +370,57 @@ def _climb(
         way.append(cache)
         frame = parent
         if frame in visited and frame not in goal:
-            raise LookupException(exceptions.loop(frame, [each.child for each in way]))
+            raise exceptions.loop(frame, [each.child for each in way])
         visited.add(frame)
     return way, frame
 
 
-# What the exceptions say of times.
+# Exceptions about times.
 
 
-def outside(cache: TimeCache, stamp_ns: int) -> str:
-    """Return how far the time is from the edge's samples."""
+def outside(cache: TimeCache, stamp_ns: int) -> ExtrapolationException:
+    """Return the exception for a time outside of the edge's samples, which says how far."""
     if not len(cache):
-        return f"{cache.child} has had no parent since the buffer was cleared"
-    edge = f"{cache.parent} → {cache.child}"
+        return ExtrapolationException(
+            "Lookup would require extrapolation",
+            f"{cache.child} has had no parent since the buffer was cleared",
+        )
+    edge = f"{cache.parent} → {cache.child} at {seconds(stamp_ns)} would be extrapolation"
+    requested = tf2_time(stamp_ns)
+    oldest, newest = tf2_time(cache.oldest_ns), tf2_time(cache.newest_ns)
     if len(cache) == 1:
         only = cache.newest_ns
         away = f"{milliseconds(abs(only - stamp_ns))} {'later' if only > stamp_ns else 'earlier'}"
-        return (
-            f"{edge} at {seconds(stamp_ns)} would be extrapolation: its one sample is {away}, of"
-            f" {seconds(only)}"
+        return ExtrapolationException(
+            f"Lookup would require extrapolation at time {requested}, but only time {newest} is in"
+            " the buffer",
+            f"{edge}: its one sample is {away}, of {seconds(only)}",
         )
     if stamp_ns > cache.newest_ns:
         late = milliseconds(stamp_ns - cache.newest_ns)
-        return (
-            f"{edge} at {seconds(stamp_ns)} would be extrapolation into the future: "
-            f"its newest sample is {late} earlier, of {seconds(cache.newest_ns)}"
+        return ExtrapolationException(
+            f"Lookup would require extrapolation into the future.  Requested time {requested} but"
+            f" the latest data is at time {newest}",
+            f"{edge} into the future: its newest sample is {late} earlier, of"
+            f" {seconds(cache.newest_ns)}",
         )
     early = milliseconds(cache.oldest_ns - stamp_ns)
-    return (
-        f"{edge} at {seconds(stamp_ns)} would be extrapolation into the past: "
-        f"its oldest sample is {early} later, of {seconds(cache.oldest_ns)}"
+    return ExtrapolationException(
+        f"Lookup would require extrapolation into the past.  Requested time {requested} but the"
+        f" earliest data is at time {oldest}",
+        f"{edge} into the past: its oldest sample is {early} later, of {seconds(cache.oldest_ns)}",
     )
 
 
-def no_common_time(moving: Sequence[TimeCache]) -> str:
-    """Return which edge has nothing at the newest time of the edge that is behind."""
+def no_common_time(moving: Sequence[TimeCache]) -> ExtrapolationException:
+    """Return the exception for edges whose samples have no time in common, which it names."""
     behind = min(moving, key=lambda cache: cache.newest_ns)
     ahead = max(moving, key=lambda cache: cache.oldest_ns)
     gap = milliseconds(ahead.oldest_ns - behind.newest_ns)
-    return (
+    return ExtrapolationException(
+        "Lookup would require extrapolation into the past.  Requested time"
+        f" {tf2_time(behind.newest_ns)} but the earliest data is at time"
+        f" {tf2_time(ahead.oldest_ns)}",
         f"{ahead.parent} → {ahead.child} begins {gap} after the last of {behind.parent} →"
-        f" {behind.child}: they have no time in common (extrapolation into the past)"
+        f" {behind.child}: they have no time in common (extrapolation into the past)",
     )

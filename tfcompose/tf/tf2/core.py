@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.tf.tf2.exceptions import TransformException
-from tfcompose.tf.tf2.messages import nanoseconds, time_of, transform_stamped
+from tfcompose.tf.tf2.messages import complete_rclpy, nanoseconds, time_of, transform_stamped
 from tfcompose.tf.tf2.pose_buffer import CACHE_NS, FrameInfo, PoseBuffer, Row
 from tfcompose.tf.tf2.velocity import Velocity, VelocityQuery, mean_velocity
 
@@ -37,6 +37,7 @@ class BufferCore(PoseBuffer):
     """
 
     def __init__(self, cache_time: Any = None) -> None:
+        complete_rclpy()
         super().__init__(CACHE_NS if cache_time is None else nanoseconds(cache_time))
 
     # Transforms in.
@@ -106,7 +107,7 @@ class BufferCore(PoseBuffer):
         """
         with self._lock:
             if target_frame == source_frame:
-                self._require(target_frame)
+                self._require(target_frame, "target_frame")
                 return time_of(self._newest_ns(target_frame))
             return time_of(self._chain_between(target_frame, source_frame).common_ns())
 

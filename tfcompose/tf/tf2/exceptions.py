@@ -2,8 +2,10 @@
 
 Tf2's exceptions and rejections, and what they say.
 
-The exceptions have tf2's names and hierarchy. Their messages name the edge that is missing, or say
-by how many milliseconds a time is too early or too late.
+The exceptions have tf2's names and hierarchy. Their messages begin as tf2's do, since programs
+look for those words; then they name the edge that is missing, or say by how many milliseconds a
+time is too early or too late. The source of the words is geometry2's buffer_core.cpp and cache.cpp
+(Jazzy).
 """
 
 # ruff: noqa: N818 - the names are tf2's
@@ -25,7 +27,25 @@ DENORMALISED = 0.01
 
 
 class TransformException(Exception):
-    """Raised when there is no pose of one frame in another; the message says why."""
+    """Raised when there is no pose of one frame in another.
+
+    Args:
+        text: what tf2 says.
+        detail: what is known beyond that; tfcompose's commands print it alone.
+    """
+
+    def __init__(self, text: str = "", detail: object = None) -> None:
+        super().__init__(text)
+        self.detail = text if detail is None else detail
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        if self.detail is text:
+            return text
+        return f"{text}: {self.detail}"
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({str(self)!r})"
 
 
 class LookupException(TransformException):
@@ -113,7 +133,7 @@ def rejection_of(parent: str, child: str, pose: PoseTuple) -> Rejection | None:
 
 
 class UnknownFrame:
-    """The message about an unknown frame, with the nearest known name.
+    """What is said of an unknown frame, with the nearest known name.
 
     It is worked out when it is read: among thousands of names that takes longer than all lookups
     of a second, and a program that waits for a frame asks for it with every message.
@@ -136,11 +156,33 @@ class UnknownFrame:
         return repr(str(self))
 
 
-def unusable_name(frame: str) -> str:
-    """Return why tf2 takes no such name in a lookup."""
+def unknown_frame(frame: str, argument: str, known: Collection[str]) -> LookupException:
+    """Return the exception for a frame of which nothing was heard."""
+    return LookupException(
+        f'"{frame}" passed to lookupTransform argument {argument} does not exist',
+        UnknownFrame(frame, known),
+    )
+
+
+def unusable_name(frame: str, argument: str) -> InvalidArgumentException:
+    """Return the exception for a name that tf2 takes in no lookup."""
+    text = f'Invalid argument "{frame}" passed to lookupTransform argument {argument}'
     if not frame:
-        return "a frame's name is empty"
-    return f"no frame's name starts with a slash in tf2: {frame} is known as {frame[1:]}"
+        return InvalidArgumentException(f"{text} - in tf2 frame_ids cannot be empty")
+    return InvalidArgumentException(
+        f"{text} - in tf2 frame_ids cannot start with a '/'", f"it is known as {frame[1:]}"
+    )
+
+
+def not_connected(
+    known: Collection[str], target: str, source: str, tops: Sequence[str]
+) -> ConnectivityException:
+    """Return the exception for two frames whose ways up end at two ``tops``."""
+    return ConnectivityException(
+        f"Could not find a connection between '{target}' and '{source}' because they are not part"
+        " of the same tree",
+        two_trees(known, target, source, *tops),
+    )
 
 
 def two_trees(known: Collection[str], a: str, b: str, top_a: str, top_b: str) -> str:
@@ -157,13 +199,21 @@ def two_trees(known: Collection[str], a: str, b: str, top_a: str, top_b: str) ->
     )
 
 
-def loop(frame: str, children: Sequence[str]) -> str:
-    """Return the loop that begins and ends at ``frame``.
+def loop(frame: str, children: Sequence[str]) -> LookupException:
+    """Return the exception for the loop that begins and ends at ``frame``.
 
     ``children`` are the frames on the way up.
     """
     around = children[children.index(frame) :]
-    return f"the live tree has a loop: {' → '.join([frame, *reversed(around)])}"
+    return LookupException(
+        "The tf tree is invalid because it contains a loop",
+        f"the live tree has a loop: {' → '.join([frame, *reversed(around)])}",
+    )
+
+
+def tf2_time(stamp_ns: int) -> str:
+    """Return a time in seconds as tf2 prints it."""
+    return f"{stamp_ns / 1e9:.6f}"
 
 
 def seconds(stamp_ns: int) -> str:

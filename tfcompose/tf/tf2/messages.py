@@ -39,6 +39,15 @@ if TYPE_CHECKING:
 _SECOND_NS = 1_000_000_000
 
 
+def complete_rclpy() -> None:
+    """Load rclpy's times where rclpy is loaded.
+
+    Tf2_ros imports them, so programs say ``rclpy.time.Time`` after ``import rclpy`` alone.
+    """
+    if "rclpy" in sys.modules:
+        import tfcompose.tf.ros.rclpy_times  # noqa: F401, PLC0415 (ROS is optional)
+
+
 @dataclass(slots=True)
 class Time:
     """builtin_interfaces/Time."""

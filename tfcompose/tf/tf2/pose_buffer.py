@@ -26,7 +26,6 @@ from tfcompose.tf.tf2.cache import (
 from tfcompose.tf.tf2.exceptions import (
     ConnectivityException,
     ExtrapolationException,
-    InvalidArgumentException,
     LookupException,
     Rejection,
     TransformException,
@@ -267,7 +266,7 @@ class PoseBuffer:
                 except ExtrapolationException as error:
                     if stamp_ns:
                         raise
-                    raise ExtrapolationException(no_common_time(chain.moving)) from error
+                    raise no_common_time(chain.moving) from error
             return pose, at_ns
 
     def _full_pose(
@@ -275,8 +274,9 @@ class PoseBuffer:
     ) -> tuple[PoseTuple, int]:
         """Return the source at one time in the target at another, and the target's motion."""
         with self._lock:
-            for frame in (target, source, fixed):
-                self._require(frame)
+            self._require(target, "target_frame")
+            self._require(source, "source_frame")
+            self._require(fixed, "fixed_frame")
             first, _ = self._pose(fixed, source, source_ns)
             second, stamp_ns = self._pose(target, fixed, target_ns)
         return unit(product(second, first)), stamp_ns
@@ -298,8 +298,8 @@ class PoseBuffer:
 
         The one by newest parents, if there is any, is remembered.
         """
-        self._require(target)
-        self._require(source)
+        self._require(target, "target_frame")
+        self._require(source, "source_frame")
         try:
             chain = newest_chain(self._caches, target, source)
         except (ConnectivityException, LookupException):
@@ -311,11 +311,11 @@ class PoseBuffer:
         self._chains[target, source] = chain
         return chain
 
-    def _require(self, frame: str) -> None:
+    def _require(self, frame: str, argument: str) -> None:
         if not frame or frame[0] == "/":
-            raise InvalidArgumentException(exceptions.unusable_name(frame))
+            raise exceptions.unusable_name(frame, argument)
         if frame not in self._names:
-            raise LookupException(exceptions.UnknownFrame(frame, self._names))
+            raise exceptions.unknown_frame(frame, argument, self._names)
 
     def _new_cache(self, child: str, *, static: bool) -> TimeCache:
         """Return the samples of a frame that is new, or becomes fixed or moving."""

@@ -220,8 +220,10 @@ def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespac
             try:
                 pose, stamp_ns = observer.pose(target, source)
                 wrong = ""
-            except (StaleError, TransformException) as error:
+            except StaleError as error:
                 wrong = str(error)
+            except TransformException as error:
+                wrong = str(error.detail)
             waiting = not shown and now - begun < _OBSERVE_S
             if wrong != trouble and not (wrong and waiting):
                 warn(wrong or "the links are live again")

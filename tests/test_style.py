@@ -139,14 +139,14 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
     "foundation": 1_717,
-    "model": 2_091,
+    "model": 2_102,
     "spec": 4_759,
     "compiler": 9_183,
-    "tf": 5_297,
-    "guard": 4_041,
-    "launcher": 3_805,
-    "cli": 5_303,
-    "tools": 11_063,
+    "tf": 5_377,
+    "guard": 4_200,
+    "launcher": 3_815,
+    "cli": 5_335,
+    "tools": 11_065,
 }
 
 

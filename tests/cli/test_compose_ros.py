@@ -81,7 +81,7 @@ def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_a
     down = tfc("down")
     assert (down.returncode, down.stdout.split("@")[0]) == (0, "rover")
     assert until(lambda: all(map(gone, pids)))
-    assert tfc("ps").returncode == 1
+    assert tfc("ps", "--fail-on", "absent").returncode == 1
     assert "ended" in tfc("logs", "tfcompose", "-n", "1").stdout
 
 
@@ -184,7 +184,7 @@ def _change(tfc: Callable[..., Any], tmp_path: Path) -> None:
 def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_searches_it(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
-    assert tfc("ps").returncode == 1
+    assert tfc("ps", "--fail-on", "absent").returncode == 1
     code = """
 import sys
 from tfcompose.cli import main, starting
@@ -225,7 +225,7 @@ def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the
     below = psutil.Process(robot["launcher"]).children(recursive=True)
     os.kill(robot["launcher"], signal.SIGKILL)
     assert until(lambda: all(map(gone, below)))
-    assert tfc("ps").returncode == 1
+    assert tfc("ps", "--fail-on", "absent").returncode == 1
     assert "was killed" in tfc("logs").stdout or "tree complete" in tfc("logs").stdout
     assert tfc("up", "--wait").returncode == 0
 
@@ -324,7 +324,7 @@ def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(
         assert time.monotonic() - began < 2 * once_s + ANSWER_S, "nobody waits for an answer"
     finally:
         os.kill(launcher, signal.SIGCONT)
-    assert until(lambda: tfc("ps", "--robot", "rover").returncode == 0)
+    assert until(lambda: tfc("ps", "--robot", "rover", "--fail-on", "absent").returncode == 0)
 
 
 def test_verify_and_doctor_take_the_plan_of_the_robot_that_runs_here(

@@ -3,7 +3,9 @@
 Up moves it, and up again gives it another description while it runs.
 """
 
+import json
 import sys
+import time
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +20,7 @@ from std_msgs.msg import String
 from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.tf.ros.node import JOINT_STATES, LATCHED, Subscription, open_node
+from tfcompose.tf.ros.sensor_data import JointStatePublisher
 from tfcompose.tf.tf2 import Buffer, TransformListener
 
 pytestmark = pytest.mark.ros
@@ -83,6 +86,25 @@ def test_simulated_joints_move_the_robot_and_a_new_description_comes_while_it_ru
         assert until(lambda: has_reported(2)), "who listens gets the new one"
         assert until(lambda: _z(buffer) == pytest.approx(0.7))
         agrees(buffer, heard[1], _positions(states))
+
+
+def test_a_second_sender_of_a_joint_is_named_while_it_sends(tfc: Callable[..., str]) -> None:
+    tfc("up", "--wait")
+
+    def codes() -> set[str]:
+        (robot,) = json.loads(tfc("ps", "--format", "json"))
+        return {found["code"] for found in robot["findings"]}
+
+    assert codes() == set()
+    with open_node("rogue", "") as node:
+        rogue = JointStatePublisher(node, ["z_first", "weel"])
+
+        def is_named() -> bool:
+            rogue.publish(time.time_ns(), [0.0, 0.0])
+            return codes() == {"TF860", "TF861"}
+
+        assert until(is_named)
+    assert until(lambda: codes() == set())
 
 
 def agrees(buffer: Buffer, description: str, positions: dict[str, float]) -> None:

@@ -92,6 +92,7 @@ from tfcompose.tf.bags import BagError
 from tfcompose.tf.live.publishers import Message, OtherRun, Publisher, Senders
 from tfcompose.tf.live.state import (
     NO_NODE,
+    JointSender,
     MovingJoint,
     RosProcess,
     StampedData,
@@ -224,8 +225,19 @@ def _graphs() -> Iterator[TreeState]:
     )
     heard = replace(states, readers=("/drive",))
     yield sound_tree().observed(
-        graph=(heard,), moving_joints=joints, joint_names=frozenset({"sholder"})
+        graph=(heard,),
+        moving_joints=joints,
+        joint_senders=(_sender("/broadcaster", "sholder"),),
     )
+    rogue = _sender("/rogue", "shoulder")
+    for other in (_sender("/broadcaster", "shoulder", "elbow"), rogue):
+        yield sound_tree().observed(
+            graph=(heard,), moving_joints=joints, joint_senders=(other, rogue)
+        )
+
+
+def _sender(node: str, *joints: str) -> JointSender:
+    return JointSender("/joint_states", node, frozenset(joints), 0, SECOND_NS)
 
 
 def _data() -> Iterator[TreeState]:

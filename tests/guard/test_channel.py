@@ -1,8 +1,11 @@
 """What the launcher hears of edges that come no more."""
 
+import pytest
+
 from tests.support.guard_history import FIXED, History, edge
-from tfcompose.guard.channel import SilentEdges
-from tfcompose.model.messages import GuardEvent, Silent
+from tfcompose.guard import channel
+from tfcompose.guard.channel import FindingsReport, SilentEdges
+from tfcompose.model.messages import CurrentFindings, GuardEvent, Silent
 
 
 def test_each_silent_or_orphaned_edge_is_reported_once_and_when_it_is_back() -> None:
@@ -22,3 +25,33 @@ def test_each_silent_or_orphaned_edge_is_reported_once_and_when_it_is_back() -> 
     report_silent()
     report_silent()
     assert events[1:] == [Silent(("base",), over=False), Silent(("camera", "lidar"), over=True)]
+
+
+def test_what_is_wrong_now_is_reported_when_it_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(channel, "FINDINGS_EVERY_S", 0.0)
+    running = History(edges=(edge("odom base", "drive", rate=10),)).clear()
+    events: list[GuardEvent] = []
+    sources = [running.judge.wrong, running.judge.live.wrong]
+    report = FindingsReport(sources, events.append).report
+
+    def codes() -> list[str]:
+        report()
+        report()
+        current = events[-1] if events else CurrentFindings(())
+        assert isinstance(current, CurrentFindings)
+        return [found.code for found in current.findings]
+
+    drive = running.joins("/drive")
+    running.repeat(drive, "odom base", 20)
+    assert codes() == []
+    running.wait(5)
+    assert codes() == ["TF804"]
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "odom base", 10)
+    assert codes() == ["TF801", "TF804"]
+    running.repeat(drive, "odom base", 20)
+    assert codes() == ["TF801"]
+    running.leaves(rogue)
+    running.repeat(drive, "odom base", 100)
+    assert codes() == []
+    assert len(events) == 4

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import TextIO
 
+    from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.runtime_dir import Holder, RuntimeDir
     from tfcompose.model.messages import Notice, ProcessStatus, Request, Verb
     from tfcompose.model.plan import Plan
@@ -180,8 +181,12 @@ def notices(
                     ) from None
 
 
-def wait_until_ready(place: RuntimeDir, timeout_s: float | None) -> int:
+def wait_until_ready(
+    place: RuntimeDir, timeout_s: float | None, *, without_errors: bool = False
+) -> int:
     """Wait until every process is ready and every edge live.
+
+    ``without_errors``: and until the guard sees no error.
 
     0 then, and 1 after saying why that did not come.
     """
@@ -192,12 +197,16 @@ def wait_until_ready(place: RuntimeDir, timeout_s: float | None) -> int:
         except OSError:
             warn(f"{place.name} has ended; see tfcompose logs")
             return FAILED
-        if status.ready:
+        if status.ready and not (without_errors and _errors(status)):
             return 0
         if timeout_s is not None and end is not None and time.monotonic() >= end:
             print_missing(place, timeout_s)
             return FAILED
         time.sleep(ASK_EVERY_S)
+
+
+def _errors(status: RobotStatus) -> list[Finding]:
+    return [found for found in status.findings if found.severity == "error"]
 
 
 def print_missing(place: RuntimeDir, timeout_s: float) -> None:
@@ -219,6 +228,8 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
             warn(f"  not ready: {process.name} ({_why_not_ready(process)})")
     if missing:
         warn(f"  not live: {listed(missing, NAMED_AT_MOST)}")
+    for found in _errors(status):
+        warn(f"  {found.severity}[{found.code}] {found.message}")
 
 
 def _why_not_ready(process: ProcessStatus) -> str:

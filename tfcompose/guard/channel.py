@@ -26,6 +26,7 @@ from tfcompose.model.messages import (
     Clear,
     ComponentOrder,
     ComponentState,
+    CurrentFindings,
     Gate,
     GateState,
     GuardEvent,
@@ -43,6 +44,7 @@ from tfcompose.tf.process import say
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from tfcompose.foundation.findings import Finding
     from tfcompose.guard.components import Components
     from tfcompose.guard.gates import Gates, Switches
     from tfcompose.guard.judge import Judge
@@ -62,6 +64,9 @@ _OBSERVATIONS = (
 )
 #: How often the launcher hears that the guard looks, in seconds.
 ALIVE_EVERY_S = 1.0
+#: How often the launcher hears what is wrong now, in seconds, and how many findings at most.
+FINDINGS_EVERY_S = 0.5
+MOST_FINDINGS = 100
 #: A longer part of the memory is not handed on: the launcher takes no longer lines; characters.
 LONGEST = 900_000
 #: The part of the memory that no topics have.
@@ -123,7 +128,7 @@ class EventWriter:
             return
         if self._pipe is not None:
             self._lines.append(GUARD_EVENTS.line(event))
-        elif not isinstance(event, (Remember, Silent)):
+        elif not isinstance(event, (CurrentFindings, Remember, Silent)):
             say(GUARD_EVENTS.line(event).rstrip())
 
     def heartbeat(self) -> None:
@@ -176,6 +181,28 @@ class SilentEdges:
             new = sorted(set(children).difference(others))
             for start in range(0, len(new), MOST_NAMED):
                 self._emit(Silent(tuple(new[start : start + MOST_NAMED]), over=over))
+
+
+class FindingsReport:
+    """Reports all that is wrong now whenever that has changed, for who asks the launcher."""
+
+    def __init__(
+        self, sources: Sequence[Callable[[], list[Finding]]], emit: Callable[[GuardEvent], None]
+    ) -> None:
+        self._sources, self._emit = sources, emit
+        self._due = 0.0
+        self._reported: tuple[Finding, ...] = ()
+
+    def report(self) -> None:
+        """Report what is different, if it is time."""
+        if time.monotonic() < self._due:
+            return
+        self._due = time.monotonic() + FINDINGS_EVERY_S
+        found = [one for source in self._sources for one in source()]
+        worst = tuple(sorted(dict.fromkeys(found), key=lambda one: one.severity)[:MOST_FINDINGS])
+        if worst != self._reported:
+            self._reported = worst
+            self._emit(CurrentFindings(worst))
 
 
 def recalled(env: Mapping[str, str]) -> dict[str, Any]:

@@ -143,11 +143,13 @@ class DiagnosticsPage:
     def publish(
         self,
         judges: Sequence[Judge],
+        found: Sequence[Callable[[], list[Finding]]],
         held: Callable[[], Mapping[tuple[str, str, str], int] | None],
     ) -> None:
         """Publish if it is due and there is a subscriber.
 
-        ``held`` says what a strict guard held back.
+        ``found`` give what is wrong now, but for edges that are silent or slow; ``held`` says what
+        a strict guard held back.
         """
         now = time.monotonic()
         if self._publisher is None or now < self._due:
@@ -155,7 +157,7 @@ class DiagnosticsPage:
         self._due = now + EVERY_S
         if self._publisher.is_heard:
             edges = [edge for judge in judges for edge in judge.health(now)]
-            wrong = [one for judge in judges for one in judge.wrong()]
+            wrong = [one for findings in found for one in findings()]
             page = statuses(self._robot, edges, wrong)
             if (counts := held()) is not None:
                 page.append(held_status(self._robot, counts))

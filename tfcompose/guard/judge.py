@@ -196,7 +196,7 @@ class Judge:
     def wrong(self) -> list[Finding]:
         """Return what was reported and is not over, worst first.
 
-        Silence and low rates are part of ``health``.
+        Silence and low rates are not among it: they are part of ``health``, and ``live`` has them.
         """
         return self.ledger.wrong()
 

@@ -28,8 +28,9 @@ from tfcompose.model.plan import SLOW_BELOW
 from tfcompose.tf.live.arrivals import Arrivals
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterable
 
+    from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import Plan, PlanEdge
 
 #: A rate is judged over this time, or so many periods; half of it at least. Arrivals are counted
@@ -211,6 +212,8 @@ class Liveness:
         self._complete = False
         self._gone: set[str] = set()
         self._absent: set[str] = set()
+        #: What is reported and not over, by the edge's child: silence, a low rate.
+        self._wrong: dict[str, Finding] = {}
         self._watched = WatchedTime()
 
     def absent(self, owner: str) -> None:
@@ -227,6 +230,7 @@ class Liveness:
         for track in tracks:
             track.live = track.silent = track.slow = track.steady = False
             track.forget()
+        self._is_over(_children(tracks))
 
     def present(self, owner: str) -> None:
         """Note that the owner was started: its edges must be observed anew."""
@@ -257,6 +261,7 @@ class Liveness:
         for one in memory.silent:
             for track in self._parted(self._planned(one.children)):
                 track.silent, track.silent_since, track.last = True, one.since, one.since
+                self._is_wrong(_children([track]), silent(list(track.edges), now - one.since))
         self._complete = not any(self._waiting.values())
 
     def _planned(self, children: tuple[str, ...]) -> tuple[str, ...]:
@@ -361,10 +366,26 @@ class Liveness:
             if change:
                 changed.setdefault((change, track.edge.owner), []).append(track)
         self.changes += len(changed)
-        return [
-            change_event(change, self._in_order(tracks), now)
-            for (change, _), tracks in changed.items()
-        ]
+        events = []
+        for (change, _), tracks in changed.items():
+            event = change_event(change, self._in_order(tracks), now)
+            events.append(event)
+            if isinstance(event, FindingShown):
+                self._is_wrong(_children(tracks), event.found)
+            else:
+                self._is_over(_children(tracks))
+        return events
+
+    def wrong(self) -> list[Finding]:
+        """Return what was reported of silent and slow edges and is not over."""
+        return list(dict.fromkeys(self._wrong.values()))
+
+    def _is_wrong(self, children: Iterable[str], found: Finding) -> None:
+        self._wrong.update(dict.fromkeys(children, found))
+
+    def _is_over(self, children: Iterable[str]) -> None:
+        for child in children:
+            self._wrong.pop(child, None)
 
     def _in_order(self, tracks: list[Track]) -> list[Track]:
         """Return tracks by their first edge's place in the plan."""
@@ -400,11 +421,12 @@ class Liveness:
             edge = tracks[0].edge
             if edge.node not in nodes and owner not in self._gone:
                 self._gone.add(owner)
-                events.append(
-                    FindingShown(left([edge for track in tracks for edge in track.edges]))
-                )
+                found = left([edge for track in tracks for edge in track.edges])
+                self._is_wrong(_children(tracks), found)
+                events.append(FindingShown(found))
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
+                self._is_over(_children(tracks))
                 events.append(RecoveredShown(f"{owner} ({edge.node}) is back"))
         self.changes += len(events)
         return events

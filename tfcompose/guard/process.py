@@ -18,6 +18,7 @@ from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.text import counted
 from tfcompose.guard.channel import (
     EventWriter,
+    FindingsReport,
     Memory,
     OrderReader,
     SilentEdges,
@@ -28,6 +29,7 @@ from tfcompose.guard.components import ComponentDriver, Components
 from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.flood import WAIT_S, FloodReader
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
+from tfcompose.guard.joint_watch import JointWatch
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.ledger import MOST_UNDECLARED
 from tfcompose.guard.relay import Feedback, Relay
@@ -337,14 +339,19 @@ def guard(own: Own, stop: Stop) -> None:
         ready()
         CATALOGUE.load()
         diagnostics = DiagnosticsPage(node, own.plan.robot)
+        joints = JointWatch(node, own.plan, emit)
+        wrong = [joints.wrong, *(judge.wrong for judge in judged)]
+        silence = [judge.live.wrong for judge in judged]
         orders = OrderReader(judged, Gates(node, emit), Components(node, emit))
         steps = [orders.take, *(watch.step for watch in watches)]
         steps += [memory.hand_on for memory in memories]
         steps += [
+            joints.check,
             SilentEdges(judged, emit).report,
+            FindingsReport([*wrong, *silence], emit).report,
             events.heartbeat,
             events.flush,
-            lambda: diagnostics.publish(judged, lambda: held_back(watches)),
+            lambda: diagnostics.publish(judged, wrong, lambda: held_back(watches)),
         ]
         steps += [switches.check] if switches else []
         if ORDERS_FD not in os.environ:

@@ -61,6 +61,7 @@ def status(state: State, now: float) -> RobotStatus:
             edge.name for edge in state.plan.edges if edge.child in state.silent & state.live
         ),
         processes=tuple(_process(state, one, now) for one in state.tracked.values()),
+        findings=state.findings,
     )
 
 

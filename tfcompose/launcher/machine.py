@@ -56,6 +56,7 @@ from tfcompose.model.messages import (
     Alive,
     Clear,
     ComponentState,
+    CurrentFindings,
     FindingShown,
     GateState,
     Live,
@@ -176,7 +177,7 @@ def _started(step: Transition, name: str, pid: int) -> None:
         order_gate(step, step.state.tracked[name])
         return
     _expect_no_sign_of_life(step)
-    step.update(silent=frozenset())  # it reports itself what is
+    step.update(silent=frozenset(), findings=())  # it reports itself what is
     if step.state.clear is not None:  # it joins the others
         for other in step.state.tracked.values():
             _introduce(step, other)
@@ -218,8 +219,17 @@ def _guard_reported(step: Transition, event: Event) -> None:
             _left_the_fence(step, found, process or _process_of(step.state, pid), pid)
         case RecoveredShown(text):
             step.notify(RecoveredShown(text, step.since_begin))
+        case _:
+            _keep(step, event)
+
+
+def _keep(step: Transition, event: Event) -> None:
+    """Keep what the guard reports for others."""
+    match event:
         case Remember(changed):
             step.update(memory=step.state.memory | changed)
+        case CurrentFindings(findings):
+            step.update(findings=findings)
         case _:
             pass
 

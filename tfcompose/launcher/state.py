@@ -118,11 +118,12 @@ class State:
     """Everything that is known about a running plan.
 
     ``clear`` is when the guard reported that no edge of the plan is published yet. ``live`` holds
-    the children of the edges that were received, ``silent`` those that come no more. ``reported``
-    are the codes of the errors that were shown, ``reminded_of`` the missing edges that were named
-    last. ``replanned`` is when another plan came, if one did. ``memory`` is what the guard wants
-    the next one to know; ``unwatched`` is since when it is dead, if it is; ``guard_alive`` when it
-    last reported that it works, and ``guard_overdue`` since when that is missed.
+    the children of the edges that were received, ``silent`` those that come no more; ``findings``
+    are what the guard sees wrong now. ``reported`` are the codes of the errors that were shown,
+    ``reminded_of`` the missing edges that were named last. ``replanned`` is when another plan
+    came, if one did. ``memory`` is what the guard wants the next one to know; ``unwatched`` is
+    since when it is dead, if it is; ``guard_alive`` when it last reported that it works, and
+    ``guard_overdue`` since when that is missed.
     """
 
     plan: Plan
@@ -134,6 +135,7 @@ class State:
     clear: float | None = None
     live: frozenset[str] = frozenset()
     silent: frozenset[str] = frozenset()
+    findings: tuple[Finding, ...] = ()
     complete: bool = False
     reported: frozenset[str] = frozenset()
     reminded_of: frozenset[str] = frozenset()

@@ -79,6 +79,13 @@ class FindingShown:
 
 
 @dataclass(frozen=True, slots=True)
+class CurrentFindings:
+    """All that is wrong now, worst first; what was sent before does not count any more."""
+
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class RecoveredShown:
     """A case that was reported is over; the text says which. A notice too.
 
@@ -156,6 +163,7 @@ GuardEvent = (
     | OwnerReady
     | TreeComplete
     | FindingShown
+    | CurrentFindings
     | Unfenced
     | RecoveredShown
     | GateState
@@ -523,7 +531,8 @@ class ProcessStatus:
 class RobotStatus:
     """All that is known of a run.
 
-    ``plan`` is the digest of what it was made from, ``uptime`` is in seconds.
+    ``plan`` is the digest of what it was made from, ``uptime`` is in seconds, ``findings`` are
+    what the guard sees wrong now, worst first.
     """
 
     robot: str
@@ -537,3 +546,4 @@ class RobotStatus:
     missing: tuple[str, ...]
     silent: tuple[str, ...]
     processes: tuple[ProcessStatus, ...]
+    findings: tuple[Finding, ...] = ()

@@ -214,6 +214,7 @@ SCENES: dict[Callable[[FakeNodes], None], dict[str, list[str]]] = {
         ],
         "TF840": ["/lost/scan", "/lost", "lasr", "laser?", "/slashed/scan", "/laser", "frame_id"],
         "TF844": ["shoulder", "base_link → upper_arm", "/broadcaster"],
+        "TF861": ["sholder", "/broadcaster"],
     },
     wrong_publishers: {
         "TF806": ["/cam", "/tf_static"],

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tfcompose.launcher.publishers.joint_mover import positions_of
 from tfcompose.tf.ros.joint_codec import JointNames, encode_names, fill, read_names
 
 names = st.lists(
@@ -45,7 +46,7 @@ def test_names_positions_and_time_are_read_in_either_byte_order(
     found = read_names(data)
     assert found.names == tuple(joints)
     assert found.fit(data)
-    assert list(found.positions(data)) == positions
+    assert list(positions_of(found, data)) == positions
     assert found.stamp_ns(data) == 3_000_000_007
 
 
@@ -70,19 +71,19 @@ def test_another_number_of_positions_is_refused_with_a_sentence(
 ) -> None:
     data = message(["left", "right"], positions)
     with pytest.raises(ValueError, match=why):
-        read_names(data).positions(data)
+        positions_of(read_names(data), data)
 
 
 def test_a_message_that_ends_early_is_refused_wherever_it_ends() -> None:
     data = message(["left", "right"], [1.0, 2.0])[:-8]
-    assert list(read_names(data).positions(data)) == [1.0, 2.0]
+    assert list(positions_of(read_names(data), data)) == [1.0, 2.0]
     full = read_names(data)
     for length in range(len(data)):
         with pytest.raises(ValueError, match=r"^it |^its "):
             _read(data[:length])
         if full.fit(data[:length]):
             with pytest.raises(ValueError, match=r"^it "):
-                full.positions(data[:length])
+                positions_of(full, data[:length])
 
 
 @given(st.binary(max_size=200))
@@ -105,6 +106,6 @@ def test_a_message_that_claims_a_lot_is_refused_at_once(at: int) -> None:
 
 def _read(data: bytes) -> JointNames:
     found = read_names(data)
-    found.positions(data)
+    positions_of(found, data)
     found.stamp_ns(data)
     return found

@@ -4,6 +4,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
+from tfcompose.launcher.publishers.joint_mover import positions_of
 from tfcompose.tf.ros.joint_codec import encode_names, fill, read_names
 
 pytestmark = pytest.mark.ros
@@ -20,7 +21,7 @@ def test_what_ros_writes_is_read(names: list[str], frame: str) -> None:
     found = read_names(data)
     assert (found.names, found.stamp_ns(data)) == (tuple(names), 7_000_000_009)
     assert found.fit(data)
-    assert list(found.positions(data)) == positions
+    assert list(positions_of(found, data)) == positions
 
 
 @pytest.mark.parametrize("names", NAMES, ids=len)

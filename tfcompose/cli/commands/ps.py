@@ -8,26 +8,43 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.options import add_format, add_robot
 from tfcompose.cli.terminal import FAILED, UNREADABLE, coloured, fail, table_width
+from tfcompose.foundation.text import counted
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Mapping, Sequence
 
     from tfcompose.cli.process_table import Usage
+    from tfcompose.foundation.findings import Finding
     from tfcompose.model.messages import RobotStatus
+
+
+#: Of which severity findings make the exit code 1, by the levels of --fail-on.
+_LEVELS: dict[str, frozenset[str]] = {
+    "absent": frozenset(),
+    "warning": frozenset({"error", "warning"}),
+    "error": frozenset({"error"}),
+}
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser, "all of this user")
     add_format(parser)
+    parser.add_argument(
+        "--fail-on",
+        choices=tuple(_LEVELS),
+        help="exit 1 where no robot runs (absent), or where one has a warning or an error too",
+    )
 
 
 def run(arguments: Namespace) -> int:
-    """Print the table; exit code 0, 1 where no robot runs."""
+    """Print the table; exit code 0, 1 where a robot does not answer, or as --fail-on says."""
     from tfcompose.cli.process_table import HEAD, TABLE, row, uptime
     from tfcompose.launcher.procfs import usage_of
 
@@ -39,13 +56,10 @@ def run(arguments: Namespace) -> int:
         print(
             json.dumps([_as_json(name, status, used) for name, status in robots.items()], indent=1)
         )
-        return code if robots else FAILED
+        return code or _exit_code(arguments.fail_on, robots)
     if not robots and not code:
-        fail(
-            "no robot is running"
-            if arguments.robot is None
-            else f"{arguments.robot} is not running"
-        )
+        name = arguments.robot
+        print("no robot is running" if name is None else f"{name} is not running")
     for name, status in robots.items():
         state = (
             "stopping"
@@ -56,7 +70,10 @@ def run(arguments: Namespace) -> int:
         )
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
+        state += f", {_counted(status.findings)}" if status.findings else ""
         print(f"{name}: {state}, launcher {status.launcher}, since {uptime(status.uptime)}")
+        for found in status.findings:
+            print(f"  {found.severity}[{found.code}] {found.message}")
         rows = [HEAD, *(row(process, used) for process in status.processes)]
         print(
             *TABLE.lines(
@@ -64,7 +81,28 @@ def run(arguments: Namespace) -> int:
             ),
             sep="\n",
         )
-    return code
+    return code or _exit_code(arguments.fail_on, robots)
+
+
+def _counted(findings: Sequence[Finding]) -> str:
+    """Return how many errors and warnings there are: "1 error and 2 warnings"."""
+    counts = Counter(found.severity for found in findings)
+    return " and ".join(counted(counts[kind], kind) for kind in counts)
+
+
+def _exit_code(fail_on: str | None, robots: Mapping[str, RobotStatus]) -> int:
+    if fail_on is None:
+        return 0
+    if not robots:
+        return FAILED
+    severities = _LEVELS[fail_on]
+    for status in robots.values():
+        has_failed = any(process.failed for process in status.processes)
+        if has_failed and severities:
+            return FAILED
+        if any(found.severity in severities for found in status.findings):
+            return FAILED
+    return 0
 
 
 def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:

@@ -1,7 +1,8 @@
 """Wait until a running robot has ended, or is ready.
 
 Wait until the robot has ended, and return its exit code. With --ready, wait instead until every
-process is ready and every edge live, and report what is missing after the timeout.
+process is ready, every edge live and the guard sees no error, and report what is missing or wrong
+after the timeout.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--ready",
         action="store_true",
-        help="wait until every process is ready and every edge live",
+        help="wait until every process is ready, every edge live, and no error is seen",
     )
     parser.add_argument("--timeout", type=positive, metavar="S", help="exit 1 after S seconds")
 
@@ -36,7 +37,7 @@ def run(arguments: Namespace) -> int:
 
     place = chosen_run(arguments.robot, "wait")
     if arguments.ready:
-        return wait_until_ready(place, arguments.timeout)
+        return wait_until_ready(place, arguments.timeout, without_errors=True)
     try:
         for notice, _ in notices(place, arguments.timeout):
             if isinstance(notice, Ended):

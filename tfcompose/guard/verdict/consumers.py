@@ -21,13 +21,12 @@ from tfcompose.guard.verdict.stamps import (
 )
 from tfcompose.tf.live.arrivals import KEPT_NS
 from tfcompose.tf.live.state import who
-from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.tf.live.edges import EdgeState
-    from tfcompose.tf.live.state import MovingJoint, StampedData, TopicState, TreeState
+    from tfcompose.tf.live.state import StampedData, TreeState
 
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -228,111 +227,3 @@ def _moving_above(state: TreeState, frame: str) -> list[EdgeState]:
     parents = {child: edge.parent for child, edge in newest.items()}
     way = [newest[child] for child in way_up(frame, parents.get) if child in newest]
     return [edge for edge in way if not edge.stream.static]
-
-
-# Joints.
-
-
-def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
-    """Joint states come, and no node turns them into transforms."""
-    missing = _missing(state)
-    for topic in _joint_topics(state):
-        if (
-            not topic.publishers
-            or _transformers(state, topic)
-            or (state.moving_joints and not missing)
-        ):
-            continue
-        message = (
-            f"{listed(topic.publishers)} publishes {topic.name}, and no node that publishes TF"
-            " listens to it"
-        )
-        notes = (
-            [Note(f"missing: {listed([f'{j.parent} → {j.child}' for j in missing])}")]
-            if missing
-            else []
-        )
-        advice = (
-            "start robot_state_publisher with the robot's description, or let tfcompose up publish"
-            " the joints"
-        )
-        yield finding("TF842", message, None, severity="warning", notes=notes, help=advice)
-
-
-def no_joint_states(state: TreeState) -> Iterator[Finding]:
-    """A robot state publisher waits for joint states that no node publishes."""
-    missing = _missing(state)
-    for topic in _joint_topics(state):
-        nodes = _transformers(state, topic)
-        if topic.publishers or not nodes or not missing:
-            continue
-        edges = listed([f"{joint.parent} → {joint.child}" for joint in missing])
-        message = (
-            f"{listed(nodes)} waits for {topic.name}, which nobody publishes; missing: {edges}"
-        )
-        advice = (
-            "start joint_state_broadcaster or joint_state_publisher; is the topic remapped, or in"
-            " a namespace?"
-        )
-        yield finding("TF843", message, None, help=advice)
-
-
-def joint_without_state(state: TreeState) -> Iterator[Finding]:
-    """Joint states come, and a joint of the description is not in them."""
-    if not state.joint_names:
-        return
-    absent = [
-        joint
-        for joint in _missing(state)
-        if not joint.mimic and joint.name not in state.joint_names
-    ]
-    heard = [topic for topic in _joint_topics(state) if _transformers(state, topic)]
-    if absent and heard:
-        message = (
-            f"{listed([joint.name for joint in absent])}: no state on"
-            f" {listed([topic.name for topic in heard])}"
-        )
-        notes = [
-            Note(f"missing: {listed([f'{joint.parent} → {joint.child}' for joint in absent])}")
-        ]
-        advice = (
-            f"{listed([node for topic in heard for node in topic.publishers])} should send them:"
-            " is a joint misspelt?"
-        )
-        yield finding("TF844", message, None, notes=notes, help=advice)
-
-
-def _missing(state: TreeState) -> list[MovingJoint]:
-    """Return the moving joints whose frames are not published; a frame_prefix may precede them."""
-    children = {edge.child for edge in state.taken}
-    plain = children | {child.rpartition("/")[2] for child in children}
-    return [joint for joint in state.moving_joints if joint.child not in plain]
-
-
-def _joint_topics(state: TreeState) -> list[TopicState]:
-    """Return the topics of joint states that are meant.
-
-    Those named ``joint_states``, but for robots beside this one.
-
-    A robot beside has TF topics of its own, in a namespace below this one's.
-    """
-    own = _namespace(state.topics[0])
-    spaces = {_namespace(topic.name) for topic in state.typed(TF_MESSAGE) if topic.publishers}
-    neighbours = tuple(
-        f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/")
-    )
-    named = [topic for topic in state.typed(JOINT_STATE) if topic.name.endswith("/joint_states")]
-    return [
-        topic
-        for topic in named
-        if topic.name.startswith(f"{own}/") and not topic.name.startswith(neighbours)
-    ]
-
-
-def _namespace(topic: str) -> str:
-    return topic.rpartition("/")[0]
-
-
-def _transformers(state: TreeState, topic: TopicState) -> list[str]:
-    writers = {one.node for one in state.publishers if one.node}
-    return [node for node in topic.readers if node in writers]

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.guard.verdict import consumers, publishers, rates, setup, stamps, tree, verify
+from tfcompose.guard.verdict import (
+    consumers,
+    joints,
+    publishers,
+    rates,
+    setup,
+    stamps,
+    tree,
+    verify,
+)
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
@@ -67,9 +76,10 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
     rates.gap,
     consumers.data_frame_unknown,
     consumers.data_beyond_tf,
-    consumers.joint_states_unheard,
-    consumers.no_joint_states,
-    consumers.joint_without_state,
+    joints.joint_states_unheard,
+    joints.no_joint_states,
+    joints.joint_without_state,
+    joints.joint_senders,
 )
 
 

@@ -50,6 +50,18 @@ class PublishOptions:
     ignore_timestamp: bool = False
 
 
+def positions_of(names: JointNames, data: bytes) -> NDArray[np.float64]:
+    """Return the positions of a message that has these names, in their order.
+
+    Rad or m, shape (names,).
+
+    Raises:
+        ValueError: if it has another number of positions.
+    """
+    at = names.positions_at(data)
+    return np.frombuffer(data, f"{names.order}f8", len(names.names), at)
+
+
 @dataclass(slots=True)
 class _Source:
     """Joint states with the same names, and the newest stamp in nanoseconds."""
@@ -118,7 +130,7 @@ class JointMover:
             source = self._source(data)
             if source.moving is None:
                 return None
-            positions = source.names.positions(data)
+            positions = positions_of(source.names, data)
             stamp_ns = source.names.stamp_ns(data) or self._now_ns(received_ns)
             if stamp_ns is None or not self._is_due(source, stamp_ns):
                 return None
@@ -132,7 +144,7 @@ class JointMover:
             if source.names.fit(data):
                 return source
         names = read_names(data)
-        names.positions(data)
+        names.positions_at(data)
         for source in self._sources:
             if (
                 source.names.names == names.names

@@ -8,6 +8,7 @@ guard both know it.
 
 from __future__ import annotations
 
+import posixpath
 import re
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -58,6 +59,14 @@ def parts_of(plan: Plan) -> dict[Topics, Plan]:
     for edge in plan.edges:
         edges.setdefault(topics.get(edge.owner, GLOBAL), []).append(edge)
     return {pair: replace(plan, edges=tuple(some)) for pair, some in edges.items()}
+
+
+def joint_states_topic(plan: Plan, edge: PlanEdge) -> str:
+    """Return the topic on which the owner of a joint's edge hears its states."""
+    name = "joint_states"
+    topic = posixpath.join(posixpath.dirname(edge.node), name)
+    remap = plan.process(edge.owner).remap
+    return posixpath.join(posixpath.dirname(edge.node), remap.get(name, remap.get(topic, topic)))
 
 
 def partition_of(plan: Plan) -> str:

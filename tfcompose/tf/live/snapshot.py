@@ -13,19 +13,25 @@ from xml.parsers import expat
 
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+from tfcompose.tf.live.joint_states import JointStates
 from tfcompose.tf.live.listener import LAST_WAIT_S, TreeListener
-from tfcompose.tf.live.state import MovingJoint, RosProcess, StampedData, TopicState, TreeState
+from tfcompose.tf.live.state import (
+    JointSender,
+    MovingJoint,
+    RosProcess,
+    StampedData,
+    TopicState,
+    TreeState,
+)
 from tfcompose.tf.ros.clock import wall_ns
 from tfcompose.tf.ros.environment import RMW
 from tfcompose.tf.ros.graph import ends, nodes, topics, volatile_readers
-from tfcompose.tf.ros.joint_codec import read_names
 from tfcompose.tf.ros.node import LATCHED, TextSubscription, middleware, open_node
 from tfcompose.tf.ros.processes import ros_processes, settings_in
 from tfcompose.tf.ros.sensor_data import (
     HEADED,
     JOINT_STATE_TYPE,
     HeaderSubscription,
-    JointStateSubscription,
 )
 
 if TYPE_CHECKING:
@@ -50,7 +56,7 @@ MOST = 100
 class SensorTopics:
     """Listens to what is below a namespace, for a while.
 
-    ``moving_joints`` are those of the newest description, ``joint_names`` those that had a state.
+    ``moving_joints`` are those of the newest description.
     """
 
     TYPES: ClassVar = frozenset({*HEADED, JOINT_STATE_TYPE})
@@ -60,12 +66,11 @@ class SensorTopics:
         self._prefix = prefix
         self._description = TextSubscription(node, f"{prefix}/robot_description", LATCHED)
         self._headers: dict[str, HeaderSubscription | None] = {}
-        self._joints: dict[str, JointStateSubscription] = {}
+        self._joints: dict[str, JointStates] = {}
         self._delays: dict[tuple[str, str], list[float]] = {}
         self._newest: dict[tuple[str, str], tuple[int, int]] = {}  # stamp and arrival
         self._senders: dict[str, tuple[str, ...]] = {}
         self.moving_joints: tuple[MovingJoint, ...] = ()
-        self.joint_names: set[str] = set()
 
     def subscribe(self, graph: Iterable[TopicState], robots_inside: tuple[str, ...]) -> None:
         """Listen to topics that are new.
@@ -89,7 +94,7 @@ class SensorTopics:
                 and topic.name not in self._joints
                 and len(self._joints) < MOST
             ):
-                self._joints[topic.name] = JointStateSubscription(self._node, topic.name)
+                self._joints[topic.name] = JointStates(self._node, topic.name)
 
     def take(self, clock_ns: int | None) -> None:
         """Take what has come; ``clock_ns`` is the newest simulated time or None."""
@@ -109,8 +114,7 @@ class SensorTopics:
                 self._end(subscription)
                 self._headers[topic] = None
         for joints in self._joints.values():
-            for received in joints.take()[-1:]:
-                self.joint_names |= _names(received.data)
+            joints.take()
         for _, text in self._description.take_texts()[-1:]:
             self.moving_joints = joints_of(text)
 
@@ -127,15 +131,12 @@ class SensorTopics:
             for (topic, frame), delays in sorted(self._delays.items())
         )
 
+    def joint_senders(self) -> tuple[JointSender, ...]:
+        """Return who sent joint states, and of which joints."""
+        return tuple(sender for joints in self._joints.values() for sender in joints.senders())
+
     def _end(self, subscription: HeaderSubscription) -> None:
         self._node.destroy_subscription(subscription.subscription)
-
-
-def _names(data: bytes) -> frozenset[str]:
-    try:
-        return frozenset(read_names(data).names)
-    except ValueError:
-        return frozenset()
 
 
 #: Joints that a state moves.
@@ -199,7 +200,7 @@ WAIT_S = 0.05
 ASK_EVERY_S = 0.5
 #: A simulator or a player sends its time much more often.
 CLOCK_STANDS_S = 2.0
-#: Nodes of tools that look, as this one does, say nothing about the robot.
+#: Nodes of tools that look, as this one does, say nothing about the robot; a plan's do.
 TOOLS = ("/tfcompose_", "/_ros2cli_")
 #: What is looked at besides TF itself.
 INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs/msg/JointState")
@@ -217,21 +218,23 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
     with open_node("tfcompose_doctor", "") as node:
         views = [_TopicPair(node, pair) for pair in expected]
         graph: dict[str, TopicState] = {}
+        robot = _robot_nodes(expected.values())
         due = begun = time.monotonic()  # a slow machine may take seconds until it listens
         while not stop.requested and (now := time.monotonic()) < begun + seconds:
             for view in views:
                 view.listen(min(WAIT_S, begun + seconds - now), stop)
             if now >= due:
                 due = now + ASK_EVERY_S
-                graph |= topics_in(node)
+                graph |= topics_in(node, robot)
                 for view in views:
                     view.sensors.subscribe(graph.values(), _robots_inside(view, graph))
         for view in views:
             view.listen(LAST_WAIT_S, stop)  # what came while this process was kept from looking
-        graph |= topics_in(node)  # the last word counts, but what was seen before is not forgotten
+        # The newest counts, but what was seen before is not forgotten.
+        graph |= topics_in(node, robot)
         common = TreeState(
             time.monotonic() - begun,
-            nodes=tuple(name for name in nodes(node) if not name.startswith(TOOLS)),
+            nodes=tuple(name for name in nodes(node) if not _is_tool(name, robot)),
             graph=tuple(graph.values()),
             settings=own_settings(),
             processes=tuple(RosProcess(*one) for one in ros_processes()),
@@ -300,17 +303,36 @@ class _TopicPair:
             skews_s=self.skews_s,
             stamped=self.sensors.stamped(),
             moving_joints=self.sensors.moving_joints,
-            joint_names=frozenset(self.sensors.joint_names),
+            joint_senders=self.sensors.joint_senders(),
         )
 
 
-def topics_in(node: Node) -> dict[str, TopicState]:
-    """Return the topics that matter to TF with their endpoints, by name and type."""
+def _robot_nodes(plans: Iterable[Plan | None]) -> frozenset[str]:
+    """Return the nodes of the plans' processes but their guards, which look as tools do."""
+    return frozenset(
+        node
+        for plan in plans
+        if plan is not None
+        for process in plan.processes
+        if process.kind != "guard"
+        for node in process.nodes
+    )
+
+
+def _is_tool(name: str, robot: frozenset[str]) -> bool:
+    return name.startswith(TOOLS) and name not in robot
+
+
+def topics_in(node: Node, robot: frozenset[str] = frozenset()) -> dict[str, TopicState]:
+    """Return the topics that matter to TF with their endpoints, by name and type.
+
+    Those of tools are left out, but for nodes of the ``robot``.
+    """
     found = {}
     for name, types in topics(node):
         if name not in GLOBAL and not set(types) & {*INTERESTING, *SensorTopics.TYPES}:
             continue
-        both = [end for end in ends(node, name) if not end[0].startswith(TOOLS)]
+        both = [end for end in ends(node, name) if not _is_tool(end[0], robot)]
         for kind in types:
             senders = tuple(
                 dict.fromkeys(who for who, type_, sends in both if sends and type_ == kind)

@@ -62,6 +62,21 @@ class MovingJoint:
 
 
 @dataclass(frozen=True, slots=True)
+class JointSender:
+    """A publisher of joint states, and the joints that it sent on a topic.
+
+    ``node`` is its full name, empty while that is not known. ``first_ns`` and ``last_ns`` are when
+    its first and newest message came, in nanoseconds of the system's clock.
+    """
+
+    topic: str
+    node: str
+    joints: frozenset[str]
+    first_ns: int = 0
+    last_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class RosProcess:
     """A process on this machine that has ROS loaded, and the settings that it was started with."""
 
@@ -85,7 +100,7 @@ class TreeState:
         clock_moves: whether that changed lately.
         stamped: what came with a header.
         moving_joints: the moving joints of the robot's description.
-        joint_names: those in joint states.
+        joint_senders: who sent joint states, and of which joints.
         settings: the variables by which ROS is set up here.
         processes: other processes of this machine with ROS, as far as they can be looked at.
         skews_s: how far the clock of a publisher's machine is ahead of this one's, at least
@@ -107,7 +122,7 @@ class TreeState:
     clock_moves: bool = False
     stamped: tuple[StampedData, ...] = ()
     moving_joints: tuple[MovingJoint, ...] = ()
-    joint_names: frozenset[str] = frozenset()
+    joint_senders: tuple[JointSender, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     processes: tuple[RosProcess, ...] = ()
     skews_s: Mapping[bytes, float] = field(default_factory=dict)
@@ -115,6 +130,11 @@ class TreeState:
     beyond: Mapping[bytes | None, int] = field(default_factory=dict)
     plan: Plan | None = None
     recorded: bool = False
+
+    @property
+    def joints_sent(self) -> frozenset[str]:
+        """The joints that joint states speak of."""
+        return frozenset(joint for sender in self.joint_senders for joint in sender.joints)
 
     @property
     def taken(self) -> list[EdgeState]:

@@ -14,14 +14,11 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from tfcompose.tf.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
 
 _HEADER = 4
 _STAMP_AT = 4
@@ -56,10 +53,8 @@ class JointNames:
         seconds, nanoseconds = struct.unpack_from(f"{self.order}iI", data, _STAMP_AT)
         return int(seconds) * _SECOND_NS + int(nanoseconds)
 
-    def positions(self, data: bytes) -> NDArray[np.float64]:
-        """Return the positions of a message that has these names, in their order.
-
-        Rad or m, shape (names,).
+    def positions_at(self, data: bytes) -> int:
+        """Return where the positions of a message that has these names begin, as doubles.
 
         Raises:
             ValueError: with a sentence that is the same for the same fault, if it has another
@@ -77,7 +72,7 @@ class JointNames:
         at += (_HEADER - at) % _DOUBLE if count else 0
         if at + count * _DOUBLE > len(data):
             raise ValueError("it ends inside its positions")
-        return np.frombuffer(data, f"{self.order}f8", count, at)
+        return at
 
 
 def read_names(data: bytes) -> JointNames:

@@ -12,12 +12,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from sensor_msgs.msg import JointState
 
 from tfcompose.tf.ros.graph import gid_of
 from tfcompose.tf.ros.joint_codec import encode_names, fill
 from tfcompose.tf.ros.node import JOINT_STATES, Subscription, qos
 from tfcompose.tf.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
+from tfcompose.tf.ros.typesupport import joint_state_type
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,7 +33,7 @@ class JointStateSubscription(Subscription):
     """A subscription to ``joint_states``, or to another topic of its type."""
 
     def __init__(self, node: Node, topic: str = JOINT_STATES_TOPIC) -> None:
-        super().__init__(node, JointState, topic, JOINT_STATES)
+        super().__init__(node, joint_state_type(), topic, JOINT_STATES)
 
 
 class JointStatePublisher:
@@ -41,7 +41,7 @@ class JointStatePublisher:
 
     def __init__(self, node: Node, names: Sequence[str], topic: str = JOINT_STATES_TOPIC) -> None:
         self._node = node
-        self._publisher: Any = node.create_publisher(JointState, topic, 10)
+        self._publisher: Any = node.create_publisher(joint_state_type(), topic, 10)
         self._message = encode_names(names)
 
     @property

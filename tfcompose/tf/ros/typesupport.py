@@ -345,6 +345,30 @@ def _description(stamped: TypeDescription) -> tuple[TypeDescription, list[Any]]:
 def _message_class(support: TypeSupport, alive: list[Any]) -> Any:
     new = ctypes.pythonapi.PyCapsule_New
     new.restype, new.argtypes = ctypes.py_object, (Pointer, ctypes.c_char_p, Pointer)
+    capsule = new(ctypes.addressof(support), None, None)
+    return _bytes_class(TF_MESSAGE, {"_TYPE_SUPPORT": capsule, "_alive": (support, alive)})
+
+
+@cache
+def joint_state_type() -> Any:
+    """Return the class to give rclpy for sensor_msgs/JointState.
+
+    Only its bytes can be published and taken. It is made without ``sensor_msgs.msg``, which
+    imports numpy for its covariances.
+
+    Raises:
+        RosError: if sensor_msgs has no such type.
+    """
+    capsule = getattr(
+        import_type_support("sensor_msgs"), "type_support_msg__msg__joint_state", None
+    )
+    if capsule is None:
+        raise RosError("sensor_msgs has no type support of JointState")
+    return _bytes_class("sensor_msgs/msg/JointState", {"_TYPE_SUPPORT": capsule})
+
+
+def _bytes_class(type_: str, attributes: dict[str, Any]) -> Any:
+    """Return a message class that rclpy takes, of which no message can be made."""
     # rclpy wants all five. The last four convert messages that are objects; they are no capsules,
     # so that a use raises.
     converters = (
@@ -353,20 +377,13 @@ def _message_class(support: TypeSupport, alive: list[Any]) -> Any:
         "_CONVERT_TO_PY",
         "_DESTROY_ROS_MESSAGE",
     )
-    attributes = {
-        "_TYPE_SUPPORT": new(ctypes.addressof(support), None, None),
-        "_alive": (support, alive),
-    }
+    name = type_.rpartition("/")[2]
     meta = type(
-        "Metaclass_TFMessage",
+        f"Metaclass_{name}",
         (type,),
         attributes | dict.fromkeys(converters, "tfcompose uses bytes"),
     )
-    return meta(
-        "TFMessage",
-        (),
-        {"__doc__": "tf2_msgs/msg/TFMessage, as bytes only.", "__module__": __name__},
-    )
+    return meta(name, (), {"__doc__": f"{type_}, as bytes only.", "__module__": __name__})
 
 
 # What can be read out of rosidl's structures.

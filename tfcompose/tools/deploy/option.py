@@ -49,6 +49,8 @@ def _options(arguments: Namespace) -> list[str]:
         options += ["--format", arguments.format]
     if "timeout" in values:
         options += ["--timeout", f"{arguments.timeout:g}"]
+    if values.get("fail_on"):
+        options += ["--fail-on", arguments.fail_on]
     if values.get("lines") is not None:
         options += ["--lines", str(arguments.lines)]
     return options

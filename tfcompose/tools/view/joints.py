@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import posixpath
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from tfcompose.foundation.text import listed
+from tfcompose.model.plan.topics import joint_states_topic
 from tfcompose.tools.view.kinematics import joint_positions
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def joint_topics(robot: Robot, plan: Plan) -> dict[str, dict[str, str]]:
     joints = {robot.final(edge.child): edge.joint.name for edge in robot.edges if edge.joint}
     for edge in plan.edges:
         if edge.kind == "joint" and edge.joint and edge.child in joints:
-            topic = posixpath.join(posixpath.dirname(edge.node), "joint_states")
+            topic = joint_states_topic(plan, edge)
             found.setdefault(topic, {})[edge.joint.name] = joints[edge.child]
     return found
 

@@ -1,0 +1,66 @@
+"""Who sends which joints, judged: two senders of a joint, and joints that nobody has."""
+
+import pytest
+
+from tests.support.tree_history import SECOND_NS, sound_tree
+from tfcompose.guard.verdict.doctor import diagnose
+from tfcompose.guard.verdict.joints import sent_twice, unknown_joints
+from tfcompose.tf.live.state import JointSender, MovingJoint, TopicState
+
+TOPIC = "/joint_states"
+
+
+def sender(node: str, *joints: str, first_s: float = 0.0, last_s: float = 10.0) -> JointSender:
+    return JointSender(
+        TOPIC, node, frozenset(joints), int(first_s * SECOND_NS), int(last_s * SECOND_NS)
+    )
+
+
+@pytest.mark.parametrize(
+    ("senders", "names"),
+    [
+        pytest.param(
+            [sender("/wheels", "arm", "elbow"), sender("/rogue", "arm")],
+            ["arm", "/rogue", "/wheels"],
+            id="two nodes",
+        ),
+        pytest.param(
+            [sender("/wheels", "arm"), sender("/wheels", "arm")],
+            ["arm", "/wheels"],
+            id="two publishers of one name",
+        ),
+        pytest.param(
+            [sender("/wheels", "left"), sender("/arm", "arm")], [], id="different joints"
+        ),
+        pytest.param(
+            [sender("/wheels", "arm", last_s=5.0), sender("/wheels", "arm", first_s=5.1)],
+            [],
+            id="one that was started again",
+        ),
+        pytest.param(
+            [sender("/wheels", "arm"), sender("", "arm")], [], id="one without a name yet"
+        ),
+    ],
+)
+def test_a_joint_has_one_sender(senders: list[JointSender], names: list[str]) -> None:
+    found = list(sent_twice(senders))
+    assert [one.code for one in found] == ["TF860"] * bool(names)
+    assert all(name in one.message for one in found for name in names)
+    assert all("elbow" not in one.message for one in found)
+
+
+def test_a_joint_that_the_robot_lacks_is_named_with_the_nearest() -> None:
+    (found,) = unknown_joints([sender("/rogue", "arm_jiont", "arm_joint")], {"arm_joint"})
+    assert (found.code, "/rogue" in found.message) == ("TF861", True)
+    assert "arm_joint" in found.help
+    assert not list(unknown_joints([sender("/rogue", "anything")], set()))
+
+
+def test_doctor_judges_the_topic_of_this_robot_alone() -> None:
+    joints = (MovingJoint("arm", "base_link", "arm_link"),)
+    senders = (sender("/wheels", "arm"), sender("/rogue", "arm"))
+    heard = TopicState(TOPIC, "sensor_msgs/msg/JointState", ("/wheels", "/rogue"), ("/drive",))
+    other = TopicState("/else/states", heard.type, heard.publishers, heard.readers)
+    for topic, expected in ((heard, True), (other, False)):
+        state = sound_tree().observed(graph=(topic,), moving_joints=joints, joint_senders=senders)
+        assert ("TF860" in {one.code for one in diagnose(state)}) is expected

@@ -1,0 +1,69 @@
+"""Watches joint states: each joint has one publisher, and is one that the robot has.
+
+A joint's edge has one publisher whoever sends the states, so TF alone does not show that two do.
+The topics are read from time to time and wake nobody.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.guard.verdict.joints import planned_joints, sent_twice, unknown_joints
+from tfcompose.model.messages import FindingShown, RecoveredShown
+from tfcompose.model.plan.topics import joint_states_topic
+from tfcompose.tf.live.joint_states import JointStates
+from tfcompose.tf.ros.clock import wall_ns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.model.messages import GuardEvent
+    from tfcompose.model.plan import Plan
+
+#: How often the topics are read, in seconds.
+READ_EVERY_S = 0.5
+#: Who sends nothing for so long is a sender no more.
+SENDS_NO_MORE_NS = 3_000_000_000
+
+
+class JointWatch:
+    """Judges the topics from which a plan's publishers take joint states."""
+
+    def __init__(self, node: Node, plan: Plan, emit: Callable[[GuardEvent], None]) -> None:
+        names = dict.fromkeys(
+            joint_states_topic(plan, edge) for edge in plan.edges if edge.kind == "joint"
+        )
+        self._topics = [JointStates(node, name) for name in names]
+        self._joints = planned_joints(plan)
+        self._emit = emit
+        self._due = 0.0
+        #: What is reported and not over, by code and message.
+        self._wrong: dict[tuple[str, str], Finding] = {}
+
+    def wrong(self) -> list[Finding]:
+        """Return what was reported and is not over."""
+        return list(self._wrong.values())
+
+    def check(self) -> None:
+        """Take what has come and report what is new or over, if it is time."""
+        if not self._topics or time.monotonic() < self._due:
+            return
+        self._due = time.monotonic() + READ_EVERY_S
+        found = {}
+        for states in self._topics:
+            states.take()
+            states.forget(wall_ns() - SENDS_NO_MORE_NS)
+            senders = states.senders()
+            for wrong in (*sent_twice(senders), *unknown_joints(senders, self._joints)):
+                found[wrong.code, wrong.message] = wrong
+        for key, wrong in found.items():
+            if key not in self._wrong:
+                self._emit(FindingShown(wrong))
+        for key, wrong in self._wrong.items():
+            if key not in found:
+                self._emit(RecoveredShown(f"no longer: {wrong.message}"))
+        self._wrong = found

@@ -1,0 +1,228 @@
+"""Joint states: who waits for them, who sends them, and of which joints.
+
+A moving joint needs its state from one publisher: a listener takes whatever comes, so the frames
+jump between the positions of two.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Finding, Note, finding, nearest
+from tfcompose.foundation.text import listed
+from tfcompose.tf.live.state import MovingJoint
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+
+    from tfcompose.model.plan import Plan
+    from tfcompose.tf.live.state import JointSender, TopicState, TreeState
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+#: One that sends for so long after the other began has not only replaced it.
+TOGETHER_NS = 300_000_000
+_NAMED_AT_MOST = 8
+
+
+def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
+    """Joint states come, and no node turns them into transforms."""
+    missing = _missing(state)
+    for topic in _joint_topics(state):
+        if (
+            not topic.publishers
+            or _transformers(state, topic)
+            or (_moving_joints(state) and not missing)
+        ):
+            continue
+        message = (
+            f"{listed(topic.publishers)} publishes {topic.name}, and no node that publishes TF"
+            " listens to it"
+        )
+        notes = (
+            [Note(f"missing: {listed([f'{j.parent} → {j.child}' for j in missing])}")]
+            if missing
+            else []
+        )
+        advice = (
+            "start robot_state_publisher with the robot's description, or let tfcompose up publish"
+            " the joints"
+        )
+        yield finding("TF842", message, None, severity="warning", notes=notes, help=advice)
+
+
+def no_joint_states(state: TreeState) -> Iterator[Finding]:
+    """A robot state publisher waits for joint states that no node publishes."""
+    missing = _missing(state)
+    for topic in _joint_topics(state):
+        nodes = _transformers(state, topic)
+        if topic.publishers or not nodes or not missing:
+            continue
+        edges = listed([f"{joint.parent} → {joint.child}" for joint in missing])
+        message = (
+            f"{listed(nodes)} waits for {topic.name}, which nobody publishes; missing: {edges}"
+        )
+        yield finding("TF843", message, None, help=_sender_help(state))
+
+
+def _sender_help(state: TreeState) -> str:
+    """Return who should publish joint states: the process that simulates them, or ROS's own."""
+    simulating = [
+        process
+        for process in (state.plan.processes if state.plan else ())
+        if process.simulate is not None and process.simulate.kind == "joints"
+    ]
+    for process in simulating:
+        is_there = bool({*process.nodes} & {*state.nodes})
+        why = "is there and sends none" if is_there else "does not run"
+        return f"{process.name} should publish it, and {why}: tfcompose start {process.name}"
+    return (
+        "start joint_state_broadcaster or joint_state_publisher; is the topic remapped, or in a"
+        " namespace?"
+    )
+
+
+def joint_without_state(state: TreeState) -> Iterator[Finding]:
+    """Joint states come, and a joint of the description is not in them."""
+    sent = state.joints_sent
+    if not sent:
+        return
+    absent = [joint for joint in _missing(state) if not joint.mimic and joint.name not in sent]
+    heard = [topic for topic in _joint_topics(state) if _transformers(state, topic)]
+    if absent and heard:
+        message = (
+            f"{listed([joint.name for joint in absent])}: no state on"
+            f" {listed([topic.name for topic in heard])}"
+        )
+        notes = [
+            Note(f"missing: {listed([f'{joint.parent} → {joint.child}' for joint in absent])}")
+        ]
+        advice = (
+            f"{listed([node for topic in heard for node in topic.publishers])} should send them:"
+            " is a joint misspelt?"
+        )
+        yield finding("TF844", message, None, notes=notes, help=advice)
+
+
+def _missing(state: TreeState) -> list[MovingJoint]:
+    """Return the moving joints whose frames are not published; a frame_prefix may precede them."""
+    children = {edge.child for edge in state.taken}
+    plain = children | {child.rpartition("/")[2] for child in children}
+    return [joint for joint in _moving_joints(state) if joint.child not in plain]
+
+
+def _moving_joints(state: TreeState) -> Sequence[MovingJoint]:
+    """Return the moving joints of the robot's description; of the plan where there is none."""
+    if state.moving_joints or state.plan is None:
+        return state.moving_joints
+    return [
+        MovingJoint(edge.joint.name, edge.parent, edge.child, edge.joint.mimic is not None)
+        for edge in state.plan.edges
+        if edge.joint is not None and edge.kind == "joint"
+    ]
+
+
+def _joint_topics(state: TreeState) -> list[TopicState]:
+    """Return the topics of joint states that are meant.
+
+    Those named ``joint_states``, but for robots beside this one.
+
+    A robot beside has TF topics of its own, in a namespace below this one's.
+    """
+    own = _namespace(state.topics[0])
+    spaces = {_namespace(topic.name) for topic in state.typed(TF_MESSAGE) if topic.publishers}
+    neighbours = tuple(
+        f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/")
+    )
+    named = [topic for topic in state.typed(JOINT_STATE) if topic.name.endswith("/joint_states")]
+    return [
+        topic
+        for topic in named
+        if topic.name.startswith(f"{own}/") and not topic.name.startswith(neighbours)
+    ]
+
+
+def _namespace(topic: str) -> str:
+    return topic.rpartition("/")[0]
+
+
+def _transformers(state: TreeState, topic: TopicState) -> list[str]:
+    writers = {one.node for one in state.publishers if one.node}
+    return [node for node in topic.readers if node in writers]
+
+
+# Senders.
+
+
+def joint_senders(state: TreeState) -> Iterator[Finding]:
+    """A joint has the states of two publishers, or the robot has no such joint."""
+    heard = {topic.name for topic in _joint_topics(state)}
+    senders = [sender for sender in state.joint_senders if sender.topic in heard]
+    yield from sent_twice(senders)
+    yield from unknown_joints(senders, joint_names(state))
+
+
+def joint_names(state: TreeState) -> frozenset[str]:
+    """Return the names of the robot's joints, by its description and its plan."""
+    described = {joint.name for joint in state.moving_joints}
+    return frozenset(described | (planned_joints(state.plan) if state.plan else frozenset()))
+
+
+def planned_joints(plan: Plan) -> frozenset[str]:
+    """Return the names of the joints that the plan's edges have."""
+    return frozenset(edge.joint.name for edge in plan.edges if edge.joint is not None)
+
+
+def sent_twice(senders: Sequence[JointSender]) -> Iterator[Finding]:
+    """Find joints of which several publishers of a topic send states at the same time."""
+    shared: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for topic in dict.fromkeys(sender.topic for sender in senders):
+        of_topic = [sender for sender in senders if sender.topic == topic and sender.node]
+        for joint in sorted({joint for sender in of_topic for joint in sender.joints}):
+            some = _together([sender for sender in of_topic if joint in sender.joints])
+            if len(some) > 1:
+                nodes = tuple(sorted(sender.node for sender in some))
+                shared.setdefault((topic, nodes), []).append(joint)
+    for (topic, nodes), joints in shared.items():
+        names = list(dict.fromkeys(nodes))
+        by = f"twice by {names[0]}" if len(names) == 1 else f"by {' and by '.join(names)}"
+        verb = "is" if len(joints) == 1 else "are"
+        yield finding(
+            "TF860",
+            f"{listed(joints, _NAMED_AT_MOST)} {verb} sent {by} on {topic}",
+            None,
+            help="end all but one of them, or let each send other joints: frames jump between the"
+            " positions of the two",
+        )
+
+
+def _together(senders: Sequence[JointSender]) -> list[JointSender]:
+    """Return those that sent while another one did, and did not only replace it."""
+    return [
+        sender
+        for sender in senders
+        if any(
+            other is not sender
+            and sender.last_ns >= other.first_ns + TOGETHER_NS
+            and other.last_ns >= sender.first_ns + TOGETHER_NS
+            for other in senders
+        )
+    ]
+
+
+def unknown_joints(senders: Sequence[JointSender], known: Collection[str]) -> Iterator[Finding]:
+    """Find joints that the robot does not have; none where nothing is known of its joints."""
+    for sender in senders if known else ():
+        unknown = sorted(sender.joints.difference(known))
+        if not unknown or not sender.node:
+            continue
+        meant = {joint: nearest(joint, list(known)) for joint in unknown}
+        near = [f"did you mean {name} for {joint}?" for joint, name in meant.items() if name]
+        yield finding(
+            "TF861",
+            f"{sender.node} sends {listed(unknown, _NAMED_AT_MOST)} on {sender.topic}; the robot"
+            f" has no such joint{'s' if len(unknown) > 1 else ''}",
+            None,
+            help=" ".join(near)
+            or "correct the name where the node is configured, or describe the joint",
+        )

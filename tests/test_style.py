@@ -139,9 +139,9 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
     "foundation": 1_717,
-    "model": 2_102,
+    "model": 2_105,
     "spec": 4_759,
-    "compiler": 9_183,
+    "compiler": 9_646,
     "tf": 5_377,
     "guard": 4_200,
     "launcher": 3_815,

@@ -12,7 +12,7 @@ from tfcompose.spec.load import load
 HERE = Path(__file__).parent
 FILES = [
     *sorted((HERE / "sound").glob("*.yaml")),
-    *sorted((HERE.parents[1] / "robots").glob("*.yaml")),
+    *sorted((HERE.parents[2] / "robots").glob("*.yaml")),
 ]
 
 

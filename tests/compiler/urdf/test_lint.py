@@ -304,7 +304,10 @@ RATES = 'effort="1" velocity="1"'
 LIMIT = f'<limit {RATES} {{}} {{}}="1"/>'
 #: What is wrong with somebody's URDF, and how severe that is: an error only where a reader refuses
 #: the robot, or takes it for another one.
-JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="a"/>{}</joint>'
+JOINT = (
+    '<joint name="{}" type="{}"><parent link="base_link"/><child link="a"/>'
+    '<axis xyz="0 0 1"/>{}</joint>'
+)
 LEVELS = {
     "hyphens, as every UR has them": (f'<link name="a"/>{JOINT.format("base_link-a_joint", "fixed", "")}', "warning"),  # noqa: E501 (a text as its reader has it)
     "a space": (f'<link name="a"/>{JOINT.format("my joint", "fixed", "")}', "warning"),

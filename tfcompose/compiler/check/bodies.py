@@ -6,12 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 from tfcompose.compiler.check.rule import rule
+from tfcompose.compiler.mesh_box import size_of
+from tfcompose.compiler.urdf.inertia import of_primitive
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.model.robot import Material, Robot
+    from tfcompose.model.robot import Material, Robot, Shape
 
 
 @rule("TF709", of_urdf=True)
@@ -132,6 +134,51 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
         if not robot.is_foreign(at):
             advice += ", or remove inertia: it is computed"
         yield finding("TF711", message, at, help=advice)
+
+
+#: Osmium has 22,600 kg/m³.
+_DENSEST = 25_000.0
+#: With its mass read in grams, such a body is as dense as a hollow one is.
+_DENSE_IN_GRAMS = 100_000.0
+#: A smaller body is a mark on a frame, with a mass because a simulator asks for one.
+_LEAST_BODY_M3 = 1e-5
+
+
+@rule("TF732", of_urdf=True)
+def density_of_no_material(robot: Robot) -> Iterator[Finding]:
+    for link in robot.links.values():
+        inertial = link.inertial
+        volume = max(_most_volume(link.visuals), _most_volume(link.collisions))
+        if inertial is None or not _LEAST_BODY_M3 < volume < math.inf:
+            continue
+        density = inertial.mass / volume
+        if density > _DENSEST:
+            message = (
+                f"{link.name} has {inertial.mass:g} kg in {volume:.3g} m³: {density:.2g} kg/m³,"
+                " and the densest metal has 22600"
+            )
+            grams = f"{inertial.mass / 1000:g}"
+            if not robot.is_foreign(link.at):
+                grams = f"mass: {inertial.mass:g} g"
+            advice = "check its mass, in kg, and the sizes of its shapes, in m"
+            if density > _DENSE_IN_GRAMS:
+                advice = f"if grams are meant, write {grams}; otherwise check its sizes, in m"
+            yield finding("TF732", message, inertial.mass_at or link.at, help=advice)
+
+
+def _most_volume(shapes: tuple[Shape, ...]) -> float:
+    """Return the volume of the shapes in m³, of a mesh that of its box.
+
+    Infinite where that is not known.
+    """
+    volume = 0.0
+    for shape in shapes:
+        if shape.mesh is None:
+            volume += of_primitive(shape).volume
+            continue
+        size = size_of(shape)
+        volume += math.prod(size) if size else math.inf
+    return volume
 
 
 #: Programs that read the description with KDL.

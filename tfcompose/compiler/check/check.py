@@ -24,6 +24,7 @@ from tfcompose.compiler.check import (
     sensors,
     stock,
     tree,
+    wheels,
 )
 from tfcompose.compiler.check.rule import Rule
 from tfcompose.foundation.catalogue import (
@@ -71,6 +72,7 @@ _FAMILIES = (
     placement,
     bodies,
     joints,
+    wheels,
     processes,
 )
 RULES = by_code(

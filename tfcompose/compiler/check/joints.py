@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import re
 from typing import TYPE_CHECKING
 
+from tfcompose.compiler.check.poses import twins
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.geometry import rotate
 from tfcompose.model.robot import BUILT_IN
 
 if TYPE_CHECKING:
@@ -13,7 +17,8 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.catalogue import Severity
     from tfcompose.foundation.findings import Span
-    from tfcompose.model.robot import Joint, Robot
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.robot import Edge, Joint, Robot
 
 
 @rule("TF701", of_urdf=True)
@@ -294,3 +299,110 @@ def negative_damping(robot: Robot) -> Iterator[Finding]:
             if value < 0:
                 message = f"{joint.name}: {name} is {value:g}"
                 yield finding("TF731", message, joint.at, help="give 0 or more, or remove it")
+
+
+@rule("TF736", of_urdf=True)
+def joint_without_axis(robot: Robot) -> Iterator[Finding]:
+    for edge in robot.edges:
+        joint = edge.joint or edge.free
+        if joint is None or joint.axis_at or not robot.is_foreign(joint.at):
+            continue
+        if joint.type != "floating":
+            message = f"{joint.type} joint {joint.name} has no axis, and so turns about x"
+            if joint.type in {"prismatic", "planar"}:
+                what = "moves along" if joint.type == "prismatic" else "lies across"
+                message = f"{joint.type} joint {joint.name} has no axis, and so {what} x"
+            advice = 'write <axis xyz="1 0 0"/> if x is right, else for example "0 0 1"'
+            yield finding("TF736", message, joint.at, help=advice)
+
+
+#: A revolute finger or slide that moves by less, in rad, has its limits in metres.
+_LEAST_REVOLUTE_RAD = 0.12
+#: A slide is no longer, in m, where its limits are a whole part of a turn.
+_SLIDES = re.compile(
+    r"finger|grip|jaw|claw|slid|prismatic|linear|rail|telescop|lift|elevator|extension"
+)
+_ANGLES_RAD = (math.tau, math.pi, math.pi / 2, 3 * math.pi / 2)
+_ROUNDED = 0.002
+
+
+@rule("TF734", of_urdf=True)
+def limits_of_another_type(robot: Robot) -> Iterator[Finding]:
+    for edge in robot.edges:
+        joint = edge.joint
+        if joint is None or joint.limit is None:
+            continue
+        low, high = joint.limit.lower, joint.limit.upper
+        if low is None or high is None or low >= high:
+            continue
+        at, span = joint.limit_at or joint.at, high - low
+        foreign = robot.is_foreign(joint.at)
+        if (
+            joint.type == "revolute"
+            and span < _LEAST_REVOLUTE_RAD
+            and _SLIDES.search(f"{joint.name} {edge.child}".lower())
+        ):
+            message = (
+                f"revolute joint {joint.name} turns by {math.degrees(span):.2g} deg only, from"
+                f" {low:g} to {high:g} rad"
+            )
+            advice = f"if it slides by {span:g} m, write type{'=' if foreign else ': '}"
+            advice += '"prismatic"' if foreign else "prismatic"
+            yield finding("TF734", message, at, help=advice)
+        elif joint.type == "prismatic" and any(
+            abs(abs(end) - part) < _ROUNDED * part for end in (low, high) for part in _ANGLES_RAD
+        ):
+            message = (
+                f"prismatic joint {joint.name} slides from {low:g} to {high:g} m, parts of a turn"
+            )
+            advice = f"if it turns, write type{'=' if foreign else ': '}"
+            advice += '"revolute"' if foreign else "revolute"
+            yield finding("TF734", message, at, help=advice)
+
+
+_FINGER = re.compile(r"finger|grip|jaw|claw|knuckle")
+
+
+@rule("TF735", of_urdf=True)
+def fingers_move_alike(robot: Robot) -> Iterator[Finding]:
+    first: dict[str, Edge] = {}
+    for edge in robot.edges:
+        joint = edge.joint
+        if joint is None or not _FINGER.search(f"{joint.name} {edge.child}".lower()):
+            continue
+        twin = next((first[name] for name in twins(edge.child) if name in first), None)
+        first[edge.child] = edge
+        if twin is None or twin.parent != edge.parent or twin.joint is None:
+            continue
+        here, there = _opening(edge), _opening(twin)
+        if sum(a * b for a, b in zip(here, there, strict=True)) < _ALIKE:
+            continue
+        is_same_place = edge.pose == twin.pose
+        verb = "slide" if joint.type == "prismatic" else "turn"
+        message = f"{twin.child} and {edge.child} both {verb} the same way when they open"
+        if is_same_place:
+            message += ", and from the same place"
+        advice = "change the sign of the axis, or of the multiplier, of one of them"
+        notes = [Note(f"{twin.joint.name} is defined here", twin.joint.at)]
+        yield finding("TF735", message, joint.axis_at or joint.at, help=advice, notes=notes)
+
+
+def _opening(edge: Edge) -> Vector:
+    """Return the direction in the parent in which a finger moves from the pose at zero.
+
+    With its sign by the limits, or by the multiplier of what it mimics.
+    """
+    joint = edge.joint
+    if joint is None:
+        return (0.0, 0.0, 0.0)
+    sign = 1.0
+    if joint.mimic is not None:
+        sign = math.copysign(1.0, joint.multiplier)
+    elif joint.limit and (joint.limit.upper or 0.0) + (joint.limit.lower or 0.0) < 0:
+        sign = -1.0
+    x, y, z = rotate(edge.pose.quat_xyzw, joint.axis)
+    return (sign * x, sign * y, sign * z)
+
+
+#: The cosine of 30 degrees.
+_ALIKE = 0.87

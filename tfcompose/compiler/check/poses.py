@@ -9,6 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from tfcompose.compiler.check.rule import rule
+from tfcompose.compiler.mesh_box import size_of
 from tfcompose.compiler.rays import fixed_to, sphere_around
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.geometry import Pose, norm, rotate
@@ -17,6 +18,7 @@ from tfcompose.model.robot import is_optical
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.foundation.findings import Span
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import Edge, Link, Robot
 
@@ -220,6 +222,7 @@ _TIMES = 3
 
 @rule("TF414", of_urdf=True, follows="pose")
 def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
+    yield from _meshes_in_other_units(robot)
     sizes = {link.name: _sizes(link) for link in robot.links.values()}
     for link in robot.links.values():
         largest = max(sizes[link.name], default=0.0)
@@ -275,6 +278,44 @@ def _sizes(link: Link) -> list[float]:
     return [max(shape.size) for shape in (*link.visuals, *link.collisions) if shape.kind != "mesh"]
 
 
+#: A mesh so much longer than the robot's longest edge is not in metres; a small robot may still
+#: have a mesh of this length.
+_MESH_TIMES, _LARGE_MESH_M = 20, 5.0
+#: Nothing to go by but the mesh: a hall or a field may be this long.
+_LONE_MESH_M = 50.0
+#: No mesh that is scaled down ends up smaller.
+_SMALL_MESH_M = 0.005
+#: Ground planes are thinner than this part of their length.
+_FLAT = 1e-3
+
+
+def _meshes_in_other_units(robot: Robot) -> Iterator[Finding]:
+    reach = max((norm(edge.pose.xyz) for edge in robot.edges if edge.pose_known), default=0.0)
+    limit = max(_LARGE_MESH_M, _MESH_TIMES * reach) if reach else _LONE_MESH_M
+    done: set[Span | None] = set()
+    for link in robot.links.values():
+        for shape in (*link.visuals, *link.collisions):
+            mesh = shape.mesh
+            size = size_of(shape) if mesh else None
+            if mesh is None or size is None or mesh.at in done:
+                continue
+            done.add(mesh.at)
+            largest, scale = max(size), max(map(abs, shape.size))
+            is_small = 0 < largest < _SMALL_MESH_M and scale < 1
+            if not is_small and (largest <= limit or min(size) < _FLAT * largest):
+                continue
+            factor = 1000 if is_small else 0.001
+            unit = "metres" if is_small else "millimetres"
+            right = " ".join(f"{abs(part) * factor:g}" for part in shape.size)
+            advice = f'scale="{right}"'
+            if not robot.is_foreign(mesh.at):
+                advice = f"scale: [{right.replace(' ', ', ')}]"
+            message = f"the mesh of {link.name} is {largest:.3g} m long at its scale of {scale:g}"
+            yield finding(
+                "TF414", message, mesh.at, help=f"if the file is in {unit}, write {advice}"
+            )
+
+
 #: The least and the greatest x, y, z.
 Box = tuple[list[float], list[float]]
 
@@ -284,15 +325,24 @@ CAMERAS = frozenset({"camera", "mono", "stereo", "rgbd", "tof"})
 #: How far from the bodies something still counts as on the robot, in metres: the arm of a mount.
 _REACH_M = 0.2
 
-#: Words in names, the word of the other side, and the axis (0: x, 1: y) on which the two sides
-#: differ (REP-103).
-_SIDES = {
-    "left": ("right", 1),
-    "right": ("left", 1),
-    "front": ("rear", 0),
-    "rear": ("front", 0),
-    "back": ("front", 0),
-}
+#: Words in names of two sides, and the axis (0: x, 1: y) on which these differ; the first of each
+#: pair is on the positive side (REP-103).
+_SIDES = (
+    ("left", "right", 1),
+    ("front", "rear", 0),
+    ("front", "back", 0),
+    ("l", "r", 1),
+    ("fl", "fr", 1),
+    ("rl", "rr", 1),
+    ("bl", "br", 1),
+    ("fl", "rl", 0),
+    ("fr", "rr", 0),
+    ("fl", "bl", 0),
+    ("fr", "br", 0),
+)
+#: These are found at the beginning of longer words, too: leftfinger.
+_LONG_SIDES = ("left", "right")
+_SIDE_WORDS = {word for pair in _SIDES for word in pair[:2]}
 _NEAR_M = 1e-6
 #: Nearer to the middle than this, left and right may well be at one place.
 _MIDDLE_M = 0.01
@@ -325,10 +375,24 @@ def twins(frame: str) -> Iterator[str]:
     """
     words = frame.split("_")
     for index, word in enumerate(words):
-        if word in _SIDES:
-            yield "_".join([*words[:index], _SIDES[word][0], *words[index + 1 :]])
-            if word == "front":
-                yield "_".join([*words[:index], "back", *words[index + 1 :]])
+        side, rest = _side_in(word)
+        for first, second, _ in _SIDES:
+            if side.lower() in {first, second}:
+                other = second if side.lower() == first else first
+                other = other.upper() if side.isupper() else other
+                yield "_".join([*words[:index], other + rest, *words[index + 1 :]])
+
+
+def _side_in(word: str) -> tuple[str, str]:
+    """Return the side that a word of a name begins with, empty if it has none, and the rest."""
+    side = next((side for side in _LONG_SIDES if word.startswith(side)), word)
+    return (side, word[len(side) :]) if side.lower() in _SIDE_WORDS else ("", word)
+
+
+def without_side(frame: str) -> str:
+    """Return the name with a star for each side: left_wheel_link is ``*_wheel_link``."""
+    words = map(_side_in, frame.split("_"))
+    return "_".join(f"{'*' * bool(side)}{rest}" for side, rest in words)
 
 
 def are_swapped(one: Edge, other: Edge) -> bool:
@@ -342,10 +406,11 @@ def are_swapped(one: Edge, other: Edge) -> bool:
 
 def side_of(frame: str, twin: str) -> tuple[int, int]:
     """Return the axis on which frame and twin differ, and the side in its name."""
-    word = next(
-        one for one, other in zip(frame.split("_"), twin.split("_"), strict=True) if one != other
-    )
-    return _SIDES[word][1], 1 if word in {"left", "front"} else -1
+    pairs = zip(frame.split("_"), twin.split("_"), strict=True)
+    here, there = next((_side_in(a)[0], _side_in(b)[0]) for a, b in pairs if a != b)
+    sides = {here.lower(), there.lower()}
+    first, axis = next((pair[0], pair[2]) for pair in _SIDES if sides == {*pair[:2]})
+    return axis, 1 if here.lower() == first else -1
 
 
 def are_mirrored(one: Edge, other: Edge) -> bool:

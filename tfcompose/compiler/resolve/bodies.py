@@ -69,6 +69,9 @@ class Bodies:
         inertial = None
         if body.inertial:
             inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))
+        if inertial and body.inertial:
+            key = "mass" if body.inertial.mass else "density"
+            inertial = replace(inertial, mass_at=self.spec.at((*at, "inertial", key)))
         return visuals, collisions, inertial
 
     def shape(self, shape: specs.ShapeSpec, at: Path) -> Shape:

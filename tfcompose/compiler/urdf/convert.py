@@ -59,6 +59,8 @@ if TYPE_CHECKING:
     #: is wrong with the address, if anything is.
     Finder = Callable[[str, Span, str], tuple[Asset, Finding | None]]
 
+_MOST_OF_A_BYTE = 255
+
 #: The elements that become links and joints; all others below <robot> are kept verbatim.
 _CONVERTED = frozenset({"link", "joint", "material"})
 
@@ -247,15 +249,18 @@ def _edge(element: Element, values: AttributeReader) -> Edge | None:
 
 
 def _joint(name: str, kind: Any, element: Element, values: AttributeReader) -> Joint:
-    x, y, z = values.numbers(element.first("axis"), "xyz", (1.0, 0.0, 0.0))
+    axis_element, bounds = element.first("axis"), element.first("limit")
+    x, y, z = values.numbers(axis_element, "xyz", (1.0, 0.0, 0.0))
     length = norm((x, y, z))
     if not 0 < length < math.inf:
-        at = (element.first("axis") or element).at_value("xyz")
+        at = (axis_element or element).at_value("xyz")
         values.refuse(f"the axis of {name} has no direction", at, '<axis xyz="0 0 1"/>')
         x, y, z, length = 1.0, 0.0, 0.0, 1.0
     axis: Vector = (x / length, y / length, z / length)
     mimic = element.first("mimic")
     joint = Joint(name, kind, axis, at=element.at_value("name"), axis_length=length)
+    if axis_element is not None and "xyz" in axis_element.attributes:
+        joint = replace(joint, axis_at=axis_element.at_value("xyz"))
     if mimic is not None:
         master = values.text(mimic, "joint", '<mimic joint="…"/>')
         multiplier, offset = (
@@ -265,7 +270,8 @@ def _joint(name: str, kind: Any, element: Element, values: AttributeReader) -> J
         joint = replace(joint, mimic=master or None, multiplier=multiplier, offset=offset)
     return replace(
         joint,
-        limit=_limit(name, element.first("limit"), values),
+        limit=_limit(name, bounds, values),
+        limit_at=bounds.at if bounds is not None else None,
         dynamics=_numbers(Dynamics, element.first("dynamics"), values),
         safety=_safety(name, element.first("safety_controller"), values),
         reference=_numbers(ReferencePositions, element.first("calibration"), values),
@@ -413,6 +419,8 @@ class _Bodies:
         if colour is None and texture is None:
             return None
         red, green, blue, opacity = self.values.numbers(colour, "rgba", (0.5, 0.5, 0.5, 1.0))
+        if colour is not None:
+            self._check_range(colour, (red, green, blue, opacity))
         file = texture.attributes.get("filename") if texture is not None else None
         image = (
             self._asset(file, texture.at_value("filename"))
@@ -421,6 +429,19 @@ class _Bodies:
         )
         rgba = (red, green, blue, opacity) if colour is not None else None
         return Material(name or colour_name(rgba or ()), rgba, image, material.at)
+
+    def _check_range(self, colour: Element, rgba: tuple[float, ...]) -> None:
+        if all(0 <= part <= 1 for part in rgba):
+            return
+        advice = "red, green, blue and opacity are numbers from 0 to 1"
+        if min(rgba) >= 0 and max(rgba) <= _MOST_OF_A_BYTE:
+            parts = [*(part / _MOST_OF_A_BYTE for part in rgba[:3]), min(rgba[3], 1.0)]
+            listed = " ".join(f"{part:.3g}" for part in parts)
+            advice = f'they are from 0 to 1, not to 255: rgba="{listed}"'
+        text = colour.attributes["rgba"]
+        self.values.refuse(
+            f"rgba={text!r} is out of range", colour.at_value("rgba"), advice, "warning"
+        )
 
     def _inertial(
         self,
@@ -448,5 +469,10 @@ class _Bodies:
         xx, xy, xz, yy, yz, zz = (self.values.number(tensor, key, 0.0) for key in MOMENTS)
         of_shapes = traces(mass, visuals, collisions)
         return Inertial(
-            mass, self.values.pose(element), (xx, xy, xz, yy, yz, zz), of_shapes, tensor.at
+            mass,
+            self.values.pose(element),
+            (xx, xy, xz, yy, yz, zz),
+            of_shapes,
+            at=tensor.at,
+            mass_at=weight.at_value("value"),
         )

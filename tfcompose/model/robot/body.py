@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -83,7 +83,8 @@ class Inertial:
     The tensor is (xx, xy, xz, yy, yz, zz).
 
     ``of_shapes`` holds, where the tensor was given, the traces of those that the visual and the
-    collision shapes would have at one density. The trace is the same in all axes.
+    collision shapes would have at one density. The trace is the same in all axes. ``mass_at`` is
+    the place of the mass, or of the density that it follows from.
     """
 
     mass: float
@@ -91,6 +92,7 @@ class Inertial:
     tensor: tuple[float, float, float, float, float, float]
     of_shapes: tuple[float, ...] = ()
     at: Span | None = None
+    mass_at: Span | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,14 +86,17 @@ class Joint(PlanJoint):
 
     The axis of a planar one is the plane's normal.
 
-    ``axis_length`` is that of the axis as it was written, ``mimic_at`` the place of the joint that
-    it follows.
+    ``axis_length`` is that of the axis as it was written, ``axis_at`` its place, None where it is
+    the default, ``limit_at`` the place of the limits, and ``mimic_at`` that of the joint that it
+    follows.
     """
 
     at: Span = field(kw_only=True)
     mimic_at: Span | None = field(default=None, kw_only=True)
     limit: Limit | None = field(default=None, kw_only=True)
+    limit_at: Span | None = field(default=None, compare=False, kw_only=True)
     axis_length: float = field(default=1.0, kw_only=True)
+    axis_at: Span | None = field(default=None, compare=False, kw_only=True)
     dynamics: Dynamics | None = field(default=None, kw_only=True)
     safety: SafetyController | None = field(default=None, kw_only=True)
     reference: ReferencePositions | None = field(default=None, kw_only=True)

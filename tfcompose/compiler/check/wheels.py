@@ -1,0 +1,215 @@
+"""Rules about wheels: their axes, the ground that they stand on, and what turns with them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from typing import TYPE_CHECKING
+
+from tfcompose.compiler.check.poses import placed, without_side
+from tfcompose.compiler.check.rule import rule
+from tfcompose.foundation.findings import Finding, Note, finding
+from tfcompose.foundation.geometry import Pose, norm, rotate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from tfcompose.foundation.findings import Span
+    from tfcompose.foundation.geometry import Vector
+    from tfcompose.model.robot import Edge, Link, MountedSensor, Robot, Shape
+
+_WHEEL = re.compile(r"wheel|tyre|(?<![a-z])tire")
+#: What turns about an upright axis, and may carry a wheel that lies across it.
+_SWIVEL = re.compile(r"caster|castor|swivel|steer|pivot|fork")
+#: The cosine of 10 degrees: axes nearer to each other are parallel.
+_PARALLEL = math.cos(math.radians(10))
+_Z = (0.0, 0.0, 1.0)
+#: Kinds of sensors that measure how a wheel turns.
+_ODOMETRY_KINDS = frozenset({"imu"})
+#: A sensor this far below the ground may be a rounding of the radius.
+_UNDER_M = 0.01
+
+
+def is_wheel(robot: Robot, edge: Edge) -> bool:
+    """Return whether the edge turns a wheel: by its name, or by a flat cylinder around it."""
+    if edge.joint is None or edge.joint.type != "continuous":
+        return False
+    names = f"{edge.child} {edge.joint.name}".lower()
+    if _SWIVEL.search(names) and not _WHEEL.search(names):
+        return False
+    return _WHEEL.search(names) is not None or _disc(robot.links.get(edge.child)) is not None
+
+
+def _cylinder(link: Link | None) -> Shape | None:
+    """Return the cylinder that is the link's only shape, as seen or for collision."""
+    for shapes in (link.visuals, link.collisions) if link else ():
+        if len(shapes) == 1 and shapes[0].kind == "cylinder":
+            return shapes[0]
+    return None
+
+
+def _disc(link: Link | None) -> Shape | None:
+    """Return the link's only cylinder, if it is flat and turns about its middle."""
+    shape = _cylinder(link)
+    if shape is None:
+        return None
+    radius, length = shape.size
+    return shape if length < 2 * radius and norm(shape.pose.xyz) < radius / 2 else None
+
+
+def _are_parallel(a: Vector, b: Vector) -> bool:
+    return abs(sum(x * y for x, y in zip(a, b, strict=True))) > _PARALLEL
+
+
+def _listed(axis: Sequence[float]) -> str:
+    return f"[{', '.join(f'{part:.3g}' for part in (round(part, 6) + 0.0 for part in axis))}]"
+
+
+@rule("TF733", of_urdf=True)
+def wheel_axis(robot: Robot) -> Iterator[Finding]:
+    wheels = [edge for edge in robot.edges if is_wheel(robot, edge)]
+    odd = _odd_axes(robot, wheels)
+    for edge in wheels:
+        joint, shape = edge.joint, _cylinder(robot.links.get(edge.child))
+        if joint is None or (joint.axis_at is None and robot.is_foreign(joint.at)):
+            continue  # that the axis is missing is a finding already
+        axis, at = _listed(joint.axis), joint.axis_at or joint.at
+        if edge.child in odd:
+            sibling, right = odd[edge.child]
+            message = f"{edge.child} turns about {axis}, across the axis of {sibling.child}"
+            notes = [Note(f"{sibling.child} is mounted here", sibling.at)]
+            advice = f"write {_axis(robot, edge, right)}"
+            yield finding("TF733", message, at, help=advice, notes=notes)
+        elif shape and not _SWIVEL.search(f"{edge.child} {joint.name}".lower()):
+            along = rotate(shape.pose.quat_xyzw, _Z)
+            if not _are_parallel(along, joint.axis):
+                yield _lying(robot, edge, shape, along)
+
+
+def _lying(robot: Robot, edge: Edge, shape: Shape, along: Vector) -> Finding:
+    """Return the finding that a wheel's cylinder lies across its axis.
+
+    It is about the cylinder if that lies as it was made, and else about the axis.
+    """
+    joint, link = edge.joint, robot.links[edge.child]
+    axis = joint.axis if joint else along
+    here, there = joint.axis_at or joint.at if joint else edge.at, link.at
+    message = f"{edge.child} turns about {_listed(axis)}; its cylinder lies along {_listed(along)}"
+    key = _axis(robot, edge, along)
+    advice, what = f"write {key}, or turn the cylinder", f"{edge.child} is defined here"
+    if shape.pose.quat_xyzw == Pose().quat_xyzw:
+        here, there, what = there, here, "it turns here"
+        advice = f"a cylinder is made along z: turn it by {_quarter(robot, edge, axis)} beside it"
+        advice += f", or write {key}"
+    return finding("TF733", message, here, help=advice, notes=[Note(what, there)])
+
+
+def _quarter(robot: Robot, edge: Edge, axis: Vector) -> str:
+    """Return what to write for a quarter turn that lays z along x or y."""
+    index = 0 if abs(axis[1]) > abs(axis[0]) else 1
+    angles = ["0", "0", "0"]
+    if robot.is_foreign(edge.at):
+        angles[index] = f"{math.pi / 2:.17g}"
+        return f'<origin rpy="{" ".join(angles)}"/>'
+    angles[index] = "90 deg"
+    return f"rpy: [{', '.join(angles)}]"
+
+
+def _axis(robot: Robot, edge: Edge, axis: Vector) -> str:
+    listed = _listed(axis)
+    if edge.joint and robot.is_foreign(edge.joint.at):
+        return f'<axis xyz="{listed[1:-1].replace(",", "")}"/>'
+    return f"axis: {listed}"
+
+
+def _odd_axes(robot: Robot, wheels: list[Edge]) -> dict[str, tuple[Edge, Vector]]:
+    """Return the wheels whose axis is unlike their siblings', with one of these and its axis.
+
+    Siblings differ only in the side in their names. Of two wheels the odd one is that whose axis
+    does not lead to the other. The axis is in the odd wheel's frame.
+    """
+    poses = placed(robot, moving=True)
+    groups: dict[str, list[Edge]] = {}
+    for edge in wheels:
+        if edge.joint and edge.child in poses and _WHEEL.search(edge.child.lower()):
+            groups.setdefault(without_side(edge.child), []).append(edge)
+    odd = {}
+    for group in groups.values():
+        axes = [
+            rotate(poses[edge.child].quat_xyzw, edge.joint.axis) for edge in group if edge.joint
+        ]
+        for index, edge in enumerate(group):
+            others = axes[:index] + axes[index + 1 :]
+            if len(others) == 1:
+                ends = (poses[other.child].xyz for other in group)
+                between = [a - b for a, b in zip(*ends, strict=True)]
+                length = norm(tuple(between))
+                others += [tuple(part / length for part in between)] if length else []
+            alike = all(_are_parallel(a, b) for a, b in itertools.combinations(others, 2))
+            if len(others) > 1 and alike and not _are_parallel(axes[index], others[0]):
+                back = poses[edge.child].inverse().quat_xyzw
+                odd[edge.child] = (group[index - 1], rotate(back, others[0]))
+    return odd
+
+
+@rule("TF626", follows="pose")
+def sensor_below_ground(robot: Robot) -> Iterator[Finding]:
+    poses = placed(robot, moving=True)
+    bottoms = {
+        edge.child: bottom
+        for edge in robot.edges
+        if edge.child in poses and is_wheel(robot, edge)
+        if (bottom := _bottom(robot.links.get(edge.child), poses[edge.child])) is not None
+    }
+    if not bottoms:
+        return
+    wheel = min(bottoms, key=lambda name: bottoms[name])
+    for sensor in robot.sensors:
+        edge = robot.parent_edge(sensor.mount)
+        if edge is None or sensor.mount not in poses:
+            continue
+        below = bottoms[wheel] - poses[sensor.mount].xyz[2]
+        if below > _UNDER_M:
+            message = f"{sensor.name} is {below:.3g} m below the ground under {wheel}"
+            advice = "z is positive upwards: check its sign and unit, and those of its parent"
+            notes = [Note(f"{wheel} is defined here", robot.links[wheel].at)]
+            yield finding(
+                "TF626", message, _height_at(robot, sensor, edge), help=advice, notes=notes
+            )
+
+
+def _height_at(robot: Robot, sensor: MountedSensor, edge: Edge) -> Span:
+    """Return the place of the z of a sensor's mount."""
+    places = (
+        value.place(2)
+        for value in robot.source_numbers
+        if (value.path[0], *value.path[2:]) == ("sensors", "xyz") and value.name == sensor.name
+    )
+    return next(places, edge.at)
+
+
+def _bottom(link: Link | None, pose: Pose) -> float | None:
+    """Return the least z of a wheel at a pose, None where it has no round shape."""
+    heights = []
+    for shape in (*link.visuals, *link.collisions) if link else ():
+        here = pose @ shape.pose
+        if shape.kind in {"cylinder", "sphere"}:
+            upright = rotate(here.quat_xyzw, _Z)[2] if shape.kind == "cylinder" else 0.0
+            half = shape.size[1] / 2 * abs(upright) if shape.kind == "cylinder" else 0.0
+            heights.append(here.xyz[2] - shape.size[0] * math.sqrt(1 - min(1, upright**2)) - half)
+    return min(heights, default=None)
+
+
+@rule("TF627")
+def sensor_on_wheel(robot: Robot) -> Iterator[Finding]:
+    wheels = {edge.child: edge for edge in robot.edges if is_wheel(robot, edge)}
+    turned = {frame: edge for edge in wheels.values() for frame in robot.below(edge.child)}
+    for sensor in robot.sensors:
+        wheel = turned.get(sensor.mount)
+        edge = robot.parent_edge(sensor.mount)
+        if wheel and edge and wheel.joint and sensor.kind not in _ODOMETRY_KINDS:
+            message = f"{sensor.name} turns with {wheel.child}, about {_listed(wheel.joint.axis)}"
+            advice = f"mount it on {wheel.parent}, which does not turn"
+            notes = [Note(f"{wheel.joint.name} is defined here", wheel.joint.at)]
+            yield finding("TF627", message, edge.at, help=advice, notes=notes)

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.support import processes
-from tests.support.domains import Domain, reserved_domain
+from tests.support.domains import Domain, entered_domain, reserved_domain
 from tests.support.processes import Started
 from tests.support.skips import ACCEPTED, unexpected
 from tests.support.waiting import TIMEOUT_S, until
@@ -146,21 +146,10 @@ def _fastdds_profile(request: pytest.FixtureRequest) -> None:
 
 
 @pytest.fixture
-def domain(
-    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Domain]:
-    """A domain of the test's own, on the loopback interface, in this process's environment too.
-
-    Runs and logs are kept in folders of the test's own.
-    """
-    for name in ("XDG_RUNTIME_DIR", "ROS_LOG_DIR"):
-        folder = tmp_path_factory.mktemp(name)
-        folder.chmod(0o700)
-        monkeypatch.setenv(name, str(folder))
-    with reserved_domain() as number:
-        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        yield Domain(number, dict(os.environ))
+def domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Domain]:
+    """A domain of the test's own, with runs and logs in folders of the test's own."""
+    with entered_domain(tmp_path_factory.mktemp("domain")) as entered:
+        yield entered
 
 
 @pytest.fixture

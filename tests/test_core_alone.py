@@ -5,11 +5,15 @@ It does all of its work, and says what installs what is absent.
 
 from __future__ import annotations
 
-import json
+import os
+import re
+import sys
 from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tests.support.core import copy_core, run_with
 from tests.support.house import ROOT
 from tests.support.names import FILE, names
@@ -33,24 +37,35 @@ def test_its_names_are_those_of_the_core_and_of_the_tools() -> None:
     assert FILE.read_text("utf-8") == names(), "python -m tests.support.names --write"
 
 
-@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.stem)
-def test_it_lints_builds_rehearses_and_explains_the_example_robots(
-    robot: Path, core: Path, tmp_path: Path
-) -> None:
-    linted = run_with(core, tmp_path, "lint", robot)
-    assert (linted.returncode, linted.stderr) == (0, ""), linted.stdout
-    built = run_with(core, tmp_path, "build", robot, "-o", tmp_path / "alone")
-    assert (built.returncode, built.stderr) == (0, "")
-    with_tools = run_with(ROOT, tmp_path, "build", robot, "-o", tmp_path / "whole")
-    assert with_tools.returncode == 0
-    for file in (tmp_path / "alone").rglob("*"):
-        same = tmp_path / "whole" / file.relative_to(tmp_path / "alone")
-        assert file.is_dir() or file.read_bytes() == same.read_bytes(), file
-    plan = json.loads((tmp_path / "alone/plan.json").read_text())
-    edge = plan["edges"][0]
-    explained = run_with(core, tmp_path, "explain", robot, edge["parent"], edge["child"])
-    assert explained.returncode == 0, explained.stderr
-    assert explained.stdout.startswith(f"pose of {edge['child']} in {edge['parent']}")
+#: Lints, builds and explains each robot in one process without tools.
+WORK = """
+import json, sys
+from pathlib import Path
+from tfcompose.cli import main
+for robot in sys.argv[1:]:
+    assert main(["lint", robot]) == 0
+    out = Path(Path(robot).stem)
+    assert main(["build", robot, "-o", str(out)]) == 0
+    edge = json.loads((out / "plan.json").read_text())["edges"][0]
+    print("explains:", edge["child"], "in", edge["parent"])
+    assert main(["explain", robot, edge["parent"], edge["child"]]) == 0
+"""
+
+
+def test_it_lints_builds_and_explains_the_example_robots(core: Path, tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(core)}
+    command = [sys.executable, "-c", WORK, *map(str, ROBOTS)]
+    done = processes.run(command, cwd=tmp_path, env=environment)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    explained = re.findall(r"^explains: (.*)\npose of (.*?)[,:\n]", done.stdout, re.MULTILINE)
+    assert len(explained) == len(ROBOTS)
+    assert all(pose.startswith(edge) for edge, pose in explained), explained
+    for robot in ROBOTS:
+        whole = tmp_path / "whole" / robot.stem
+        assert tfcompose_in(tmp_path, "build", robot, "-o", whole).returncode == 0
+        for file in (tmp_path / robot.stem).rglob("*"):
+            same = whole / file.relative_to(tmp_path / robot.stem)
+            assert file.is_dir() or file.read_bytes() == same.read_bytes(), file
 
 
 def test_help_topics_and_codes_are_those_of_the_core(core: Path, tmp_path: Path) -> None:

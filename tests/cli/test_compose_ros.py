@@ -17,6 +17,8 @@ import psutil
 import pytest
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
+from tests.support.domains import entered_domain
 from tests.support.edge_listener import EdgeListener
 from tests.support.robots import EXTERNAL, ROVER
 from tests.support.waiting import gone, until
@@ -27,23 +29,26 @@ pytestmark = pytest.mark.ros
 LATE = {"TF804", "TF805"}
 
 
-@pytest.fixture
-def tfc(
-    domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., Any]]:
-    """Run a command to its end, in a folder and with a runtime folder of the test's own."""
-    assert domain
-    (tmp_path / "runtime").mkdir(mode=0o700)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
-    (tmp_path / "robot.yaml").write_text(ROVER, encoding="utf-8")
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end.
 
-    def run(*words: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "tfcompose", *words]
-        return processes.run(command)
+    A launcher is the child of a process of its own; commands that talk to one run in this process.
+    """
+    if words[0] != "up":
+        return tfcompose_in(Path.cwd(), *words)
+    return processes.run([sys.executable, "-m", "tfcompose", *words])
 
-    yield run
+
+def enter(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in a folder that has its own runtime folder."""
+    (folder / "runtime").mkdir(mode=0o700)
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder / "runtime"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(folder / "log"))
+
+
+def kill_all() -> None:
+    """Kill the robots of this runtime folder."""
     left: list[psutil.Process] = []
     for robot in json.loads(run("ps", "--format", "json").stdout or "[]"):
         with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
@@ -51,6 +56,37 @@ def tfc(
             left += [launcher, *launcher.children(recursive=True)]
             launcher.kill()
     assert until(lambda: all(map(gone, left)))
+
+
+@pytest.fixture
+def tfc(
+    domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Any]]:
+    """Run commands in a folder of the test's own."""
+    assert domain
+    enter(tmp_path, monkeypatch)
+    (tmp_path / "robot.yaml").write_text(ROVER, encoding="utf-8")
+    yield run
+    kill_all()
+
+
+#: Waits for another process.
+LATE_PROCESS = "  late: {run: [sleep, '1000'], after: {drive: ready}}\n"
+
+
+@pytest.fixture(scope="module")
+def background(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder of a robot that runs in the background; the last of its tests ends it."""
+    folder = tmp_path_factory.mktemp("background")
+    with entered_domain(folder), pytest.MonkeyPatch.context() as patch:
+        enter(folder, patch)
+        (folder / "robot.yaml").write_text(ROVER + LATE_PROCESS, encoding="utf-8")
+        up = run("up", "--wait")
+        assert up.returncode == 0, up.stdout + up.stderr
+        assert "tree complete: 2 edges" in up.stdout
+        assert "all ready after" in up.stdout
+        yield folder
+        kill_all()
 
 
 def launcher_of(folder: Path) -> int:
@@ -61,28 +97,6 @@ def launcher_of(folder: Path) -> int:
 def ps(tfc: Callable[..., Any]) -> dict[str, dict[str, Any]]:
     (robot,) = json.loads(tfc("ps", "--format", "json").stdout)
     return {process["name"]: process for process in robot["processes"]}
-
-
-def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_and_goes_down(
-    tfc: Callable[..., Any],
-) -> None:
-    up = tfc("up", "--wait")
-    assert up.returncode == 0, up.stdout + up.stderr
-    assert "tree complete: 2 edges" in up.stdout
-    assert "all ready after" in up.stdout
-    processes = ps(tfc)
-    for process in processes.values():
-        assert (process["state"], process["ready"], process["restarts"]) == ("running", True, 0)
-        assert psutil.pid_exists(process["pid"])
-        assert process["memory"] > 1e6
-    edges = [(1, 1), (1, 1), (0, 0)]
-    assert until(lambda: [(one["live"], one["edges"]) for one in ps(tfc).values()] == edges)
-    pids = [process["pid"] for process in processes.values()]
-    down = tfc("down")
-    assert (down.returncode, down.stdout.split("@")[0]) == (0, "rover")
-    assert until(lambda: all(map(gone, pids)))
-    assert tfc("ps", "--fail-on", "absent").returncode == 1
-    assert "ended" in tfc("logs", "tfcompose", "-n", "1").stdout
 
 
 def test_what_is_missing_when_the_time_is_over_is_reported_with_1_and_the_robot_goes_on(
@@ -135,23 +149,6 @@ def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobod
     assert " drive?" in tfc("restart", "driv").stderr
 
 
-def test_what_waits_for_a_stopped_process_is_reported_to_wait_by_ps_and_by_who_starts_it(
-    tfc: Callable[..., Any], tmp_path: Path
-) -> None:
-    late = "  late: {run: [sleep, '1000'], after: {drive: ready}}\n"
-    (tmp_path / "robot.yaml").write_text(ROVER + late)
-    assert tfc("up", "--wait").returncode == 0
-    assert tfc("restart", "late").stdout == "late: restarting\n"
-    assert tfc("stop", "drive").returncode == 0
-    assert until(lambda: ps(tfc)["drive"]["state"] == "stopped")
-    waits = "waits for drive"
-    assert waits in tfc("restart", "late").stdout
-    assert until(lambda: re.search(f"  late +{waits}", tfc("ps").stdout)), tfc("ps").stdout
-    assert f"late ({waits}" in tfc("wait", "--ready", "--timeout", "0.1").stderr
-    assert tfc("down").returncode == 0
-    assert "\ntfcompose | ended\n" in tfc("logs").stdout
-
-
 def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_keep(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -199,37 +196,6 @@ sys.exit(main(["up", "-d"]))
     assert "ZeroDivisionError: of a launcher" in error_file.read_text()
 
 
-def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
-    tfc: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert tfc("up", "--wait").returncode == 0
-    with monkeypatch.context() as elsewhere:
-        (tmp_path / "other").mkdir(mode=0o700)
-        elsewhere.setenv("XDG_RUNTIME_DIR", str(tmp_path / "other"))
-        second = tfc("up", "--for", "3")
-        assert (second.returncode, second.stdout) == (1, "")
-        assert (
-            f" pid {launcher_of(tmp_path)}, with XDG_RUNTIME_DIR={tmp_path}/runtime"
-            in second.stderr
-        )
-        down = tfc("down", "--leftovers")
-        assert (down.returncode, down.stdout.split()[0]) == (0, "0")
-    assert {process["state"] for process in ps(tfc).values()} == {"running"}
-
-
-def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the_way(
-    tfc: Callable[..., Any],
-) -> None:
-    assert tfc("up", "--wait").returncode == 0
-    (robot,) = json.loads(tfc("ps", "--format", "json").stdout)
-    below = psutil.Process(robot["launcher"]).children(recursive=True)
-    os.kill(robot["launcher"], signal.SIGKILL)
-    assert until(lambda: all(map(gone, below)))
-    assert tfc("ps", "--fail-on", "absent").returncode == 1
-    assert "was killed" in tfc("logs").stdout or "tree complete" in tfc("logs").stdout
-    assert tfc("up", "--wait").returncode == 0
-
-
 def test_events_are_reported_from_the_start_and_wait_returns_the_exit_code(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -256,32 +222,25 @@ def test_events_are_reported_from_the_start_and_wait_returns_the_exit_code(
     )
 
 
-def test_who_follows_ends_when_nobody_reads_it_any_more(tfc: Callable[..., Any]) -> None:
-    """``tfcompose logs -f | grep -m1 complete``: nothing more may ever be written."""
-    assert tfc("up", "--wait").returncode == 0
-    with processes.start(
-        [sys.executable, "-m", "tfcompose", "logs", "-f"], stdout=subprocess.PIPE
-    ) as follower:
-        assert follower.stdout
-        while "all ready after" not in follower.stdout.readline():
-            pass
-        follower.stdout.close()
-        assert follower.wait(20) == 141
-
-
-def test_events_of_a_launcher_that_is_killed_do_not_end_like_those_of_one_that_ends(
+def test_a_killed_launcher_ends_events_with_1_leaves_no_process_and_is_not_in_the_way(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
-    assert tfc("up", "-d").returncode == 0
+    assert tfc("up", "--wait").returncode == 0
     command = [sys.executable, "-m", "tfcompose", "events"]
     with processes.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as follower:
         assert follower.stdout
         assert "started guard" in follower.stdout.readline()
-        os.kill(launcher_of(tmp_path), signal.SIGKILL)
+        launcher = launcher_of(tmp_path)
+        below = psutil.Process(launcher).children(recursive=True)
+        os.kill(launcher, signal.SIGKILL)
         _, error_file = follower.communicate(timeout=20)
     assert follower.returncode == 1
     assert error_file.startswith("tfcompose: rover@")
     assert error_file.endswith(" was killed\n")
+    assert until(lambda: all(map(gone, below)))
+    assert tfc("ps", "--fail-on", "absent").returncode == 1
+    assert "was killed" in tfc("logs").stdout or "tree complete" in tfc("logs").stdout
+    assert tfc("up", "--wait").returncode == 0
 
 
 def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
@@ -327,20 +286,93 @@ def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(
     assert until(lambda: tfc("ps", "--robot", "rover", "--fail-on", "absent").returncode == 0)
 
 
-def test_verify_and_doctor_take_the_plan_of_the_robot_that_runs_here(
-    tfc: Callable[..., Any], tmp_path: Path
+#: In this order, with one robot.
+of_one_robot = pytest.mark.xdist_group("one robot in the background")
+
+
+@of_one_robot
+@pytest.mark.usefixtures("background")
+def test_a_robot_in_the_background_is_listed_with_states_memory_and_edges() -> None:
+    listed = ps(run)
+    for process in listed.values():
+        assert (process["state"], process["ready"], process["restarts"]) == ("running", True, 0)
+        assert psutil.pid_exists(process["pid"])
+        assert process["memory"] > 1e5
+    edges = [(1, 1), (1, 1), (0, 0), (0, 0)]
+    assert until(lambda: [(one["live"], one["edges"]) for one in ps(run).values()] == edges)
+
+
+@of_one_robot
+def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
+    background: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert tfc("up", "--wait").returncode == 0
-    (tmp_path / "robot.yaml").unlink()
-    verified = tfc("verify", "--for", "2")
+    with monkeypatch.context() as elsewhere:
+        tmp_path.chmod(0o700)
+        elsewhere.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+        second = run("up", "--for", "3")
+        assert (second.returncode, second.stdout) == (1, "")
+        assert (
+            f" pid {launcher_of(background)}, with XDG_RUNTIME_DIR={background}/runtime"
+            in second.stderr
+        )
+        down = run("down", "--leftovers")
+        assert (down.returncode, down.stdout.split()[0]) == (0, "0")
+    assert {process["state"] for process in ps(run).values()} == {"running"}
+
+
+@of_one_robot
+@pytest.mark.usefixtures("background")
+def test_who_follows_ends_when_nobody_reads_it_any_more() -> None:
+    """``tfcompose logs -f | grep -m1 complete``: nothing more may ever be written."""
+    with processes.start(
+        [sys.executable, "-m", "tfcompose", "logs", "-f"], stdout=subprocess.PIPE
+    ) as follower:
+        assert follower.stdout
+        while "all ready after" not in follower.stdout.readline():
+            pass
+        follower.stdout.close()
+        assert follower.wait(20) == 141
+
+
+@of_one_robot
+@pytest.mark.usefixtures("background")
+def test_what_waits_for_a_stopped_process_is_reported_to_wait_by_ps_and_by_who_starts_it() -> None:
+    assert run("restart", "late").stdout == "late: restarting\n"
+    assert run("stop", "drive").returncode == 0
+    assert until(lambda: ps(run)["drive"]["state"] == "stopped")
+    waits = "waits for drive"
+    assert waits in run("restart", "late").stdout
+    assert until(lambda: re.search(f"  late +{waits}", run("ps").stdout)), run("ps").stdout
+    assert f"late ({waits}" in run("wait", "--ready", "--timeout", "0.1").stderr
+    assert run("start", "drive").returncode == 0
+    assert run("wait", "--ready", "--timeout", "60").returncode == 0
+
+
+@of_one_robot
+@pytest.mark.usefixtures("background")
+def test_verify_and_doctor_take_the_plan_of_the_robot_that_runs_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # without a robot file
+    verified = run("verify", "--for", "2")
     assert (verified.returncode, verified.stdout.count("2 of 2")) == (0, 1), (
         verified.stdout + verified.stderr
     )
     assert "rover@" in verified.stderr
-    drive = next(
-        name for name, process in ps(tfc).items() if process["edges"] and name != "static"
-    )
-    assert tfc("stop", drive).returncode == 0
-    examined = tfc("doctor", "--for", "3")
+    assert run("stop", "drive").returncode == 0
+    examined = run("doctor", "--for", "3")
     assert "rover@" in examined.stderr
-    assert (examined.returncode, drive in examined.stdout) == (1, True), examined.stdout
+    assert (examined.returncode, "drive" in examined.stdout) == (1, True), examined.stdout
+
+
+@of_one_robot
+@pytest.mark.usefixtures("background")
+def test_down_ends_every_process_also_one_that_waits() -> None:
+    assert run("stop", "drive").returncode in (0, 1)
+    assert run("restart", "late").returncode in (0, 1)
+    pids = [process["pid"] for process in ps(run).values() if process["pid"]]
+    down = run("down")
+    assert (down.returncode, down.stdout.split("@")[0]) == (0, "rover")
+    assert until(lambda: all(map(gone, pids)))
+    assert run("ps", "--fail-on", "absent").returncode == 1
+    assert "\ntfcompose | ended\n" in run("logs").stdout

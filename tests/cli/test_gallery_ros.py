@@ -28,7 +28,7 @@ def test_a_demo_runs_without_hardware(
             "-o",
             tmp_path,
             "--for",
-            7,
+            4,
         )
         code = up.process.wait(2 * TIMEOUT_S)
         up.close()

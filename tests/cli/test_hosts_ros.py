@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tests.support.processes import Started
 from tests.support.robots import ON_TWO_HOSTS
 from tests.support.waiting import offences, until
@@ -16,9 +17,7 @@ pytestmark = pytest.mark.ros
 
 
 def ps() -> dict[str, dict[str, str]]:
-    words = [sys.executable, "-m", "tfcompose", "ps", "--format", "json"]
-    shown = processes.run(words).stdout
-    robots = json.loads(shown or "[]")
+    robots = json.loads(tfcompose_in(Path.cwd(), "ps", "--format", "json").stdout or "[]")
     return {
         robot["name"].partition("@")[0]: {one["name"]: one["state"] for one in robot["processes"]}
         for robot in robots

@@ -5,6 +5,7 @@ It is drawn, left, and put back.
 
 from __future__ import annotations
 
+import os
 import signal
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ import pytest
 
 from tests.support.shell import PROMPT, Shell
 from tests.support.waiting import gone, until
+from tfcompose.cli.live_run import can_show_live
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -86,7 +88,7 @@ def test_ctrl_z_leaves_the_view_and_not_the_robot_and_fg_shows_it_again(shell: S
     assert until(lambda: gone(launcher))
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGQUIT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGQUIT, signal.SIGKILL])
 def test_whatever_ends_the_view_ends_the_robot(shell: Shell, number: signal.Signals) -> None:
     shell.up()
     shell.shows("all well")
@@ -115,22 +117,47 @@ def test_a_process_that_fails_ends_it_and_the_reason_stays_on_the_terminal(
     shell.shows("exit code 1")
 
 
+class Terminal:
+    """A stream of a terminal."""
+
+    @staticmethod
+    def isatty() -> bool:
+        return True
+
+    @staticmethod
+    def fileno() -> int:
+        return 0
+
+
 @pytest.mark.parametrize(
-    ("environment", "words"),
-    [({"TERM": "dumb"}, ()), ({"CI": "true"}, ()), ({}, ("--no-live",)), ({}, ("| cat",))],
+    ("environment", "group", "shows"),
+    [
+        ({}, os.getpgrp(), True),
+        ({"TERM": "dumb"}, os.getpgrp(), False),
+        ({"CI": "true"}, os.getpgrp(), False),
+        ({}, 1, False),
+    ],
+    ids=["a terminal", "a dumb one", "CI", "in the background"],
 )
-def test_elsewhere_it_prints_lines(
-    domain: object, tmp_path: Path, environment: dict[str, str], words: tuple[str, ...]
+def test_a_view_needs_a_terminal_that_redraws(
+    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], group: int, *, shows: bool
 ) -> None:
-    assert domain
-    (tmp_path / "robot.yaml").write_text(ROBOT)
-    shell = Shell(tmp_path, **environment)
-    try:
-        shell.up("--for 1", *words)
-        shell.shows("tree complete", "tfcompose | ended")
-        assert OTHER_SCREEN not in shell.text
-    finally:
-        shell.close()
+    for name, value in ({"TERM": "xterm", "CI": ""} | environment).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("sys.stdout", Terminal())
+    monkeypatch.setattr("sys.stdin", Terminal())
+    monkeypatch.setattr("os.tcgetpgrp", lambda _: group)
+    assert can_show_live() == shows
+
+
+@pytest.mark.parametrize("words", ["--no-live", "| cat"])
+def test_elsewhere_it_prints_lines(shell: Shell, words: str) -> None:
+    shell.up(words)
+    shell.shows("tree complete")
+    started = shell.below()
+    shell.type("\003")
+    assert until(lambda: all(map(gone, started)))
+    assert OTHER_SCREEN not in shell.text
 
 
 def test_without_colours_there_are_none(domain: object, tmp_path: Path) -> None:
@@ -138,7 +165,7 @@ def test_without_colours_there_are_none(domain: object, tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(ROBOT)
     shell = Shell(tmp_path, NO_COLOR="1")
     try:
-        shell.up("--for 2")
+        shell.up()
         shell.shows("all well")
         colours = {char.fg for line in shell.screen.buffer.values() for char in line.values()}
         assert colours == {"default"}

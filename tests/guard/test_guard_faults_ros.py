@@ -19,6 +19,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from tests.support import processes
+from tests.support.domains import entered_domain
 from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, until
 
 pytestmark = pytest.mark.ros
@@ -162,27 +163,104 @@ def up(domain: object, tmp_path: Path) -> Iterator[Callable[[str], Running]]:
         robot.end()
 
 
-def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(
-    up: Callable[[str], Running],
-) -> None:
-    robot = up(ROBOT)
-    robot.joins("/drive", "odom base_link")
-    robot.says("complete")
-    pid = robot.joins("/strange/loop", "base_link map")
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """A robot that is complete, for the tests of its group, in their order."""
+    folder = tmp_path_factory.mktemp("faulty")
+    with entered_domain(folder):
+        robot = Running(folder, PATIENT)
+        processes.share(robot.popen)
+        robot.says("started slam")
+        robot.joins("/drive", "odom base_link")
+        robot.says("complete")
+        drive = robot.nodes.pop()
+        processes.share(drive)
+        yield robot
+        robot.nodes.append(drive)
+        robot.end()
+
+
+of_one_robot = pytest.mark.xdist_group("faulty")
+
+
+@of_one_robot
+def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(faulty: Running) -> None:
+    faulty.joins("/rogue", "map odom")
+    faulty.says("TF801")
+    pages: list[Any] = []
+
+    def last() -> dict[str, Any]:
+        return (
+            {line.name.removeprefix("tfcompose faulty: "): line for line in pages[-1].status}
+            if pages
+            else {}
+        )
+
+    def reported() -> bool:
+        """Return whether the page says what is.
+
+        A process that was kept from running is slow for a while.
+        """
+        rclpy.spin_once(reader, timeout_sec=0.1)
+        if not pages or last()["slam"].level != DiagnosticStatus.OK:
+            return False
+        return any(" Hz" in pair.value for pair in last()["slam"].values)
+
+    rclpy.init()
+    try:
+        reader: Any = rclpy.create_node("reader")
+        reader.create_subscription(DiagnosticArray, "/diagnostics", pages.append, 10)
+        assert until(reported), pages
+        reader.destroy_node()
+    finally:
+        rclpy.shutdown()
+    tree, slam = last()["tree"], last()["slam"]
+    assert (tree.level, tree.hardware_id) == (DiagnosticStatus.ERROR, "faulty")
+    assert all(name in tree.message for name in ("TF801", "map → odom", "/rogue"))
+    assert [pair.key for pair in slam.values] == ["map → odom"]
+    assert "from /slam" in slam.values[0].value
+    faulty.leaves()
+    faulty.says("over", "map → odom", "/rogue")
+
+
+@of_one_robot
+def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(faulty: Running) -> None:
+    pid = faulty.joins("/strange/loop", "base_link map")
     loop = ("map → odom → base_link → map", "base_link → map from /strange/loop")
-    robot.says(
+    faulty.says(
         "error[TF820]", *loop, notes=(f"/strange/loop runs on this machine as pid {pid}: ",)
     )
-    robot.joins("/strange/itself", "odom odom")
-    robot.says("warning[TF821]", "/strange/itself", "odom → odom")
-    robot.joins("/strange/best", "base_link cup", reliability="best_effort")
-    robot.says("error[TF826]", "/strange/best", "/tf")
-    robot.joins("/tracker_a", "map person_1")
-    robot.joins("/tracker_b", "map person_1")
-    robot.says("warning[TF822]", "map → person_1", "/tracker_a", "/tracker_b")
-    robot.leaves()
-    robot.says("over", "base_link → map", "/strange/loop")
-    assert "TF803" not in robot.output.read_text(encoding="utf-8")
+    faulty.joins("/strange/itself", "odom odom")
+    faulty.says("warning[TF821]", "/strange/itself", "odom → odom")
+    faulty.joins("/strange/best", "base_link cup", reliability="best_effort")
+    faulty.says("error[TF826]", "/strange/best", "/tf")
+    faulty.joins("/tracker_a", "map person_1")
+    faulty.joins("/tracker_b", "map person_1")
+    faulty.says("warning[TF822]", "map → person_1", "/tracker_a", "/tracker_b")
+    faulty.leaves()
+    faulty.says("over", "base_link → map", "/strange/loop")
+    assert "TF803" not in faulty.output.read_text(encoding="utf-8")
+
+
+@of_one_robot
+def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twice(
+    faulty: Running,
+) -> None:
+    faulty.joins("/first", "map odom")
+    faulty.says("TF801", "/first")
+    faulty.child("guard").kill()
+    faulty.says("warning[TF808]", "guard", "SIGKILL")
+    faulty.says("over", "guard")
+    faulty.joins("/second", "map odom")
+    faulty.says("TF801", "/second")
+    faulty.leaves()
+    faulty.says("over", "map → odom", "/first")
+    assert faulty.count("TF801", "/first;") == 1
+    assert (
+        faulty.count("| live "),
+        faulty.count("complete"),
+        faulty.count("watching 2 edges again"),
+    ) == (2, 1, 1)
 
 
 #: A node that latches its edges one message each: before anybody can have found it, if nobody
@@ -218,70 +296,6 @@ def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(
     guard.send_signal(signal.SIGCONT)
     robot.says("warning[TF850]", "/mounts", "/tf_static", "base_link → camera")
     assert robot.count("TF850") == 1
-
-
-def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(
-    up: Callable[[str], Running],
-) -> None:
-    robot = up(ROBOT)
-    robot.joins("/drive", "odom base_link")
-    robot.says("complete")
-    robot.joins("/rogue", "map odom")
-    robot.says("TF801")
-    pages: list[Any] = []
-
-    def last() -> dict[str, Any]:
-        return (
-            {line.name.removeprefix("tfcompose faulty: "): line for line in pages[-1].status}
-            if pages
-            else {}
-        )
-
-    def reported() -> bool:
-        """Return whether the page says what is.
-
-        A process that was kept from running is slow for a while.
-        """
-        rclpy.spin_once(reader, timeout_sec=0.1)
-        return bool(pages) and last()["slam"].level == DiagnosticStatus.OK
-
-    rclpy.init()
-    try:
-        reader: Any = rclpy.create_node("reader")
-        reader.create_subscription(DiagnosticArray, "/diagnostics", pages.append, 10)
-        assert until(reported), pages
-        reader.destroy_node()
-    finally:
-        rclpy.shutdown()
-    tree, slam = last()["tree"], last()["slam"]
-    assert (tree.level, tree.hardware_id) == (DiagnosticStatus.ERROR, "faulty")
-    assert all(name in tree.message for name in ("TF801", "map → odom", "/rogue"))
-    assert [pair.key for pair in slam.values] == ["map → odom"]
-    assert " Hz" in slam.values[0].value
-    assert "from /slam" in slam.values[0].value
-
-
-def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twice(
-    up: Callable[[str], Running],
-) -> None:
-    robot = up(PATIENT)
-    robot.joins("/drive", "odom base_link")
-    robot.says("complete")
-    robot.joins("/rogue", "map odom")
-    robot.says("TF801", "/rogue")
-    robot.child("guard").kill()
-    robot.says("warning[TF808]", "guard", "SIGKILL")
-    robot.says("over", "guard")
-    robot.joins("/rogue_too", "map odom")
-    robot.says("TF801", "/rogue_too")
-    robot.leaves()
-    robot.says("over", "map → odom", "/rogue")
-    assert robot.count("TF801", "/rogue;") == 1
-    assert (
-        robot.count("| live "),
-        robot.count("complete"),
-        robot.count("watching 2 edges again"),
-    ) == (2, 1, 1)
 
 
 #: A child that owns an edge, and once there is a file "lie" sends that of another, too.

@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from tests.support import processes
-from tests.support.domains import reserved_domain
+from tests.support.domains import Domain, entered_domain
 from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, offences, until
 
 pytestmark = [pytest.mark.ros, pytest.mark.xdist_group("one robot for all of these")]
@@ -76,12 +76,10 @@ class Robot:
 
 
 @pytest.fixture(scope="module")
-def domain() -> Iterator[int]:
+def domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Domain]:
     """A domain as conftest's, for all tests of this module."""
-    with reserved_domain() as number, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(number))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        yield number
+    with entered_domain(tmp_path_factory.mktemp("domain")) as entered:
+        yield entered
 
 
 def start(folder: Path, *words: str) -> Robot:
@@ -100,7 +98,7 @@ def end(robot: Robot) -> int:
 
 
 @pytest.fixture(scope="module")
-def robot(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+def robot(domain: Domain, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
     """The demo robot, complete."""
     assert domain
     running = start(tmp_path_factory.mktemp("robot"), str(ROBOT), "--profile", "demo")
@@ -135,7 +133,7 @@ class Stranger:
 
 
 @pytest.fixture
-def stranger(domain: int) -> Iterator[Stranger]:
+def stranger(domain: Domain) -> Iterator[Stranger]:
     assert domain
     one = Stranger()
     yield one

@@ -16,6 +16,7 @@ import psutil
 import pytest
 
 from tests.support import processes
+from tests.support.domains import entered_domain
 from tests.support.guard_without_ids import guard_without_ids
 from tests.support.processes import Started
 from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
@@ -140,16 +141,27 @@ class Fenced:
             self.popen.kill()
 
 
-@pytest.fixture(params=["partition", "remap", "remap nameless"])
-def robot(request: pytest.FixtureRequest, domain: object, tmp_path: Path) -> Iterator[Fenced]:
-    assert domain
+FENCES = [
+    pytest.param(fence, marks=pytest.mark.xdist_group(f"fence {fence}"))
+    for fence in ("partition", "remap", "remap nameless")
+]
+
+
+@pytest.fixture(scope="module", params=FENCES)
+def robot(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Fenced]:
+    """A robot for its tests in their order; the last one ends it."""
+    folder = tmp_path_factory.mktemp("fenced")
     fence, _, nameless = request.param.partition(" ")
-    running = Fenced(tmp_path, fence, guard_without_ids(tmp_path) if nameless else {})
-    try:
-        running.says("tree complete")
-        yield running
-    finally:
-        running.end()
+    with entered_domain(folder):
+        running = Fenced(folder, fence, guard_without_ids(folder) if nameless else {})
+        processes.share(running.popen)
+        try:
+            running.says("tree complete")
+            yield running
+        finally:
+            running.end()
 
 
 class Listener:
@@ -227,12 +239,9 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
     assert until(lambda: heard_by_the_drive() >= FRAMES), "the fence is in a child's ear"
     assert heard_by_the_drive() == FRAMES
     robot.says("note: held back")
-    robot.end()
-    robot.says("held back: ", " × map → odom from /rogue", " × tool → cup from /rogue")
-    assert "tool → hand from" not in robot.text
 
 
-@pytest.mark.parametrize("robot", ["partition"], indirect=True)
+@pytest.mark.parametrize("robot", FENCES[:1], indirect=True, scope="module")
 def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_again(
     robot: Fenced,
 ) -> None:
@@ -267,6 +276,12 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
         assert children(joined.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
     assert robot.text.count("tree complete") == 1
     assert reported(robot) == before
+
+
+def test_at_its_end_it_prints_what_it_held_back(robot: Fenced) -> None:
+    robot.end()
+    robot.says("held back: ", " × map → odom from /rogue", " × tool → cup from /rogue")
+    assert "tool → hand from" not in robot.text
 
 
 #: A node that latches an edge, and counts what it hears: a line of JSON, by frame, whenever it has

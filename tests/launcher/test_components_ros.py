@@ -42,6 +42,7 @@ from tfcompose.tf.ros.node import open_node
 
 pytestmark = [
     pytest.mark.ros,
+    pytest.mark.xdist_group("containers"),  # so that no other worker waits for the package
     pytest.mark.skipif(not can_build(), reason="there is no compiler for composition_interfaces"),
 ]
 
@@ -151,11 +152,40 @@ def has_found(code: str) -> Step:
 
 
 @pytest.mark.usefixtures("domain")
-def test_components_are_loaded_with_names_parameters_and_remappings_as_launch_gives_them(
+def test_components_are_loaded_come_back_with_a_killed_container_and_own_their_edges(
     tmp_path: Path, stand_in: Path
 ) -> None:
-    notices = run(tmp_path, ROBOT, are_ready)
-    rectify, odometry = requested(stand_in)
+    """Names, parameters and remappings are as launch gives them."""
+    fakes = FakeNodes()
+
+    def kill(notices: list[Notice]) -> bool:
+        if are_ready(notices):
+            os.kill(requested(stand_in)[-1]["pid"], SIGKILL)
+        return are_ready(notices)
+
+    def steal(notices: list[Notice]) -> bool:
+        is_back = (
+            sum(isinstance(one, TreeComplete) for one in notices) == 2
+            and states(notices, "rectify")[-1] == "running"
+        )
+        if is_back:
+            assert found(notices) == [], (
+                "an edge of a component is its owner's, though the container sends it"
+            )
+            fakes.moving(fakes.node("thief"), "odom base_link")
+        return is_back
+
+    try:
+        notices = run(tmp_path, ROBOT, kill, steal, has_found("TF801"))
+    finally:
+        fakes.close()
+    expect(found(notices)[0], "TF801", "/thief", "odometry", "(/robot1/odometry)")
+    for name in ("rectify", "odometry"):
+        assert states(notices, name) == ["starting", "running", "stopped", "starting", "running"]
+    first, second = requested(stand_in)[:2], requested(stand_in)[2:]
+    assert [one | {"pid": 0} for one in second] == [one | {"pid": 0} for one in first]
+    assert {one["pid"] for one in first}.isdisjoint(one["pid"] for one in second)
+    rectify, odometry = first
     assert rectify["node"] == "/robot1/front/rectify"
     assert rectify["plugin"] == "image_proc/demo::Empty"
     assert rectify["remap"] == ["image:=camera/image_raw"]
@@ -173,39 +203,8 @@ def test_components_are_loaded_with_names_parameters_and_remappings_as_launch_gi
         name: (type(value), value) for name, value in params.items()
     }
     assert odometry["node"] == "/robot1/odometry"
-    lines = {
-        one.process: one.text
-        for one in notices
-        if isinstance(one, LogLine) and "is up" in one.text
-    }
-    assert lines.keys() == {"rectify", "odometry"}, "what a component logs is its own"
-    assert found(notices) == [], (
-        "an edge of a component is its owner's, though the container sends it"
-    )
-
-
-@pytest.mark.usefixtures("domain")
-def test_a_container_that_is_killed_comes_back_with_its_components(
-    tmp_path: Path, stand_in: Path
-) -> None:
-    def kill(notices: list[Notice]) -> bool:
-        if are_ready(notices):
-            os.kill(requested(stand_in)[-1]["pid"], SIGKILL)
-        return are_ready(notices)
-
-    def is_back(notices: list[Notice]) -> bool:
-        return (
-            sum(isinstance(one, TreeComplete) for one in notices) == 2
-            and states(notices, "rectify")[-1] == "running"
-        )
-
-    notices = run(tmp_path, ROBOT, kill, is_back)
-    first, second = requested(stand_in)[:2], requested(stand_in)[2:]
-    assert [one | {"pid": 0} for one in second] == [one | {"pid": 0} for one in first]
-    assert {one["pid"] for one in first}.isdisjoint(one["pid"] for one in second)
-    for name in ("rectify", "odometry"):
-        assert states(notices, name) == ["starting", "running", "stopped", "starting", "running"]
-    assert found(notices) == []
+    lines = {one.process for one in notices if isinstance(one, LogLine) and "is up" in one.text}
+    assert lines == {"rectify", "odometry"}, "what a component logs is its own"
 
 
 @pytest.mark.usefixtures("domain")
@@ -222,23 +221,6 @@ def test_a_component_that_cannot_be_loaded_is_named_with_the_containers_words(
         "image_proc/demo::Missing",
         "requested plugin name.",
     )
-
-
-@pytest.mark.usefixtures("domain")
-def test_who_sends_the_edge_of_a_component_is_named(tmp_path: Path, stand_in: Path) -> None:
-    fakes = FakeNodes()
-
-    def steal(notices: list[Notice]) -> bool:
-        if are_ready(notices):
-            fakes.moving(fakes.node("thief"), "odom base_link")
-        return are_ready(notices)
-
-    try:
-        notices = run(tmp_path, ROBOT, steal, has_found("TF801"))
-    finally:
-        fakes.close()
-    assert requested(stand_in)
-    expect(found(notices)[0], "TF801", "/thief", "odometry", "(/robot1/odometry)")
 
 
 def start_box() -> None:

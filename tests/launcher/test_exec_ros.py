@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tests.support.processes import Started
 from tests.support.robots import ROVER
 from tests.support.waiting import until
@@ -27,17 +27,7 @@ def units(domain: object, tmp_path: Path) -> Path:
     """The robot's units, exported."""
     assert domain
     (tmp_path / "robot.yaml").write_text(HELLO, "utf-8")
-    words = [
-        sys.executable,
-        "-m",
-        "tfcompose",
-        "export",
-        "systemd",
-        str(tmp_path / "robot.yaml"),
-        "-o",
-        str(tmp_path),
-    ]
-    done = processes.run(words)
+    done = tfcompose_in(tmp_path, "export", "systemd", "robot.yaml", "-o", ".")
     assert done.returncode == 0, done.stderr
     return tmp_path / "systemd"
 

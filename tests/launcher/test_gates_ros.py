@@ -125,56 +125,47 @@ def late_of(notices: list[Notice]) -> dict[str, Finding]:
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_topic_and_a_service_open_gates_and_say_what_they_are(tmp_path: Path) -> None:
+def test_each_kind_of_gate_opens_says_what_it_saw_and_what_waits_follows(tmp_path: Path) -> None:
     lidar, reset = Ready("topic", "/robot/scan"), Ready("service", "/robot/reset")
-    notices = run(tmp_path, node("lidar", ready=lidar), node("reset", ready=reset))
+    slam = node("slam", "lifecycle", lifecycle={"/robot/slam": "active"})
+    line = script(
+        "line", "echo booting; sleep 0.3; echo ready 17; sleep 180", Ready("log", "ready [0-9]+")
+    )
+    code = script("code", "exit 4", Ready("exit", number=4.0))
+    later = script("later", "sleep 180", Ready("time", number=0.4))
+    gates = (
+        node("lidar", ready=lidar),
+        node("reset", ready=reset),
+        slam,
+        simulated(Ready("edges")),
+        line,
+        code,
+        later,
+    )
+    names = {gate.name for gate in gates}
+    last = script("last", "sleep 180", None, after=dict.fromkeys(sorted(names), "ready"))
+    notices = run(tmp_path, *gates, last)
     observed = {
         notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)
     }
-    assert "/robot/scan" in words_of(observed["lidar"]), (
+    assert "/robot/scan" in words_of(observed.pop("lidar")), (
         "its node's name may come later than its topic"
     )
-    assert "/robot/reset" in words_of(observed["reset"])
-    assert isinstance(notices[-1], AllReady)
-
-
-@pytest.mark.usefixtures("domain")
-def test_a_lifecycle_node_is_configured_and_activated_and_then_ready(tmp_path: Path) -> None:
-    notices = run(tmp_path, node("slam", "lifecycle", lifecycle={"/robot/slam": "active"}))
-    (ready,) = [notice for notice in notices if isinstance(notice, ProcessReady)]
-    assert ready.seen == "/robot/slam is active"
+    assert "/robot/reset" in words_of(observed.pop("reset"))
+    assert observed == {
+        "slam": "/robot/slam is active",
+        "drive": "its edges are live",
+        "line": "ready 17",
+        "later": "0.4 s have passed",
+    }
     output = [
         getattr(notice, "text", "")
         for notice in notices
         if getattr(notice, "process", "") == "slam"
     ]
     assert [text for text in output if text] == ["configured", "activated"]
-
-
-@pytest.mark.usefixtures("domain")
-def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(
-    tmp_path: Path,
-) -> None:
-    drive = simulated(Ready("edges"))
-    line = script(
-        "line", "echo booting; sleep 0.3; echo ready 17; sleep 180", Ready("log", "ready [0-9]+")
-    )
-    code = script("code", "exit 4", Ready("exit", number=4.0))
-    later = script("later", "sleep 180", Ready("time", number=0.4))
-    last = script(
-        "last", "sleep 180", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready")
-    )
-    notices = run(tmp_path, drive, line, code, later, last)
-    observed = {
-        notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)
-    }
-    assert observed == {
-        "drive": "its edges are live",
-        "line": "ready 17",
-        "later": "0.4 s have passed",
-    }
     assert isinstance(notices[-1], AllReady)
-    assert {row.process for row in notices[-1].rows} >= {"drive", "line", "code", "later", "last"}
+    assert {row.process for row in notices[-1].rows} >= names | {"last"}
 
 
 @pytest.mark.usefixtures("domain")

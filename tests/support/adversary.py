@@ -5,6 +5,7 @@ Each edge's x says who sent it.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import re
@@ -15,10 +16,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import pytest
-
 from tests.support import processes
-from tests.support.domains import reserved_domain
+from tests.support.domains import entered_domain
 from tests.support.waiting import TIMEOUT_S, complete_lines, until
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.ros.node import TFSubscription, open_node, wait
@@ -206,18 +205,9 @@ def running(folder: Path, guard: str, children: Mapping[str, Child]) -> Iterator
 
     What it keeps is in the folder.
     """
-    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
-        for name in ("XDG_RUNTIME_DIR", "ROS_LOG_DIR"):
-            (folder / name).mkdir(mode=0o700)
-            patch.setenv(name, str(folder / name))
-        patch.setenv("ROS_DOMAIN_ID", str(domain))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        robot = Robot(
-            folder,
-            guard,
-            children,
-            os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        )
+    with entered_domain(folder) as domain:
+        path = os.pathsep.join(filter(None, sys.path))
+        robot = Robot(folder, guard, children, {**domain.environment, "PYTHONPATH": path})
         try:
             yield robot
         finally:
@@ -244,3 +234,23 @@ class PlainListener:
 
             assert until(enough), self.heard
         return self.heard[child]
+
+
+def holds_back(robot: Robot, inside: Mapping[str, str], **foreign_inside: str) -> None:
+    """Let a node, and a program of another DDS, join what only the robot's processes are in."""
+    after = robot.lines()
+    started = [robot.start(node("inside", OTHER_X, "map odom"), **inside)]
+    try:
+        robot.says("error[TF801]", "map → odom", "/inside", after=after)
+        robot.says("note: ", f"pid {started[0].pid}", after=after)
+        if importlib.util.find_spec("cyclonedds"):  # there is none for every Python
+            program = foreign(OTHER_X, "map odom", "odom extra")
+            started.append(robot.start(program, **foreign_inside))
+            robot.says("a DDS program that is no ROS node", after=after)
+        listener = PlainListener()
+        assert OTHER_X not in listener.until("odom", OWNER_X, 40)
+        assert "extra" not in listener.heard
+        assert "listeners receive it" not in robot.output_after(after)
+    finally:
+        for one in started:
+            robot.stop(one)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+import pytest
+
 #: The domains that tests may have; CI's own run of a robot has 101.
 DOMAINS = range(1, 101)
 _WINDOW = count(os.getpid())
@@ -67,6 +69,21 @@ def reserved_domain() -> Iterator[int]:
             os.close(descriptor)
         return
     raise RuntimeError("all ROS domains are in use by other tests")
+
+
+@contextmanager
+def entered_domain(folder: Path) -> Iterator[Domain]:
+    """Enter a domain on the loopback interface, in this process's environment too.
+
+    Runs and logs are kept in the folder.
+    """
+    with reserved_domain() as number, pytest.MonkeyPatch.context() as patch:
+        for name in ("XDG_RUNTIME_DIR", "ROS_LOG_DIR"):
+            (folder / name).mkdir(mode=0o700)
+            patch.setenv(name, str(folder / name))
+        patch.setenv("ROS_DOMAIN_ID", str(number))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield Domain(number, dict(os.environ))
 
 
 def domains_in_use() -> set[int]:

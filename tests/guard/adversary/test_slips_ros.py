@@ -18,6 +18,7 @@ from tests.support.adversary import (
     PlainListener,
     Robot,
     foreign,
+    holds_back,
     in_shell,
     node,
     running,
@@ -137,3 +138,9 @@ def test_a_child_in_another_domain_is_nobodys(robot: Robot) -> None:
     robot.says("TF803", "odom → foreign")
     assert not gone(robot.pid_of("other_domain"))
     assert "odom → other_domain" not in robot.text
+
+
+def test_who_joins_the_fence_on_purpose_is_held_back(robot: Robot) -> None:
+    if robot.guard == "remap":  # test_rogues_ros has the other
+        topic = {"TOPIC": "/_tfcompose/liars/slam/tf"}
+        holds_back(robot, topic, PARTITION="", **topic)

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.support import processes
+from tests.support.core import copy_core
 from tests.support.domains import Domain, entered_domain, reserved_domain
 from tests.support.processes import Started
 from tests.support.skips import ACCEPTED, unexpected
@@ -192,6 +193,12 @@ def start(domain: Domain) -> Iterator[Callable[..., Started]]:
     yield run
     for started in running:
         started.close()
+
+
+@pytest.fixture(scope="session")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package without its tools, in a folder for PYTHONPATH."""
+    return copy_core(tmp_path_factory.mktemp("core"))
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import pytest
 
 from tests.support import processes
 from tests.support.cli import tfcompose_in
-from tests.support.core import copy_core, run_with
+from tests.support.core import run_with
 from tests.support.house import ROOT
 from tests.support.names import FILE, names
 from tfcompose.foundation.catalogue import CATALOGUE
@@ -25,12 +25,9 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.tool import Tool
 
+#: One worker has the copy, whose modules are compiled once.
+pytestmark = pytest.mark.xdist_group("core")
 ROBOTS = sorted((ROOT / "robots").glob("*.yaml"))
-
-
-@pytest.fixture(scope="module")
-def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return copy_core(tmp_path_factory.mktemp("core"))
 
 
 def test_its_names_are_those_of_the_core_and_of_the_tools() -> None:
@@ -61,10 +58,10 @@ def test_it_lints_builds_and_explains_the_example_robots(core: Path, tmp_path: P
     assert len(explained) == len(ROBOTS)
     assert all(pose.startswith(edge) for edge, pose in explained), explained
     for robot in ROBOTS:
-        whole = tmp_path / "whole" / robot.stem
-        assert tfcompose_in(tmp_path, "build", robot, "-o", whole).returncode == 0
+        complete = tmp_path / "complete" / robot.stem
+        assert tfcompose_in(tmp_path, "build", robot, "-o", complete).returncode == 0
         for file in (tmp_path / robot.stem).rglob("*"):
-            same = whole / file.relative_to(tmp_path / robot.stem)
+            same = complete / file.relative_to(tmp_path / robot.stem)
             assert file.is_dir() or file.read_bytes() == same.read_bytes(), file
 
 

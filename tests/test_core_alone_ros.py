@@ -11,20 +11,19 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.support import processes
-from tests.support.core import copy_core, run_with
+from tests.support.core import run_with
 from tests.support.house import ROOT
 from tests.support.processes import Started
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.xdist_group("core")]
 ROBOT = ROOT / "robots/autonomous_robot.yaml"
 
 
-def test_it_starts_guards_and_judges_a_robot(domain: object, tmp_path: Path) -> None:
+def test_it_starts_guards_and_judges_a_robot(domain: object, core: Path, tmp_path: Path) -> None:
     assert domain
-    core = copy_core(tmp_path / "core")
     rehearsed = run_with(core, tmp_path, "up", ROBOT, "-p", "demo", "--dry-run", "-o", "built")
     assert rehearsed.returncode == 0, rehearsed.stdout + rehearsed.stderr
     words = ("up", str(ROBOT), "-p", "demo", "-o", "built")

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     Run = Callable[..., subprocess.CompletedProcess[str]]
 
+#: One worker installs the package, for all tests.
+pytestmark = pytest.mark.xdist_group("acme")
 ROBOT = """\
 tfcompose: 1
 robot: r

@@ -44,10 +44,10 @@ def of_trimesh(kind: str) -> Any:
         case "box":
             return trimesh.creation.box(size)
         case "sphere":
-            return trimesh.creation.icosphere(5, size[0])
+            return trimesh.creation.icosphere(4, size[0])
         case "cylinder":
-            return trimesh.creation.cylinder(size[0], size[1], sections=512)
-    mesh = trimesh.creation.capsule(size[1], size[0], count=(256, 256))
+            return trimesh.creation.cylinder(size[0], size[1], sections=256)
+    mesh = trimesh.creation.capsule(size[1], size[0], count=(96, 96))
     mesh.apply_translation(-mesh.bounds.mean(axis=0))
     return mesh
 
@@ -61,7 +61,7 @@ def transform(pose: Pose) -> np.ndarray:
     return made
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     kind=st.sampled_from(KINDS_OF_SHAPES),
     xyz=st.tuples(metres, metres, metres),

@@ -3,6 +3,7 @@
 Each is found at its place, with help that names what to write.
 """
 
+import re
 from pathlib import Path
 
 import pytest
@@ -13,199 +14,20 @@ from tfcompose.spec.language.values import COLOURS
 
 BASE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 CAM = BASE + "sensors:\n  cam: {preset: realsense/d435i, parent: base_link, %s}\n"
-ARG = "tfcompose: 1\nrobot: r\nargs: {on: false}\nframes:\n  base_link: {}\n"
-MAST = "  mast: {parent: base_link, when: '${args.on}'}\n"
 FRAME = BASE + "frames:\n  mast: {parent: base_link, %s}\n"
-PROCESS = BASE + "processes:\n  a: {run: [sleep, '9']}\n  b: {run: [sleep, '9'], %s}\n"
 SHAPE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {box: [1, 1, 1], %s}}}\n"
 
-#: (text, where and what is found, words of its help)
+#: Texts of one mistake each, separated by ---, behind BASE where they do not begin a file of their
+#: own. The mark on a line, or below it, has the code, its column, and words of its help.
+FILES = sorted((Path(__file__).parent / "mistakes").glob("*.yaml"))
 MISTAKES = [
-    # keys of URDF, launch files, messages and compose files
-    (FRAME % "pose: [0, 0, 1, 0, 0, 0]", "5:29 TF101", "xyz rpy"),
-    (FRAME % "origin: {xyz: [0, 0, 1]}", "5:29 TF101", "xyz rpy"),
-    (FRAME % "translation: [0, 0, 1]", "5:29 TF101", "xyz"),
-    (FRAME % "position: [0, 0, 1]", "5:29 TF101", "xyz"),
-    (FRAME % "rotation: [0, 0, 1]", "5:29 TF101", "rpy quat_xyzw"),
-    (FRAME % "quaternion: [0, 0, 0, 1]", "5:29 TF101", "quat_xyzw"),
-    (FRAME % "frame_id: x", "5:29 TF101", "parent"),
-    (FRAME % "publisher: x", "5:29 TF101", "owner"),
-    (CAM % "position: [0, 0, 1]", "5:53 TF101", "xyz"),
-    (CAM % "imu: true", "5:53 TF101", "options: imu:"),
-    (CAM % "driver: off", "5:61 TF813", "none"),
-    (CAM.replace("realsense/", "") % "rate: 5", "5:17 TF601", "realsense/d435i"),
-    (PROCESS % "depends_on: [a]", "6:26 TF101", "after:"),
-    (PROCESS % "environment: [A=1]", "6:26 TF101", "env:"),
-    (PROCESS % "respawn: true", "6:26 TF101", "restart"),
-    (PROCESS % "after: [a]", "6:33 TF103", "after: {a: ready}"),
-    (PROCESS % "after: a", "6:33 TF103", "after: {a: ready}"),
-    (PROCESS % "env: [A=1]", "6:31 TF103", "env: {A: '1'}"),
-    (PROCESS % "remap: ['/a:=/b']", "6:33 TF103", "remap: {/a: /b}"),
-    (PROCESS % "remap: [[a, b]]", "6:33 TF103", "remap: {a: b}"),
-    (PROCESS % "params: nav2.yaml", "6:34 TF103", "params: {file: nav2.yaml}"),
-    (PROCESS % "cmd: [a]", "6:26 TF101", "run:"),
-    (PROCESS % "owns: [odom]", "6:26 TF101", "owner:"),
-    (PROCESS % "simulate: fixed", "6:36 TF103", "{fixed:"),
-    (BASE + "guard: strict\n", "4:8 TF103", "{mode: strict}"),
-    (BASE + "rules: {TF999: off}\n", "4:9 TF017", "a code that lint prints"),
-    (CAM % "params: {a: 1}", "5:53 TF101", "driver: params:"),
-    (
-        BASE + "parts:\n  arm: {file: arm.yaml, parent: base_link}\n",
-        "5:9 TF101",
-        "spec: arm.yaml urdf: xacro:",
-    ),
-    (
-        SHAPE.replace("{box: [1, 1, 1], %s}", "{cylinder: {radius: 1, width: 1}}"),
-        "3:52 TF101",
-        "length",
-    ),
-    (BASE + "processes:\n  a: {external: yes}\n", "5:17 TF106", "true"),
-    (CAM % "driver: {serial: 1}", "5:62 TF101", "options: {serial:"),
-    (CAM % "serial: 1", "5:53 TF101", "options: {serial:"),
-    (CAM % "mount: base_link", "5:53 TF101", "parent"),
-    (CAM % "place: nopes", "5:60 TF203", "cam_link"),
-    (BASE + "frames:\n  - mast: {}\n", "5:3 TF103", "frames: {mast: {…}}"),
-    (BASE + "frames:\n  - name: mast\n", "5:3 TF103", "frames: {mast: {…}}"),
-    (FRAME % "quat_wxyz: [1, 0, 0, 0]", "5:29 TF101", "quat_xyzw: w last"),
-    (FRAME % "rpy_deg: [0, 90, 0]", "5:29 TF101", "90 deg"),
-    (SHAPE.replace("visual: {box: [1, 1, 1], %s}", "box: [1, 1, 1]"), "3:21 TF101", "visual:"),
-    (
-        SHAPE.replace("visual: {box: [1, 1, 1], %s}", "inertial: {mass: 1, ixx: 1}"),
-        "3:41 TF101",
-        "inertia:",
-    ),
-    (PROCESS % "package: nav2_amcl", "6:26 TF101", "run: nav2_amcl"),
-    (PROCESS % "executable: amcl", "6:26 TF101", "run: amcl"),
-    (PROCESS % "preset: ekf", "6:26 TF101", "node: {preset: ekf}"),
-    (PROCESS % "args: [--fast]", "6:26 TF101", "run: args:"),
-    (PROCESS % "ros2_control: base_controller", "6:26 TF101", "controller_manager"),
-    (PROCESS % "remap: {/cmd_vel: '/cmd vel'}", "6:44 TF106", ""),
-    (PROCESS % "remap: {'scan:=front': scan}", "6:34 TF106", ""),
-    (
-        BASE
-        + "processes:\n  nav: {run: {package: nav2_bringup, executable: navigation_launch.py}}\n",
-        "5:50 TF106",
-        "launch: nav2_bringup/navigation_launch.py",
-    ),
-    (
-        BASE + "processes:\n  joints: {simulate: {joints: sweep}}\n",
-        "5:12 TF101",
-        "name of its own",
-    ),
-    (BASE + "namespace: nurse\n", "4:1 TF101", "ros: {namespace: nurse}"),
-    (BASE + "use_sim_time: true\n", "4:1 TF101", "ros: {clock: sim}"),
-    (BASE + "units: {length: cm}\n", "4:1 TF101", "30 cm"),
-    (CAM % "look: front", "5:59 TF106", "forward"),
-    (CAM % "inverted: true", "5:53 TF101", "rpy: 180 deg"),
-    (FRAME % "tf: driver", "5:29 TF101", "sensors owner"),
-    (SHAPE.replace("[1, 1, 1], %s", "{size: [0.2, 0.3, 1]}"), "3:35 TF103", "[0.2, 0.3, 1]"),
-    (SHAPE.replace("[1, 1, 1], %s", "{size: 0.2 0.3 1}"), "3:35 TF103", "[0.2, 0.3, 1]"),
-    (
-        SHAPE.replace("box: [1, 1, 1], %s", "cylinder: {radius: 1, height: 1}"),
-        "3:52 TF101",
-        "length",
-    ),
-    (SHAPE.replace("box: [1, 1, 1], %s", "sphere: {diameter: 1}"), "3:39 TF101", "radius"),
-    (
-        BASE.replace("{}}", "{}, lift: {}}")
-        + "joints:\n  j: {type: hinge, parent: base_link, child: lift, mimic: k}\n",
-        "5:13 TF106",
-        "revolute",
-    ),
-    (
-        BASE.replace("{}}", "{}, lift: {}}")
-        + "joints:\n  j: {type: continuous, parent: base_link, child: lift, mimic: k}\n",
-        "5:64 TF103",
-        "{joint: k}",
-    ),
-    (
-        BASE + "joints:\n  i: {type: continuous, parent: base_link, child: pan}\n"
-        "frames: {eye: {parent: pan}}\n",
-        "6:24 TF203",
-        "links: {pan: {}}",
-    ),
-    (BASE + "env: {A: b}\n", "4:1 TF101", "env: domain_id:"),
-    (BASE + "ros: {use_sim_time: true}\n", "4:7 TF101", "clock: sim"),
-    (PROCESS % "after: {a: running}", "6:37 TF106", "started"),
-    (
-        BASE + "frames:\n  base_link: {parent: base_footprint}\n",
-        "5:23 TF203",
-        "frames: {base_footprint: {}}",
-    ),
-    (FRAME % "owner: static_transform_publisher", "5:36 TF302", "leave owner out"),
-    # owners
-    (BASE + "frames:\n  odom: {owner: drive}\n", "5:10 TF102", "owner: drive child"),
-    (
-        BASE
-        + "frames:\n  mast: {parent: base_link, owner: node}\nprocesses:\n  a: {external: true, node: node}\n",  # noqa: E501 (a text as its reader has it)
-        "5:36 TF302",
-        "did you mean a",
-    ),
-    (
-        BASE.replace("{}}", "{}, lift: {}}")
-        + "joints:\n  j: {type: continuous, parent: base_link, child: lift, mimic: {joint: k}}\n",
-        "5:72 TF701",
-        "",
-    ),
-    (PROCESS % "ready: {topic: '/sc an'}", "6:41 TF106", ""),
-    # conditions
-    (ARG + MAST + "  tip: {parent: mast}\n", "7:17 TF203", "when: ${args.on};"),
-    (
-        ARG + MAST + "  tip: {parent: base_link, relative_to: mast}\n",
-        "7:41 TF203",
-        "when: ${args.on};",
-    ),
-    (
-        ARG
-        + "  tip: {parent: base_link, owner: drive}\nprocesses: {drive: {when: '${args.on}', external: true}}\n",  # noqa: E501 (a text as its reader has it)
-        "6:35 TF302",
-        "when: ${args.on};",
-    ),
-    # what is new to YAML
-    (BASE + "frames:\n  laser\n    parent: base_link\n", "5:3 TF002", "laser:"),
-    (BASE + "frames:\n\n  laser  # on top\n    parent: base_link\n", "6:3 TF002", "laser:"),
-    (BASE + "frames:\n  laser: {parent:base_link}\n", "5:11 TF006", "parent: base_link"),
-    (BASE + "frames:\n  tag36h11:7:\n", "5:3 TF006", "{}"),
-    (BASE + "frames:\n  sensors:\n    cam: {preset: x}\n", "5:3 TF101", "indent"),
-    (BASE + "frames:\nmast: {parent: base_link}\n", "5:1 TF101", "indent frames"),
-    (BASE + "frames:\n  mast:\n  parent: base_link\n", "6:11 TF103", "indent"),
-    (BASE + "frames:\n\u00a0 mast: {}\n", "5:1 TF002", "space"),
-    # colours
-    (SHAPE % "material: {color: [0, 0, 1]}", "3:57 TF101", "rgba"),
-    (SHAPE % "color: bleu", "3:53 TF106", "blue"),
-    (SHAPE % "color: [0, 0, 1], material: red", "3:64 TF107", ""),
-    # numbers
-    (FRAME % "xyz: [0,2, 0, 0,1]", "5:34 TF103", "point"),
-    (FRAME % "xyz: [0, 0, 1,5 m]", "5:34 TF103", "point"),
-    (FRAME % "xyz: ['0,2', 0, 0]", "5:35 TF103", "0.2"),
-    (FRAME % "xyz: 0.2 0 0.1", "5:34 TF103", "[0.2, 0, 0.1]"),
-    (FRAME % "xyz: {x: 0.2, z: 0.1}", "5:34 TF103", "[0.2, 0, 0.1]"),
-    (FRAME % "xyz: [30 cmm, 0, 0]", "5:35 TF104", "cm mm"),
-    (FRAME % "rate: 1,5 Hz", "5:37 TF006", "point"),
-    (FRAME % "xyz: [20 cm 0 10 cm]", "5:34 TF103", "[20 cm, 0, 10 cm]"),
-    (
-        FRAME % "xyz: [0.2, 0, 0.1, 0, 0, 1.57]",
-        "5:34 TF103",
-        "xyz: [0.2, 0, 0.1] rpy: [0, 0, 1.57]",
-    ),
-    (FRAME % "rpy: {yaw: 90 deg}", "5:34 TF103", "[0, 0, 90 deg]"),
-    (FRAME % "xyz: [0, 0, $mast]", "5:41 TF103", '"${mast}"'),
-    (FRAME % "xyz: [0, 0, mast]", "5:41 TF103", '"${mast}"'),
-    (FRAME % "rpy: [0, 0, pi/2]", "5:41 TF103", '"${pi/2}"'),
-    (FRAME % "xyz: [0, 0, '$(var mast)']", "5:41 TF103", '"${mast}"'),
-    (FRAME % "rpy: [0, 0, '${math.pi/2}']", "5:41 TF105", "pi"),
-    # YAML
-    (BASE + "frames:\n  mast: {parent: base_link}\n  cam {parent: mast}\n", "6:3 TF002", "cam:"),
-    (BASE + "frames:\n  mast:{parent: base_link}\n", "5:3 TF002", "mast:"),
-    (BASE + "frames\n  mast: {parent: base_link}\n", "4:1 TF002", "frames:"),
-    (
-        BASE + "frames:\n  mast: {parent: base_link}\n   cam: {parent: mast}\n",
-        "6:4 TF002",
-        "column 3",
-    ),
-    (BASE + "  frames:\n    mast: {parent: base_link}\n", "4:3 TF002", "column 1"),
-    (FRAME % "xyz: [0, 0, ${mast}]", "5:42 TF002", '"${mast}"'),
-    (FRAME % "xyz: {${mast}}", "5:36 TF002", '"${mast}"'),
+    pytest.param(text, id=f"{file.stem} {number}")
+    for file in FILES
+    for number, text in enumerate(file.read_text("utf-8").split("---\n"))
+]
+MARK = re.compile(r"# expect( above)?: (TF\d{3}) at (\d+)(?:: (.*))?$")
+#: Texts on whose lines a mark would be another mistake: place and code, words of the help.
+UNMARKED = [
     (
         BASE + "frames:\n  mast:\n    parent base_link\n    xyz: [0, 0, 1]\n",
         "6:5 TF002",
@@ -216,38 +38,37 @@ MISTAKES = [
         "6:5 TF002",
         "parent: base_link",
     ),
-    (
-        BASE + "frames:\n  mast:\n    parent: base_link\n      xyz: [0, 0, 1]\n",
-        "7:7 TF002",
-        "column 5",
-    ),
     ("tfcompose:1\nrobot: r\n", "1:1 TF002", "tfcompose: 1"),
-    ("tfcompose: 1\nrobot r\nlinks: {}\n", "2:1 TF002", "robot: r"),
-    (BASE + "frames: mast: {parent: base_link}\n", "4:9 TF002", "next line"),
-    (BASE + "frames: {mast: {parent: base_link}} // mast\n", "4:37 TF002", "# mast"),
-    (BASE + "frames: {mast: {xyz: [0, 0, 1}}\n", "4:30 TF002", "]"),
     (BASE + "frames: {mast: {parent: 'base_link}}\n", "4:25 TF002", "'"),
-    # names in profiles
-    (
-        CAM % "rate: 5" + "profiles:\n  demo:\n    sensors: {camm: {driver: none}}\n",
-        "8:15 TF102",
-        "cam?",
-    ),
 ]
 
 
-@pytest.mark.parametrize("case", MISTAKES, ids=lambda case: case[1] + " " + case[2][:20])
-def test_a_mistake_is_found_at_its_place_with_help_that_names_what_to_write(
-    case: tuple[str, str, str], tmp_path: Path
-) -> None:
-    text, place, words = case
-    (tmp_path / "robot.yaml").write_text(text, "utf-8")
-    printed = tfcompose_in(tmp_path, "lint").stdout
-    where, code = place.split()
-    _, begin, rest = printed.partition(f"robot.yaml:{where}: error[{code}]")
+def check_mistake(folder: Path, text: str, place: str, code: str, words: str) -> None:
+    (folder / "robot.yaml").write_text(text, "utf-8")
+    printed = tfcompose_in(folder, "lint").stdout
+    _, begin, rest = printed.partition(f"robot.yaml:{place}: error[{code}]")
     assert begin, printed
     advice = rest.partition("help: ")[2].partition("\n")[0]
     assert all(word in advice for word in words.split()), printed
+
+
+@pytest.mark.parametrize("text", MISTAKES)
+def test_a_mistake_is_found_at_its_place_with_help_that_names_what_to_write(
+    text: str, tmp_path: Path
+) -> None:
+    text = text if text.startswith("tfcompose") else BASE + text
+    marks = [(number, MARK.search(line)) for number, line in enumerate(text.splitlines(), 1)]
+    ((number, mark),) = [(number, mark) for number, mark in marks if mark]
+    above, code, column, words = mark.groups()
+    check_mistake(tmp_path, text, f"{number - bool(above)}:{column}", code, words or "")
+
+
+@pytest.mark.parametrize(("text", "where", "words"), UNMARKED)
+def test_a_mistake_that_no_mark_can_follow_is_found_too(
+    text: str, where: str, words: str, tmp_path: Path
+) -> None:
+    place, code = where.split()
+    check_mistake(tmp_path, text, place, code, words)
 
 
 @pytest.mark.parametrize(

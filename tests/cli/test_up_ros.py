@@ -148,18 +148,6 @@ def rogue(domain: object) -> Iterator[Callable[[], subprocess.Popen[str]]]:
         popen.communicate()
 
 
-def test_a_signal_ends_everything_with_0_and_leaves_no_process(up: Callable[..., Up]) -> None:
-    robot = up(ROVER)
-    robot.says("tree complete: 2 edges live after ")
-    below = robot.below()
-    assert {"guard", "static", "drive"} <= {process.cmdline()[-1] for process in below}
-    robot.popen.send_signal(signal.SIGTERM)
-    assert robot.ends() == 0
-    assert [process for process in below if not gone(process)] == []
-    assert robot.text.splitlines()[-1].endswith("| ended")
-    assert "SIGTERM" not in robot.text.split("stopping: ", 1)[1].split("\n", 1)[1]
-
-
 @pytest.mark.parametrize("seconds", [0.0, 0.2, 0.5, 1.2])
 def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
     up: Callable[..., Up], seconds: float
@@ -199,9 +187,11 @@ def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
 
 
-def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]) -> None:
+def test_the_same_edges_by_another_name_are_refused_and_a_signal_ends_the_first_with_0(
+    up: Callable[..., Up],
+) -> None:
     first = up(ROVER)
-    first.says("tree complete")
+    first.says("tree complete: 2 edges live after ")
     second = up(ROVER.replace("robot: rover", "robot: other"), "--settle", "40")
     assert second.ends() == 1
     assert f"rover (pid {first.popen.pid}, since " in second.text
@@ -212,7 +202,13 @@ def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]
     )
     assert "isolate: topics" in second.text
     assert re.findall(r"started (\w+)", second.text) == ["guard"]
-    assert first.popen.poll() is None
+    below = first.below()
+    assert {"guard", "static", "drive"} <= {process.cmdline()[-1] for process in below}
+    first.popen.send_signal(signal.SIGTERM)
+    assert first.ends() == 0
+    assert [process for process in below if not gone(process)] == []
+    assert first.text.splitlines()[-1].endswith("| ended")
+    assert "SIGTERM" not in first.text.split("stopping: ", 1)[1].split("\n", 1)[1]
 
 
 def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreported(

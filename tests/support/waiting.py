@@ -13,12 +13,16 @@ TIMEOUT_S = 60.0
 
 
 def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool:
-    """Look every few milliseconds until the condition holds; return whether it did in time."""
-    end = time.monotonic() + timeout_s
+    """Look every few milliseconds until the condition holds; return whether it did in time.
+
+    The longer it takes, the more rarely it looks: others need the processor that it waits for.
+    """
+    begun = time.monotonic()
     while not condition():
-        if time.monotonic() > end:
+        waited_s = time.monotonic() - begun
+        if waited_s > timeout_s:
             return False
-        time.sleep(0.005)
+        time.sleep(min(0.005 + waited_s / 50, 0.03))
     return True
 
 

@@ -96,7 +96,7 @@ def read_dot(graph: Graph) -> Any:
 
 FAMILY = [
     (seed, frames, poses)
-    for seed in range(12)
+    for seed in range(6)
     for frames in (1, 2, 9, 100)
     for poses in (False, True)
 ]
@@ -341,7 +341,7 @@ def test_odd_names_are_well_formed_and_escaped_in_every_format() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # as above
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_graphviz_text_has_each_frame_edge_and_group(seed: int) -> None:
     graph = tree(seed, 40, poses=True)
     read = read_dot(graph)

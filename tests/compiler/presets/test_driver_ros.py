@@ -179,55 +179,45 @@ def test_a_driver_that_does_as_its_preset_says_is_let_alone(
 
 
 @pytest.mark.parametrize(
-    ("options", "environment", "code", "names"),
+    ("options", "environment", "expected"),
     [
         (
             f"{EVERYTHING}}}, tf: tfcompose",
             {"STAND_IN_IGNORES": "1"},
-            "TF801",
-            ("publish_tf: false", "front (realse"),
-        ),
-        (
-            "streams: [depth]}, tf: driver",
-            {"STAND_IN_ALSO": "infra1"},
-            "TF803",
-            ("front_infra1", "sensors.front"),
+            {"TF801": ("publish_tf: false", "front (realse")},
         ),
         (  # an infra2 that is 4.5 cm further to the right is that of a D455
-            f"{EVERYTHING}}}, tf: driver",
-            {"STAND_IN_OFF": "infra2_frame:-0.045"},
-            "TF828",
-            (
-                "front_infra2_frame",
-                "front_link",
-                " 46.",
-                "xyz 0.0004 -0.0962 0.0003 m",
-                "xyz 0 -0.05 0 m",
-                "sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962, 0.0003]",
-            ),
+            "streams: [depth, infra2]}, tf: driver",
+            {"STAND_IN_ALSO": "infra1", "STAND_IN_OFF": "infra2_frame:-0.045"},
+            {
+                "TF803": ("front_infra1", "sensors.front"),
+                "TF828": (
+                    "front_infra2_frame",
+                    "front_link",
+                    " 46.",
+                    "xyz 0.0004 -0.0962 0.0003 m",
+                    "xyz 0 -0.05 0 m",
+                    "sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962,",
+                ),
+            },
         ),
         (
             f"{EVERYTHING}}}, tf: tfcompose",
             {"STAND_IN_FORCES": "true"},
-            "TF829",
-            ("publish_tf: true", "publish_tf: false", "front (realsense/d435i)"),
+            {"TF829": ("publish_tf: true", "publish_tf: false", "front (realsense/d435i)")},
         ),
     ],
-    ids=[
-        "ignores its switch",
-        "another stream",
-        "a nominal frame",
-        "forces",
-    ],
+    ids=["ignores its switch", "another stream and a nominal frame", "forces"],
 )
 def test_a_driver_that_does_otherwise_is_named_once(
     up: Callable[..., Up],
     options: str,
     environment: dict[str, str],
-    code: str,
-    names: tuple[str, ...],
+    expected: dict[str, tuple[str, ...]],
 ) -> None:
     robot = up(ROVER % options, **environment)
-    robot.says(code, "/front/front", *names)
+    for code, names in expected.items():
+        robot.says(code, "/front/front", *names)
     robot.popen.send_signal(signal.SIGINT)
-    assert robot.ended().count(code) == 1
+    codes = robot.ended()
+    assert all(codes.count(code) == 1 for code in expected), codes

@@ -82,9 +82,8 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(
-        key=lambda item: item.get_closest_marker("ros") is None
-    )  # those that wait come first, and end with all
+    # Those that wait, and groups, which one worker has alone, come first, and end with all.
+    items.sort(key=lambda item: not any(map(item.get_closest_marker, ("ros", "xdist_group"))))
     with_ros = [item for item in items if item.get_closest_marker("ros")]
     if NO_ROS:
         for item in with_ros:

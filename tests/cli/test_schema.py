@@ -20,6 +20,8 @@ from tfcompose.spec.load import Source, load
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+#: One worker makes the validators, for all tests.
+pytestmark = pytest.mark.xdist_group("schema")
 ROOT = Path(__file__).parents[2]
 HEAD = "tfcompose: 1\nrobot: r\n"
 LINKS = "links: {base_link: {}}\n"

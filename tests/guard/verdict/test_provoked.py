@@ -19,6 +19,7 @@ ELSEWHERE = {
     "TF852": "guard/test_cleared_environment_ros.py",
     "TF853": "guard/adversary/test_rogues_ros.py",
     "TF854": "cli/test_up_ros.py",
+    "TF860": "cli/test_joints_ros.py",
 }
 
 

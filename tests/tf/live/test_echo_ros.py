@@ -16,6 +16,7 @@ from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tests.support.processes import Started
 from tests.support.waiting import until
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
@@ -349,7 +350,7 @@ def test_what_was_sent_before_simulated_time_starts_again_does_not_outlive_it(
     ],
 )
 def test_an_option_that_cannot_be_read_is_wrong_use(words: tuple[str, str]) -> None:
-    done = echo("odom", "base_link", *words)
+    done = tfcompose_in(Path.cwd(), "echo", "odom", "base_link", *words)
     assert done.returncode == 2
     assert words[1] in done.stderr
     assert "Traceback" not in done.stderr

@@ -44,7 +44,7 @@ def complete_rclpy() -> None:
 
     Tf2_ros imports them, so programs say ``rclpy.time.Time`` after ``import rclpy`` alone.
     """
-    if "rclpy" in sys.modules:
+    if sys.modules.get("rclpy"):
         import tfcompose.tf.ros.rclpy_times  # noqa: F401, PLC0415 (ROS is optional)
 
 

@@ -126,3 +126,30 @@ def test_what_is_not_understood_is_refused_once(source_text: str, code: str, wor
     (found,) = compiled(source_text).errors
     assert found.code == code
     assert words in (found.help or "")
+
+
+@pytest.mark.parametrize(
+    ("rates", "requested", "rate_hz"),
+    [
+        (["", ""], "", 20.0),
+        ([", rate: 50 Hz", ""], "", 50.0),
+        ([", rate: 5 Hz", ", rate: 8 Hz"], "", 8.0),
+        ([", rate: 50 Hz", ""], ", rate: 30 Hz", 30.0),
+    ],
+)
+def test_a_simulated_owner_sends_at_the_rate_that_its_edges_declare(
+    rates: list[str], requested: str, rate_hz: float
+) -> None:
+    text = f"""tfcompose: 1
+robot: r
+frames:
+  odom: {{}}
+  base_link: {{parent: odom, owner: ekf{rates[0]}}}
+  tool: {{parent: base_link, owner: ekf{rates[1]}}}
+processes: {{ekf: {{simulate: {{circle: {{}}{requested}}}}}}}
+"""
+    done = compile_robot(text, "r.yaml", library())
+    assert done.robot
+    (ekf,) = [process for process in done.robot.processes if process.name == "ekf"]
+    assert ekf.simulate
+    assert ekf.simulate.rate == rate_hz

@@ -30,7 +30,9 @@ def validated(text: str) -> Validated:
 
 def value_of(source_text: str, variables: str = "{}") -> Any:
     """Return what ``xyz: [written, 0, 0]`` is read as."""
-    done = validated(f"vars: {variables}\nframes: {{a: {{xyz: [{source_text}, 0, 0]}}}}\n")
+    done = validated(
+        f"vars: {variables}\nframes: {{a: {{parent: b, xyz: [{source_text}, 0, 0]}}}}\n"
+    )
     assert not done.found, done.found
     return done.spec.frames["a"].xyz[0]
 
@@ -91,7 +93,7 @@ def test_an_unknown_unit_is_named_with_the_one_that_is_meant(unit: str, advice: 
     ],
 )
 def test_the_unit_that_is_advised_has_the_dimension_that_is_wanted(unit: str, advice: str) -> None:
-    (found,) = validated(f"frames: {{a: {{xyz: [1 {unit}, 0, 0]}}}}\n").found
+    (found,) = validated(f"frames: {{a: {{parent: b, xyz: [1 {unit}, 0, 0]}}}}\n").found
     assert found.help.startswith(advice)
 
 
@@ -260,7 +262,7 @@ def test_a_chain_of_a_thousand_variables_is_computed() -> None:
 
 def test_variables_that_need_each_other_are_one_finding_that_shows_the_circle() -> None:
     found = validated(
-        'vars: {a: "${b}", b: "${c}", c: "${a}"}\nframes: {f: {xyz: ["${a}", 0, 0]}}\n'
+        'vars: {a: "${b}", b: "${c}", c: "${a}"}\nframes: {f: {parent: b, xyz: ["${a}", 0, 0]}}\n'
     ).found
     (one,) = found
     assert one.code == "TF105"
@@ -316,7 +318,7 @@ ROTATIONS = {
 
 @pytest.mark.parametrize("source_text", ROTATIONS)
 def test_each_way_to_write_a_rotation_agrees_with_scipy(source_text: str) -> None:
-    done = validated(f"frames: {{a: {{{source_text}}}}}\n")
+    done = validated(f"frames: {{a: {{parent: b, {source_text}}}}}\n")
     assert not done.found
     found = done.spec.frames["a"].rotation
     assert found
@@ -336,7 +338,9 @@ def test_each_way_to_write_a_rotation_agrees_with_scipy(source_text: str) -> Non
     ],
 )
 def test_a_direction_points_the_x_axis_there(direction: str, axis: tuple[int, int, int]) -> None:
-    quat = validated(f"frames: {{a: {{look: {direction}}}}}\n").spec.frames["a"].rotation
+    quat = (
+        validated(f"frames: {{a: {{parent: b, look: {direction}}}}}\n").spec.frames["a"].rotation
+    )
     assert quat
     assert Rotation.from_quat(quat).apply([1, 0, 0]) == pytest.approx(axis, abs=1e-12)
 

@@ -286,18 +286,81 @@ _SHORT_WORD = 3
 @rule("TF624")
 def serial_used_twice(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], MountedSensor] = {}
+    found: set[str] = set()
     for sensor in robot.sensors:
         if sensor.serial:
             other = first.setdefault((sensor.preset.partition("/")[0], str(sensor.serial)), sensor)
             if other is not sensor:
+                found.add(sensor.driver)
                 message = (
                     f"{sensor.name} and {other.name} have the same serial number {sensor.serial}"
                 )
                 notes = [Note(f"{other.name} is defined here", other.at)]
+                advice = "correct the number of one of the two"
+                yield finding("TF624", message, sensor.at, help=advice, notes=notes)
+    yield from _addresses_used_twice(robot, found)
+
+
+#: How parameters are called that say where a device is.
+_ADDRESSES = re.compile(
+    r"(?:.*_)?(?:port|ip|ip_addr|ip_address|host|hostname|device|device_id|device_path"
+    r"|serial_no|serial_number|video_device|usb_port_id|mxid|guid)"
+)
+#: Serial lines and cameras can be opened by one process only.
+_EXCLUSIVE = re.compile(r"/dev/(?:tty|video|serial/)\w.*")
+_ARGUMENT = re.compile(r"([\w.]+):=(.+)")
+
+
+def _addresses_used_twice(robot: Robot, found: set[str]) -> Iterator[Finding]:
+    """Yield a finding for each process that opens a device of one before it, on one host."""
+    addresses = {
+        process.name: _addresses(process)
+        for process in robot.processes
+        if process.kind in {"run", "component", "external"} and process.name not in found
+    }
+    before: list[Process] = []
+    for process in robot.processes:
+        mine = addresses.get(process.name)
+        if not mine:
+            continue
+        for other in before:
+            key = _shared(process, other, mine, addresses[other.name])
+            if key:
+                message = f"{process.name} and {other.name} have the same {key} {mine[key]}"
+                notes = [Note(f"{other.name} is defined here", other.at)]
+                advice = f"correct {key} of one of the two"
+                severity: Severity = "error" if _EXCLUSIVE.fullmatch(mine[key]) else "warning"
                 yield finding(
-                    "TF624",
-                    message,
-                    sensor.at,
-                    help="correct the number of one of the two",
-                    notes=notes,
+                    "TF624", message, process.at, help=advice, notes=notes, severity=severity
                 )
+                break
+        before.append(process)
+
+
+def _addresses(process: Process) -> dict[str, str]:
+    """Return what the process's parameters and arguments say about where its device is."""
+    words = [match.groups() for word in process.argv if (match := _ARGUMENT.fullmatch(word))]
+    given = [*words, *((process.ros_nodes[0].flat_params if process.ros_nodes else {}).items())]
+    named = ((key.rpartition(".")[2], str(value)) for key, value in given)
+    return {key: value for key, value in named if value and _ADDRESSES.fullmatch(key)}
+
+
+def _shared(
+    process: Process, other: Process, mine: dict[str, str], theirs: dict[str, str]
+) -> str | None:
+    """Return the parameter that names one device for both, if one does."""
+    if process.host != other.host:
+        return None
+    for key, value in mine.items():
+        if _EXCLUSIVE.fullmatch(value) and value in theirs.values():
+            return key
+    program = _program(process)
+    are_alike = any(program) and program == _program(other) and mine == theirs
+    return next(iter(mine)) if are_alike else None
+
+
+def _program(process: Process) -> tuple[object, ...]:
+    if process.component:
+        return (process.component.package, process.component.plugin)
+    command = () if process.package or process.launch else process.argv[:1]
+    return (process.package, process.executable, process.launch, *command)

@@ -169,6 +169,7 @@ _MOST_ANCESTORS = 100
 
 @rule("TF207")
 def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
+    yield from _base_not_below_odom(robot)
     above = {edge.child: edge for edge in reversed(robot.edges)}
     for edge in robot.edges:
         prefix, level = _level(edge.child)
@@ -187,6 +188,27 @@ def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
                 yield finding("TF207", message, edge.at, help=advice)
                 break
             parent = above[parent].parent if parent in above else parent
+
+
+def _base_not_below_odom(robot: Robot) -> Iterator[Finding]:
+    """Yield a finding where odom and the base are on two branches below one frame."""
+    for odom in robot.frames:
+        prefix, _, name = odom.rpartition("/")
+        around = robot.parent_edge(odom)
+        if name != "odom" or around is None:
+            continue
+        bases = (f"{prefix}/{base}".lstrip("/") for base in ("base_footprint", "base_link"))
+        for base in bases:
+            edge = robot.parent_edge(base)
+            if edge is None or odom in edge.switched:
+                continue
+            others = robot.below(around.parent) - robot.below(odom)
+            if base in others and odom not in robot.below(base):
+                message = f"{base} is beside {odom}, not below it: both are below {around.parent}"
+                notes = [Note(f"{odom} is defined here", around.at)]
+                advice = f"write {base}: {{parent: {odom}}}, which odometry publishes"
+                yield finding("TF207", message, edge.at, help=advice, notes=notes)
+            break
 
 
 def _level(frame: str) -> tuple[str, int | None]:

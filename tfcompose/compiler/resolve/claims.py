@@ -168,10 +168,13 @@ class _Work:
             frame = claimant.roles.frames.get(role)
             if described.parameter is None or frame is None:
                 continue
-            given = claimant.given.get(described.parameter)
+            parameter = described.parameter
+            if described.instead in claimant.given:
+                parameter = described.instead
+            given = claimant.given.get(parameter)
             if given is not None and not claimant.roles.is_bound(role) and self._is_frame(given):
                 continue  # the tree leaves it open
-            self._set(claimant, described.parameter, self.robot.final(frame))
+            self._set(claimant, parameter, self.robot.final(frame))
         for key, value in preset.set.items():
             self._set(claimant, key, value)
 

@@ -97,19 +97,36 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
     return None
 
 
+#: How often a simulated owner publishes an edge that declares no rate.
+_USUAL_RATE_HZ = 20.0
+
+
+def _declared_rate(owner: str, spec: RobotSpec) -> float:
+    """Return the highest rate that edges of the owner declare, in Hz."""
+    sections = (spec.frames, spec.links, spec.joints, spec.parts)
+    rates = [
+        entry.rate
+        for section in sections
+        for entry in section.values()
+        if entry.owner == owner and entry.rate
+    ]
+    return max(rates, default=_USUAL_RATE_HZ)
+
+
 def _simulation(name: str, simulate: Simulate, validated: Validated) -> Finds[Simulation | None]:
     at: Path = ("processes", name, "simulate")
+    rate = simulate.rate or _declared_rate(name, validated.spec)
     if simulate.circle:
         return Simulation(
             "circle",
-            simulate.rate,
+            rate,
             radius=simulate.circle.radius,
             speed=simulate.circle.speed,
         )
     if simulate.fixed:
-        return Simulation("fixed", simulate.rate, pose=pose_of(simulate.fixed))
+        return Simulation("fixed", rate, pose=pose_of(simulate.fixed))
     if simulate.joints is not None:
-        return Simulation("joints", simulate.rate)
+        return Simulation("joints", rate)
     if not any(
         path[:3] == at and path[3:4] and path[3] in SIMULATIONS for path in validated.refused
     ):

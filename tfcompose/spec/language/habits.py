@@ -19,12 +19,14 @@ _PARENT = "the frame that it is mounted on is parent"
 _OWNER = "the process that publishes the edge is owner"
 _TOPIC = "topics are set in the driver: driver: {remap: {scan: front/scan}}, or params"
 _OPTION = "it is an option of the sensor: options: {WORD: …}; tfcompose presets PRESET lists them"
+_ROBOTS = "several robots are parts: {r1: {spec: rover.yaml, namespace: r1, prefix: r1_}}"
 _MASS = "it belongs under inertial: {mass: 2 kg}"
 
 #: By the word: the key that has its meaning, where that is known, and what to write.
 _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
     word: meanings
     for words, meanings in (
+        ("robots fleet", (("parts", _ROBOTS),)),
         ("pose origin transform", (("xyz", _POSE),)),
         (
             "tf",

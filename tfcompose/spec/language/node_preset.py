@@ -58,6 +58,9 @@ class Role(Spec):
     parameter: Text | None = key(
         None, "the parameter that holds its name; default: it cannot be changed"
     )
+    instead: Text | None = key(
+        None, "the parameter that holds the name of the published frame, where it is set"
+    )
     default: Text = key(..., "the name without the parameter", "odom")
 
 

@@ -6,9 +6,11 @@ What is written stays as it is: ``rotation`` and ``Posed.xyz`` are what it means
 """
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Discriminator, Tag
+from pydantic_core import PydanticCustomError
 from typing_extensions import TypeAliasType
 
 from tfcompose.foundation.geometry import (
@@ -21,7 +23,7 @@ from tfcompose.foundation.geometry import (
     quat_from_matrix,
     quat_from_rpy,
 )
-from tfcompose.foundation.units import Angle, Length, Number, Rate, refused
+from tfcompose.foundation.units import Angle, Length, Number, Rate, WithUnit, refused
 from tfcompose.spec.language.spec import Checked, Entry, Spec, key, several
 from tfcompose.spec.language.values import (
     Axis,
@@ -34,6 +36,7 @@ from tfcompose.spec.language.values import (
     Xyz,
     short,
 )
+from tfcompose.spec.load import Path
 
 #: How far a quaternion's or a matrix row's length may be from 1: what four written decimals can
 #: do.
@@ -97,6 +100,25 @@ class AxisAngle(Spec):
     angle: Angle = key(..., "the angle of rotation")
 
 
+def _not_over_the_top(angle: float) -> float:
+    """Return the angle.
+
+    Raises:
+        PydanticCustomError: if it is more than a quarter turn.
+    """
+    is_in_degrees = not isinstance(angle, WithUnit) and abs(angle) > math.pi
+    if is_in_degrees or abs(angle) <= math.pi / 2 + UNIT_TOLERANCE:
+        return angle  # that degrees were meant is TF410
+    message = (
+        f"{math.degrees(angle):.4g} deg is beyond the vertical, where the view is upside down"
+    )
+    advice = "straight down or up is 90 deg; to look backwards add left: 180 deg"
+    raise refused("TF106", message, advice)
+
+
+Steep = TypeAliasType("Steep", Annotated[Angle, AfterValidator(_not_over_the_top)])
+
+
 class LookAngles(Checked):
     """A direction by the angles that lead to it from straight ahead."""
 
@@ -105,8 +127,8 @@ class LookAngles(Checked):
         frozenset({"left", "right"}),
     )
 
-    up: Angle | None = key(None, "how far the direction points up")
-    down: Angle | None = key(None, "how far the direction points down")
+    up: Steep | None = key(None, "how far the direction points up, at most 90 deg", "15 deg")
+    down: Steep | None = key(None, "how far the direction points down, at most 90 deg", "15 deg")
     left: Angle | None = key(None, "how far the direction points left")
     right: Angle | None = key(None, "how far the direction points right")
     roll: Angle = key(0.0, "roll about the viewing direction, right-handed")
@@ -288,3 +310,22 @@ class MountKeys(EdgeKeys):
     joint: Text | None = key(
         None, "the name of the fixed joint in URDF; default: PARENT_to_CHILD", "camera_mount_joint"
     )
+
+    #: What a pose without a parent would need.
+    NEEDS_PARENT: ClassVar[str] = "add the frame that it is in, parent: FRAME, or remove it"
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also the first key of a pose that has no parent, and so places nothing."""
+        yield from super().check(data)
+        name = next((name for name in data if name in _OF_A_POSE), None)
+        if (
+            name is not None
+            and "parent" not in data
+            and not cls.model_fields["parent"].is_required()
+        ):
+            message = f"{name} without a parent places nothing"
+            yield (name,), refused("TF102", message, cls.NEEDS_PARENT, on_key=True, keeps=True)
+
+
+_OF_A_POSE = ROTATIONS | {"xyz", "relative_to", "calibration"}

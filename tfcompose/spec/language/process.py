@@ -239,7 +239,9 @@ class Simulate(Checked):
         "zero",
         {"lift": 0.2},
     )
-    rate: Rate = key(20.0, "how often it publishes")
+    rate: Rate | None = key(
+        None, "how often it publishes; default: the rate of its edges, or 20 Hz", "50 Hz"
+    )
 
 
 class ScheduleSpec(Checked):

@@ -363,6 +363,10 @@ class PartSpec(MountKeys):
     """
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*MountKeys.EXCLUSIVE, frozenset(PART_KINDS))
+    NEEDS_PARENT: ClassVar[str] = (
+        "its own file says where a part without a parent is: add parent: FRAME, or let the process"
+        " that publishes its first moving edge begin elsewhere"
+    )
 
     spec: Text | None = key(None, "a robot file, relative to the file that names it", "rover.yaml")
     urdf: Text | None = key(

@@ -141,7 +141,7 @@ MOST_STATEMENTS = {
     "foundation": 1_717,
     "model": 2_105,
     "spec": 4_783,
-    "compiler": 9_722,
+    "compiler": 9_726,
     "tf": 5_377,
     "guard": 4_200,
     "launcher": 3_815,

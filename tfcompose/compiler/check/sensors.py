@@ -197,9 +197,10 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
     for edge in robot.edges:
         if not edge.given:
             continue
-        twin = next((given[name] for name in twins(edge.child) if name in given), None)
+        others = [given[name] for name in twins(edge.child) if name in given]
+        twin = next((other for other in others if are_mirrored(other, edge)), None)
         given.setdefault(edge.child, edge)
-        if twin and are_mirrored(twin, edge):
+        if twin:
             x, y, z = edge.pose.xyz
             message = (
                 f"{edge.child} and {twin.child} are both at [{x:g}, {y:g}, {z:g}] in {edge.parent}"
@@ -223,9 +224,13 @@ def sides_swapped(robot: Robot) -> Iterator[Finding]:
             or angle_between(base.quat_xyzw, IDENTITY_XYZW) > _TURNED_RAD
         ):
             continue
-        twin = next((given[name] for name in twins(edge.child) if name in given), None)
+        others = [given[name] for name in twins(edge.child) if name in given]
+        swapped = (
+            other for other in others if other.parent == edge.parent and are_swapped(other, edge)
+        )
+        twin = next(swapped, None)
         given[edge.child] = edge
-        if twin and twin.parent == edge.parent and are_swapped(twin, edge):
+        if twin:
             axis = "xy"[side_of(edge.child, twin.child)[0]]
             places = " and ".join(
                 f"{one.child} at {axis} = {one.pose.xyz['xy'.index(axis)]:g}"

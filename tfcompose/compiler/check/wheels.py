@@ -203,7 +203,11 @@ def _bottom(link: Link | None, pose: Pose) -> float | None:
 
 @rule("TF627")
 def sensor_on_wheel(robot: Robot) -> Iterator[Finding]:
-    wheels = {edge.child: edge for edge in robot.edges if is_wheel(robot, edge)}
+    wheels = {
+        edge.child: edge
+        for edge in robot.edges
+        if is_wheel(robot, edge) and edge is robot.parent_edge(edge.child)
+    }
     turned = {frame: edge for edge in wheels.values() for frame in robot.below(edge.child)}
     for sensor in robot.sensors:
         wheel = turned.get(sensor.mount)

@@ -267,7 +267,10 @@ def _joint(name: str, kind: Any, element: Element, values: AttributeReader) -> J
             values.number(mimic, "multiplier", 1.0),
             values.number(mimic, "offset", 0.0),
         )
-        joint = replace(joint, mimic=master or None, multiplier=multiplier, offset=offset)
+        at = mimic.at_value("joint") if master else mimic.at
+        joint = replace(
+            joint, mimic=master or None, multiplier=multiplier, offset=offset, mimic_at=at
+        )
     return replace(
         joint,
         limit=_limit(name, bounds, values),

@@ -21,7 +21,7 @@ from tfcompose.foundation.geometry import Offset, Pose, offset_of
 from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan.file import write_plan
 from tfcompose.tools.view.judgement import Judgement
-from tfcompose.tools.view.live_view import Following, observers_of
+from tfcompose.tools.view.live_source import LiveSource, observers_of
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.reload import WatchedFiles
 from tfcompose.tools.view.server import start_server, stop_server
@@ -37,7 +37,7 @@ class View:
 
     server: viser.ViserServer
     windows: Windows
-    following: Following
+    following: LiveSource
     changed: threading.Event
 
     @property
@@ -71,11 +71,11 @@ def following(
         files(file)
     server, ending = start_server("127.0.0.1", 0, "test", TOKEN), Stop()
     observers = observers_of(plan_of(session.robot))
-    follows = Following(observers, Offset(1e-3, 1e-3), joints=joints)
-    windows = Windows(server, session, files, edit=False, joints=joints, extend=follows.show_in)
+    follows = LiveSource(observers, Offset(1e-3, 1e-3), joints=joints)
+    windows = Windows(server, session, files, follows)
     if not in_browser:
         windows.add(server, 0)
-    thread = threading.Thread(target=follows.run, args=(windows, changed, ending))
+    thread = threading.Thread(target=follows.follow, args=(windows, changed, ending))
     thread.start()
     try:
         yield View(server, windows, follows, changed)

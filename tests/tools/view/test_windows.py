@@ -17,7 +17,7 @@ from tfcompose.foundation.geometry import Pose
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.reload import WatchedFiles
 from tfcompose.tools.view.view_session import session_of
-from tfcompose.tools.view.windows import Windows
+from tfcompose.tools.view.windows import SceneSource, Windows
 
 pytestmark = pytest.mark.xdist_group("browser")
 
@@ -37,7 +37,7 @@ def windows(tmp_path: Path, server: viser.ViserServer) -> Windows:
     files = WatchedFiles(read_text)
     arguments = parser_of("view").parse_args([str(tmp_path / "r.yaml")])
     session = session_of(str(tmp_path / "r.yaml"), arguments, files)
-    return Windows(server, session, files, edit=True, joints=True)
+    return Windows(server, session, files, SceneSource(has_edit=True))
 
 
 @contextmanager

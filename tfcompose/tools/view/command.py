@@ -31,11 +31,9 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Iterator, Sequence
 
-    from tfcompose.foundation.geometry import Offset
-    from tfcompose.tools.view.bag_view import BagView
-    from tfcompose.tools.view.live_view import Following
     from tfcompose.tools.view.reload import WatchedFiles
     from tfcompose.tools.view.session import Session
+    from tfcompose.tools.view.windows import SceneSource
 
 _HOST, _PORT = "127.0.0.1", 8080
 _EVERYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 (what a user may give)
@@ -100,23 +98,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.cli.reading import read_text
     from tfcompose.tools.view.view_session import session_of
 
-    if arguments.live and arguments.bag:
-        fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
-    if arguments.joints and not arguments.live:
-        fail(
-            "--joints publishes for a running robot: give --live, too; without it sliders move"
-            " what is shown",
-            UNREADABLE,
-        )
-    if (arguments.live or arguments.bag) and (arguments.html or arguments.edit):
-        given = "--live" if arguments.live else "--bag"
-        fail(f"{given} shows what is published: leave out --html and --edit", UNREADABLE)
-    if arguments.at is not None and not arguments.bag:
-        fail("--at is a time of a recording: give --bag, too", UNREADABLE)
-    if arguments.tolerance is not None and not (arguments.live or arguments.bag):
-        fail("--tolerance compares with what is published: give --live or --bag, too", UNREADABLE)
-    if arguments.edit and arguments.html:
-        fail("--html writes a page, in which nothing is moved: leave out --edit", UNREADABLE)
+    _refuse_options(arguments)
     file = arguments.file or _running_plan(arguments) or DEFAULT_FILE
     if arguments.html:
         _check_output(Path(arguments.html), [file, *arguments.overlays])
@@ -128,61 +110,91 @@ def run(arguments: Namespace) -> int:
     return _serve(session, files, arguments)
 
 
+def _refuse_options(arguments: Namespace) -> None:
+    """Refuse options that do not go together; ends then."""
+    is_published = arguments.live or bool(arguments.bag)
+    source = "--live" if arguments.live else "--bag"
+    refusals = (
+        (
+            arguments.live and arguments.bag,
+            "--live uses the running tree and --bag a recording: give one of them",
+        ),
+        (
+            arguments.joints and not arguments.live,
+            (
+                "--joints publishes for a running robot: give --live, too; without it sliders move"
+                " what is shown"
+            ),
+        ),
+        (
+            is_published and (arguments.html or arguments.edit),
+            f"{source} shows what is published: leave out --html and --edit",
+        ),
+        (
+            arguments.at is not None and not arguments.bag,
+            "--at is a time of a recording: give --bag, too",
+        ),
+        (
+            arguments.tolerance is not None and not is_published,
+            "--tolerance compares with what is published: give --live or --bag, too",
+        ),
+        (
+            arguments.edit and arguments.html,
+            "--html writes a page, in which nothing is moved: leave out --edit",
+        ),
+    )
+    for is_refused, message in refusals:
+        if is_refused:
+            fail(message, UNREADABLE)
+
+
 def _serve(session: Session, files: WatchedFiles, arguments: Namespace) -> int:
     """Show the session in the browser until Ctrl-C; return the exit code."""
     from tfcompose.tools.view.reload import Watcher
     from tfcompose.tools.view.server import new_token, start_server, stop_server
     from tfcompose.tools.view.windows import Windows
 
-    bag = _bag_view(session, arguments) if arguments.bag else None
-    following = _following(session, arguments) if arguments.live else None
+    source = _source_of(session, arguments)
     token = new_token()
-    port = _free(arguments.host, arguments.port)
-    server = start_server(arguments.host, port, session.robot.name, token)
+    server = start_server(
+        arguments.host, _free(arguments.host, arguments.port), session.robot.name, token
+    )
     windows: Windows | None = None
     try:
-        address = _address(arguments.host, server.get_port(), token)
-        joints, extend = bag is None, bag.show if bag else None
-        if following:
-            joints, extend = arguments.joints, following.show_in
-        windows = Windows(
-            server, session, files, edit=arguments.edit, joints=joints, extend=extend
-        )
-        with _announced(address, arguments), Watcher(files) as watcher:
-            if following:
-                from tfcompose.tools.view.live_view import follow
-
-                return follow(following, windows, watcher.changed)
-            while True:
-                watcher.changed.wait()
-                watcher.changed.clear()
-                windows.reload()
+        windows = Windows(server, session, files, source)
+        with (
+            _announced(_address(arguments.host, server.get_port(), token), arguments),
+            Watcher(files) as watcher,
+        ):
+            return source.run(windows, watcher.changed)
     finally:
         if windows is not None:
             windows.end()
         stop_server(server)
 
 
-def _tolerance(arguments: Namespace) -> Offset:
-    return arguments.tolerance or tolerance(TOLERANCE)
+def _source_of(session: Session, arguments: Namespace) -> SceneSource:
+    """Return where frames are: in the file, in a running tree, or in a recording.
 
+    For a running tree this process is set up for its ROS.
+    """
+    tolerated = arguments.tolerance or tolerance(TOLERANCE)
+    if arguments.bag:
+        from tfcompose.tools.view.bag_source import BagSource
 
-def _following(session: Session, arguments: Namespace) -> Following:
-    """Return what follows the running tree, after this process is set up for its ROS."""
-    from tfcompose.cli.live import set_up_ros
-    from tfcompose.tools.view.view_session import plan_of_session
+        return BagSource(arguments.bag, arguments.at or 0.0, session, tolerated)
+    if arguments.live:
+        from tfcompose.cli.live import set_up_ros
+        from tfcompose.tools.view.view_session import plan_of_session
 
-    plan = plan_of_session(session)
-    set_up_ros(plan.ros)
-    from tfcompose.tools.view.live_view import Following, observers_of
+        plan = plan_of_session(session)
+        set_up_ros(plan.ros)
+        from tfcompose.tools.view.live_source import LiveSource, observers_of
 
-    return Following(observers_of(plan), _tolerance(arguments), joints=arguments.joints)
+        return LiveSource(observers_of(plan), tolerated, joints=arguments.joints)
+    from tfcompose.tools.view.windows import SceneSource
 
-
-def _bag_view(session: Session, arguments: Namespace) -> BagView:
-    from tfcompose.tools.view.bag_view import BagView
-
-    return BagView(arguments.bag, arguments.at or 0.0, session, _tolerance(arguments))
+    return SceneSource(has_edit=arguments.edit)
 
 
 def _write(session: Session, path: Path) -> None:

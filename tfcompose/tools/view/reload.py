@@ -154,16 +154,6 @@ class ReloadedPanel:
         self.panel = Panel(server, session, **options)
         files.look_at(meshes_of(session.robot))
 
-    def end(self) -> None:
-        """Let the panel move nothing any more."""
-        self.panel.end()
-
-    def reload(self) -> bool:
-        """Read the files again; return whether the panel is a new one."""
-        return self.files.differ() and self.accept(  # they do not after a save
-            *self.session.read_again(self.files)
-        )
-
     def accept(self, texts: Mapping[str, str], state: Compiled) -> bool:
         """Show the files as they are now, or what is wrong with them.
 

@@ -9,6 +9,7 @@ another one saved is said before it is saved again.
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -18,8 +19,6 @@ from tfcompose.tools.view.panel import Window
 from tfcompose.tools.view.reload import ReloadedPanel, meshes_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import viser
 
     from tfcompose.compiler.compile import Compiled
@@ -32,6 +31,31 @@ if TYPE_CHECKING:
 _MOST_LEFT = 8
 
 
+@dataclass(eq=False)
+class SceneSource:
+    """A source of a scene: frames are where the robot file and the sliders put them.
+
+    A running tree and a recording override this.
+
+    Attributes:
+        has_edit: whether mounts can be moved and saved.
+        has_joints: whether a window has sliders of joints.
+    """
+
+    has_edit: bool = False
+    has_joints: bool = True
+
+    def show_in(self, shown: ReloadedPanel) -> None:
+        """Add the source's sections to a window, and show its frames there."""
+
+    def run(self, windows: Windows, changed: threading.Event) -> int:
+        """Keep the windows up to date until the view ends; return the exit code."""
+        while True:
+            changed.wait()
+            changed.clear()
+            windows.reload()
+
+
 class Windows:
     """Makes a panel for each window that connects to a server, and reloads all of them.
 
@@ -42,26 +66,20 @@ class Windows:
         server: where windows connect.
         session: what is shown; nothing is moved in it.
         files: what the session was read with.
-        edit: as for ``Panel``.
-        joints: as for ``Panel``.
-        extend: adds to a panel that was made, as ``view --bag`` and ``view --live`` do.
+        source: where frames are, and which sections a window has.
     """
 
-    def __init__(  # noqa: PLR0913 (options of the view)
+    def __init__(
         self,
         server: viser.ViserServer,
         session: Session,
         files: WatchedFiles,
-        *,
-        edit: bool,
-        joints: bool,
-        extend: Callable[[ReloadedPanel], None] | None = None,
+        source: SceneSource,
     ) -> None:
         self.session = session
         self.files = files
         self._server = server
-        self._edit, self._joints = edit, joints
-        self._extend = extend or (lambda _: None)
+        self._source = source
         self._lock = threading.RLock()
         self._open: dict[int, ReloadedPanel] = {}
         self._left: list[tuple[Session, Choices]] = []
@@ -80,7 +98,7 @@ class Windows:
     def end(self) -> None:
         """Let no panel move anything any more."""
         for shown in self.panels:
-            shown.end()
+            shown.panel.end()
 
     def reload(self) -> bool:
         """Read the files again if they have changed, and show them in all windows.
@@ -93,7 +111,7 @@ class Windows:
             texts, state = self.session.read_again(self.files)
             for shown in self._open.values():
                 if shown.accept(texts, state):
-                    self._extend(shown)
+                    self._source.show_in(shown)
             self._found = state.found
             if not self.session.accepts(state):
                 return False
@@ -113,21 +131,21 @@ class Windows:
                 place,
                 session,
                 self.files,
-                edit=self._edit,
-                joints=self._joints,
+                edit=self._source.has_edit,
+                joints=self._source.has_joints,
                 choices=choices,
                 window=Window(self._server, self._lock, lambda: self._share(number)),
             )
             self._open[number] = shown
             if self._found:
                 shown.show(self._found)
-            self._extend(shown)
+            self._source.show_in(shown)
 
     def _remove(self, client: viser.ClientHandle) -> None:
         with self._lock:
             shown = self._open.pop(client.client_id, None)
             if shown is not None:
-                shown.end()
+                shown.panel.end()
                 self._left = [*self._left, (shown.session, shown.panel.choices)][-_MOST_LEFT:]
 
     def _share(self, number: int) -> None:
@@ -139,7 +157,7 @@ class Windows:
                 continue
             conflicts = _conflicts(shown.session, state)
             if shown.accept(texts, state):
-                self._extend(shown)
+                self._source.show_in(shown)
             shown.panel.window.conflicts |= conflicts
             shown.panel.say(_word(list(shown.session.moved), conflicts))
         self._replace(texts, state)

@@ -10,6 +10,7 @@ from tfcompose.model.plan.topics import parts_of
 from tfcompose.tools.view.bag import BagTree, Recorded
 from tfcompose.tools.view.live_panel import BagPanel
 from tfcompose.tools.view.view_session import plan_of_session
+from tfcompose.tools.view.windows import SceneSource
 
 if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Offset
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _LONGEST_S = 1e8
 
 
-class BagView:
+class BagSource(SceneSource):
     """A bag, at a time, with the robot that a session has.
 
     Raises:
@@ -28,6 +29,7 @@ class BagView:
     """
 
     def __init__(self, path: str, at_s: float, session: Session, tolerance: Offset) -> None:
+        super().__init__(has_joints=False)
         plan = plan_of_session(session)
         self._recorded = from_bag(lambda: Recorded(path, parts_of(plan)))
         self._tolerance = tolerance
@@ -39,7 +41,7 @@ class BagView:
                 UNREADABLE,
             )
 
-    def show(self, shown: ReloadedPanel) -> None:
+    def show_in(self, shown: ReloadedPanel) -> None:
         """Show the recording in a window with the robot as it is now."""
         session, choices = shown.session, shown.panel.choices
         tree = BagTree(session.robot, plan_of_session(session), self._recorded, self._tolerance)

@@ -24,6 +24,7 @@ from tfcompose.tools.view.joints import JointSender, first_positions, joint_topi
 from tfcompose.tools.view.live import LiveTree
 from tfcompose.tools.view.live_panel import LivePanel
 from tfcompose.tools.view.view_session import plan_of_session
+from tfcompose.tools.view.windows import SceneSource, Windows
 
 if TYPE_CHECKING:
     import threading
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from tfcompose.model.robot import Robot
     from tfcompose.tools.view.reload import ReloadedPanel
     from tfcompose.tools.view.session import Session
-    from tfcompose.tools.view.windows import Windows
 
     Topics = tuple[str, str]
 
@@ -60,7 +60,7 @@ class LiveWindow(NamedTuple):
     panel: LivePanel
 
 
-class Following:
+class LiveSource(SceneSource):
     """Moves the scenes of all windows, judges and asks, each as often as it is due.
 
     With ``joints`` sliders publish joint states: those of the window in which one was moved last.
@@ -76,7 +76,7 @@ class Following:
     ) -> None:
         self._observers = observers
         self._tolerance = tolerance
-        self._joints = joints
+        super().__init__(has_joints=joints)
         self._meter = UsageMeter()
         self.shown: dict[ReloadedPanel, LiveWindow] = {}
         self._judge_at = self._ask_at = 0.0
@@ -94,7 +94,22 @@ class Following:
         self.shown[shown] = LiveWindow(tree, LivePanel(shown.server, shown.panel, tree))
         self._judge_at = self._ask_at = 0.0
 
-    def run(self, windows: Windows, changed: threading.Event, stop: Stop) -> None:
+    def run(self, windows: Windows, changed: threading.Event) -> int:
+        """Follow the tree until a signal comes, in a process that is set up for its ROS.
+
+        Return the exit code.
+
+        Raises:
+            SystemExit: after saying why ROS cannot be started.
+        """
+        with Stop() as stop:
+            try:
+                self.follow(windows, changed, stop)
+            except RosError as error:
+                reject([finding("TF901", str(error), None)])
+        return INTERRUPTED
+
+    def follow(self, windows: Windows, changed: threading.Event, stop: Stop) -> None:
         """Follow the tree until ``stop`` is requested; of files that changed show the new robot.
 
         Raises:
@@ -142,7 +157,7 @@ class Following:
         for sender in self.senders:
             sender.close()
         self.senders = []
-        if self._joints:
+        if self.has_joints:
             first = self._first_positions = first_positions(session.robot)
             self._positions = {name: self._positions.get(name, first[name]) for name in first}
             topics = joint_topics(session.robot, self._plan)
@@ -248,19 +263,3 @@ def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
         return sorted([*(found - set(unnamed)), *(NAMELESS for _ in unnamed)])
 
     return JointSender(topic, names, make, others)
-
-
-def follow(following: Following, windows: Windows, changed: threading.Event) -> int:
-    """Show the running tree until a signal comes, in a process that is set up for its ROS.
-
-    Return the exit code.
-
-    Raises:
-        SystemExit: after saying why ROS cannot be started.
-    """
-    with Stop() as stop:
-        try:
-            following.run(windows, changed, stop)
-        except RosError as error:
-            reject([finding("TF901", str(error), None)])
-    return INTERRUPTED

@@ -28,6 +28,11 @@ _SOFTWARE = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
+#: Makes a page draw no scene. Drawing by software takes seconds of all cores for each picture, and
+#: clicks wait for it. The panel and the server work as usual.
+_DRAW_NOTHING = """
+const names = ['drawArrays', 'drawArraysInstanced', 'drawElements', 'drawElementsInstanced'];
+for (const name of names) WebGL2RenderingContext.prototype[name] = () => {};"""
 
 
 def address_of(server: viser.ViserServer, host: str = "127.0.0.1") -> str:
@@ -48,11 +53,26 @@ def browser() -> Iterator[Browser]:
             chromium.close()
 
 
+def new_page(
+    chromium: Browser, width: int = 1000, height: int = 700, *, draws: bool = False
+) -> Page:
+    """Return a page without an address; only one that ``draws`` has a picture of the scene."""
+    page = chromium.new_page(viewport={"width": width, "height": height})
+    page.set_default_timeout(TIMEOUT_MS)
+    if not draws:
+        page.add_init_script(_DRAW_NOTHING)
+    return page
+
+
 @contextmanager
-def page_of(address: str, width: int = 1000, height: int = 700) -> Iterator[Page]:
-    """Open the address in a browser; the test is skipped where there is none."""
+def page_of(
+    address: str, width: int = 1000, height: int = 700, *, draws: bool = False
+) -> Iterator[Page]:
+    """Open the address in a browser, as ``new_page`` does.
+
+    The test is skipped where there is none.
+    """
     with browser() as chromium:
-        page = chromium.new_page(viewport={"width": width, "height": height})
-        page.set_default_timeout(TIMEOUT_MS)
+        page = new_page(chromium, width, height, draws=draws)
         page.goto(address, wait_until="load")
         yield page

@@ -77,7 +77,7 @@ def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(
 ) -> None:
     session = session_of(rover)
     panel = Panel(server, session, edit=True)
-    with page_of(address_of(server)) as page:
+    with page_of(address_of(server), draws=True) as page:
         select_front_link(page, panel)
         before = session.mount("front_link").given(session.mount("front_link").edge.pose)
 
@@ -173,7 +173,7 @@ def test_a_click_selects_a_body_and_owners_can_be_hidden(
     rover: Path, server: viser.ViserServer
 ) -> None:
     panel = Panel(server, session_of(rover), edit=False)
-    with page_of(address_of(server)) as page:
+    with page_of(address_of(server), draws=True) as page:
         page.get_by_text("odom is a root").wait_for()
         assert until(lambda: clicked_body(page, panel) == "base_link")
         page.get_by_text("by ekf").wait_for()

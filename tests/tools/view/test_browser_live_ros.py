@@ -68,7 +68,7 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(tmp_path: Path, no
     with (
         sending("diff_drive", "odom", "base_link", rate=20),
         following(session_of(tmp_path / "r.yaml"), in_browser=True) as view,
-        page_of(address_of(view.server)) as page,
+        page_of(address_of(view.server), draws=True) as page,
     ):
         page.get_by_text("all edges as expected").wait_for()
         page.locator("canvas").first.wait_for()

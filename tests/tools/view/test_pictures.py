@@ -37,7 +37,7 @@ def test_each_robot_fills_its_picture(file: Path, server: viser.ViserServer, fol
 
     session = Session({str(file): file.read_text("utf-8")}, compiled, lambda *_: None)
     Panel(server, session, edit=False)
-    with page_of(address_of(server), 1400, 900) as page:
+    with page_of(address_of(server), 1400, 900, draws=True) as page:
         page.get_by_text("Frame", exact=True).wait_for()
         page.wait_for_timeout(4000)  # a picture tells nobody that it is drawn
         picture = page.screenshot(path=folder / f"{file.stem}.png")

@@ -8,7 +8,7 @@ import pytest
 import viser
 from playwright.sync_api import Browser, Page
 
-from tests.support.browser import TIMEOUT_MS, address_of, browser
+from tests.support.browser import TIMEOUT_MS, address_of, browser, new_page
 from tests.support.waiting import until
 from tests.tools.view.test_browser import enter
 from tfcompose.cli.parser import parser_of
@@ -46,8 +46,7 @@ def opened(
 ) -> Iterator[tuple[Page, Panel]]:
     """Open one more window; yield its page and its panel."""
     before = len(windows.panels)
-    page = chromium.new_page(viewport={"width": 1000, "height": 700})
-    page.set_default_timeout(TIMEOUT_MS)
+    page = new_page(chromium)
     page.goto(address_of(server), wait_until="load")
     assert until(lambda: len(windows.panels) > before, TIMEOUT_MS / 1000)
     try:

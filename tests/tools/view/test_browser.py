@@ -300,6 +300,23 @@ def test_a_tree_of_hundreds_of_frames_stays_where_it_was_scrolled_to(
         assert not in_view(page, "f250")
 
 
+def test_the_window_has_the_robots_name_and_frames_have_all_of_theirs(
+    tmp_path: Path, server: viser.ViserServer
+) -> None:
+    frame = "wrist_camera_depth_optical_frame_of_the_second_arm"
+    (tmp_path / "r.yaml").write_text(
+        f"tfcompose: 1\nrobot: rover_7\n"
+        f"frames: {{base: {{}}, {frame}: {{parent: base, xyz: [1, 0, 0]}}}}\n",
+        "utf-8",
+    )
+    Panel(server, session_of(tmp_path / "r.yaml"), edit=False)
+    with page_of(address_of(server)) as page:
+        name = in_tree(page, frame, "select")
+        name.wait_for()
+        assert name.evaluate("name => name.scrollWidth <= name.clientWidth"), "nothing is cut"
+        assert until(lambda: page.title() == "rover_7")
+
+
 def in_view(page: Page, frame: str) -> bool:
     """Return whether a row of the tree is in the picture."""
     box = page.locator(f"[data-frame={frame}]").bounding_box()

@@ -48,7 +48,7 @@ div:has(> .tf-frames) + div { display: none }
 .tf-row > input {
   flex: none; width: 0.95em; height: 0.95em; margin: 0 0.4em 0 0.1em; cursor: pointer
 }
-.tf-row > button { flex: 1; overflow: hidden; text-overflow: ellipsis; white-space: nowrap }
+.tf-row > button { flex: 1; min-width: 0; overflow-wrap: anywhere }
 .tf-row.tf-hidden > button { opacity: 0.45 } .tf-row.tf-wrong > button { color: #dc1e1e }
 .tf-row button b { color: #e8590c }
 .tf-row mark { background: #ffd43b80; color: inherit }
@@ -90,14 +90,16 @@ _LEFT = """
 const place = this.parentElement;
 setTimeout(() => { if (this.isConnected) delete place.dataset.hasKeys })"""
 #: What scrolls to the selected row, or to what is found first, when the tree is put into the page,
-#: where scripts do not run, and has the next keys go to the tree if the one before did.
+#: where scripts do not run, and has the next keys go to the tree if the one before did. It names
+#: the window after the robot, too.
 _PLACED = """<img hidden src="data:," onerror="
+document.title = this.dataset.robot;
 const tree = this.closest('.tf-frames'), selected = tree.querySelector('[aria-selected=true]');
 const row = this.dataset.scrolls === 'true' && (selected || tree.querySelector('mark'));
 if (row) row.scrollIntoView({block: 'nearest'});
 const isFree = document.activeElement === document.body;
 if (isFree && 'hasKeys' in tree.parentElement.dataset) tree.focus({preventScroll: true})"
- data-scrolls="SCROLLS">"""
+ data-robot="ROBOT" data-scrolls="SCROLLS">"""
 _NO_OWNER = (134, 142, 150)
 
 
@@ -115,6 +117,7 @@ class TreePanel:
         self, gui: viser.GuiApi, robot: Robot, colours: Mapping[str, Colour], choices: Choices
     ) -> None:
         self.tree = FrameTree(robot)
+        self._robot = escape(robot.name)
         self._choices = choices
         self._lock = threading.RLock()
         self._wrong: frozenset[str] = frozenset()
@@ -245,7 +248,8 @@ class TreePanel:
         does = ("open all", "close all", "show all") if hidden else ("open all", "close all")
         buttons = (f'<button data-does="{one}">{one}</button>' for one in does)
         header = f"<header>{' · '.join([count, *buttons])}</header>"
-        tree = f'<div role="tree">{rows}</div>{_PLACED.replace("SCROLLS", str(scrolls).lower())}'
+        placed = _PLACED.replace("SCROLLS", str(scrolls).lower()).replace("ROBOT", self._robot)
+        tree = f'<div role="tree">{rows}</div>{placed}'
         handlers = (
             f'onclick="{escape(_CLICKED)}" onkeydown="{escape(_PRESSED)}" onblur="{escape(_LEFT)}"'
         )

@@ -138,14 +138,14 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_717,
-    "model": 2_105,
-    "spec": 4_783,
-    "compiler": 9_726,
-    "tf": 5_377,
-    "guard": 4_200,
+    "foundation": 1_720,
+    "model": 2_106,
+    "spec": 4_809,
+    "compiler": 9_774,
+    "tf": 5_384,
+    "guard": 4_201,
     "launcher": 3_815,
-    "cli": 5_335,
+    "cli": 5_344,
     "tools": 11_058,
 }
 

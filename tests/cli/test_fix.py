@@ -191,6 +191,12 @@ def test_where_the_answer_is_not_safe_the_file_stays_as_it_is(why: str, tmp_path
     )
 
 
+def test_expressions_get_their_quotes_all_at_once(tmp_path: Path) -> None:
+    text = HEAD + "frames: {lidar: {parent: base_link, xyz: [-${%s/2}, ${b}, 0]}}\n"
+    meant = HEAD + 'frames: {lidar: {parent: base_link, xyz: ["${-%s/2}", "${b}", 0]}}\n'
+    assert fixed(tmp_path, text % "a") == meant % "a"
+
+
 def test_a_slip_of_the_pen_is_one_character_and_has_one_answer() -> None:
     assert [
         slip_of(word, ["parent", "xyz"])

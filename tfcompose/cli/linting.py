@@ -160,6 +160,8 @@ class _Variants:
         from tfcompose.spec.language import profiles_in
 
         known = {_identity(finding) for finding in findings}
+        # A profile that lays over another key of an entry moves the place of what was found there.
+        messages = {_judgement(finding) for finding in findings} - {None}
         more: list[Finding] = []
         variants = list(judged)
         for profile, inside in profiles_in(self.source).items():
@@ -168,9 +170,14 @@ class _Variants:
             variant = self._compile(self.given, [profile])
             variants.append(variant)
             note = Note(f"with --profile {profile}")
-            new = [finding for finding in variant.found if _identity(finding) not in known]
+            new = [
+                finding
+                for finding in variant.found
+                if _identity(finding) not in known and _judgement(finding) not in messages
+            ]
             more += [replace(finding, notes=(*finding.notes, note)) for finding in new]
             known |= {_identity(finding) for finding in new}
+            messages |= {_judgement(finding) for finding in new} - {None}
         if all(variant.robot is not None for variant in variants):
             # Otherwise a comment may be about what was not judged.
             used = {pair for variant in variants for pair in variant.used}
@@ -228,3 +235,8 @@ _Identity = tuple[str, str, "Span | None"]
 
 def _identity(finding: Finding) -> _Identity:
     return finding.code, finding.message, finding.span
+
+
+def _judgement(finding: Finding) -> tuple[str, str] | None:
+    """Return what a rule about the robot found, wherever it shows it; None for text and keys."""
+    return (finding.code, finding.message) if finding.code >= "TF2" else None

@@ -137,6 +137,10 @@ class Truth:
     value: bool
 
 
+#: Numbers with operators between them.
+_ARITHMETIC = re.compile(r"[-+(\s]*[\d.][\d.e()\s]*[-+*/][-+*/().\de\s]*")
+
+
 class UnitError(ValueError):
     """A string is not a quantity.
 
@@ -163,6 +167,8 @@ def quantity(text: str, wanted: Dimension | None = None) -> Quantity:
         named = _NAMED.fullmatch(text.strip())
         if named and not {text.strip().lower()} & {*UNITS, "inf", "nan"}:
             advice += f'; a variable or an expression is written "${{{named[1] or named[2]}}}"'
+        if _ARITHMETIC.fullmatch(text):
+            advice = 'arithmetic belongs inside the braces, as in "${a / 2}"'
         point = text.replace(",", ".")
         if _QUANTITY.fullmatch(point):
             advice = f"decimals take a point: {point}"

@@ -289,7 +289,10 @@ def not_found(missing: Sequence[NotFound]) -> Finding:
         message = f"the executable {what} was not found"
     places = dict.fromkeys(place for one in missing for place in one.places)
     paths = ["looked in the folders of PATH"] if any(one.path for one in missing) else []
-    advice = dict.fromkeys(one.advice for one in missing if one.advice)
+    # Two programs may share a part of the advice.
+    advice = dict.fromkeys(
+        part for one in missing if one.advice for part in one.advice.split("; ")
+    )
     return finding(
         "TF810",
         message,

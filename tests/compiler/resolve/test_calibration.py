@@ -448,10 +448,7 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     nominal = f"xyz: {list(back.xyz)}, quat_xyzw: {list(back.quat_xyzw)}, "
     robot = "frames: {lens: {parent: base_link, %scalibration: c.yaml}}\n"
     found = compiled(robot % nominal, c_yaml=autoware()).found
-    assert {(one.code, one.severity) for one in found} == {
-        ("TF615", "error"),
-        ("TF616", "warning"),
-    }
+    assert [(one.code, one.severity) for one in found] == [("TF615", "warning")]
     assert "c.yaml:2 (autoware)" in found[0].message
     assert "0 mm and 0 deg" in found[0].message, "the distance of the inverse"
     # A body 1 m to the left; the sensor is said to be 1 m ahead, looking left, so the way back

@@ -115,6 +115,9 @@ def _principal(
 
 
 _TIMES = 10
+#: So many grams are a kilogram, and so many times off still counts as that; what weighs less is
+#: rarely written in grams.
+_GRAMS, _GRAMS_ABOUT, _GRAMS_FROM = 1000.0, 3.0, 100.0
 
 
 @rule("TF711", of_urdf=True)
@@ -131,7 +134,10 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
         at = inertial.at or link.at
         message = f"inertia of {link.name} is {ratio:.3g} times what its mass and shape give"
         advice = "give it in kg m², about the centre of mass"
-        if not robot.is_foreign(at):
+        is_heavy = inertial.mass >= _GRAMS_FROM
+        if is_heavy and 1 / _GRAMS_ABOUT < ratio * _GRAMS < _GRAMS_ABOUT:
+            advice = f"its mass is probably in grams: write {inertial.mass / _GRAMS:g} kg"
+        elif not robot.is_foreign(at):
             advice += ", or remove inertia: it is computed"
         yield finding("TF711", message, at, help=advice)
 

@@ -47,6 +47,10 @@ if TYPE_CHECKING:
     Used = set[tuple[Allow, str]]
 
 
+#: Findings about one value, at its place.
+_OF_VALUES = frozenset({"TF410", "TF411", "TF412", "TF704", "TF705", "TF707"})
+
+
 def by_code(rules: Iterable[Rule]) -> dict[str, Rule]:
     """Return the rules by code, in the order of codes.
 
@@ -108,7 +112,26 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
                     help="this is a bug in tfcompose: please report it",
                 )
             )
-    return found
+    return _at_shared_values(found)
+
+
+def _at_shared_values(found: list[Finding]) -> list[Finding]:
+    """Return one finding for a value that several entries share through a YAML anchor.
+
+    The others stand in its notes.
+    """
+    by_place: dict[tuple[str, Span], list[Finding]] = {}
+    single = []
+    for one in found:
+        if one.span is not None and one.code in _OF_VALUES:
+            by_place.setdefault((one.code, one.span), []).append(one)
+        else:
+            single.append(one)
+    shared = [
+        replace(first, notes=(*first.notes, *(Note(other.message) for other in others)))
+        for first, *others in by_place.values()
+    ]
+    return [*single, *shared]
 
 
 def rules_of_tools(robot: Robot) -> tuple[list[Rule], list[Finding]]:

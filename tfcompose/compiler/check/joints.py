@@ -86,7 +86,8 @@ def joint_without_limits(robot: Robot) -> Iterator[Finding]:
         advice += "; a joint without limits is continuous" if joint.type == "revolute" else ""
         message = f"{joint.type} joint {joint.name} has no lower and upper limit"
         severity: Severity = "warning" if lax else "error"
-        yield finding("TF704", message, joint.at, help=advice, severity=severity)
+        at = joint.limit_at or joint.at
+        yield finding("TF704", message, at, help=advice, severity=severity)
 
 
 @rule("TF705", of_urdf=True)
@@ -106,9 +107,8 @@ def inverted_limits(robot: Robot) -> Iterator[Finding]:
                 f"{joint.name}: lower {joint.limit.lower:g} {unit} is above upper"
                 f" {joint.limit.upper:g} {unit}"
             )
-            yield finding(
-                "TF705", message, joint.at, help="swap lower and upper, or check the sign"
-            )
+            at = joint.limit_at or joint.at
+            yield finding("TF705", message, at, help="swap lower and upper, or check the sign")
 
 
 @rule("TF706", of_urdf=True)
@@ -126,7 +126,7 @@ def zero_limit(robot: Robot) -> Iterator[Finding]:
             if value is not None and value <= 0:
                 message = f"{joint.name}: {name} limit is {value:g}"
                 advice = f"give the motor's {name}, or remove it"
-                yield finding("TF706", message, joint.at, help=advice)
+                yield finding("TF706", message, joint.limit_at or joint.at, help=advice)
 
 
 #: The error of two decimals: [0.71, 0.71, 0] has length 1.004.
@@ -140,7 +140,8 @@ def axis_not_unit(robot: Robot) -> Iterator[Finding]:
         if joint and abs(joint.axis_length - 1) > _AXIS_TOLERANCE:
             axis = ", ".join(f"{part:.4g}" for part in joint.axis)
             message = f"{joint.name}: axis has length {joint.axis_length:.4g}, not 1"
-            yield finding("TF707", message, joint.at, help=f"the unit vector is [{axis}]")
+            at = joint.axis_at or joint.at
+            yield finding("TF707", message, at, help=f"the unit vector is [{axis}]")
 
 
 #: No more joints are followed than this.

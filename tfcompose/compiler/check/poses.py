@@ -243,6 +243,8 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         max(_USUAL_M, _TIMES * body, _TIMES * sorted(mounts)[len(mounts) // 2] if mounts else 0.0),
         max(_LARGEST_M, _TIMES * body),
     )
+    near = sorted(distance for distance in mounts if distance <= limit)
+    usual = near[len(near) // 2] if near else 0.0
     moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
     mounted = {sensor.name: sensor.mount for sensor in robot.sensors}
     named: dict[str | int, dict[str, str]] = {
@@ -268,9 +270,24 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
             )
             farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
             at, number = value.place(farthest), value.numbers[farthest]
-            meant = f"{number / 1000:g}" if robot.is_foreign(at) else f"{number:g} mm"
-            advice = f"a bare number is in metres; if millimetres are meant, write {meant}"
+            unit, divisor = _unit_meant(distance, usual)
+            meant = f"{number / divisor:g}"
+            if not robot.is_foreign(at):
+                meant = f"{number:g} {unit}"
+            name = "centimetres" if unit == "cm" else "millimetres"
+            advice = f"a bare number is in metres; if {name} are meant, write {meant}"
             yield finding("TF414", message, at, help=advice)
+
+
+def _unit_meant(distance: float, usual: float) -> tuple[str, float]:
+    """Return the unit, and how many are a metre, that brings a distance nearest to the usual one.
+
+    Without a usual distance they are millimetres, as in drawings.
+    """
+    units = (("mm", 1000.0), ("cm", 100.0))
+    if not usual:
+        return units[0]
+    return min(units, key=lambda unit: abs(math.log(distance / unit[1] / usual)))
 
 
 def _sizes(link: Link) -> list[float]:

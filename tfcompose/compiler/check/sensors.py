@@ -18,6 +18,7 @@ from tfcompose.compiler.check.poses import (
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.geometry import IDENTITY_XYZW, Pose, angle_between, norm
+from tfcompose.foundation.text import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,11 +41,10 @@ def calibration_probably_inverse(robot: Robot) -> Iterator[Finding]:
                 f" {why}"
             )
             advice = _if_inverse(measured)
+            if measured.nominal:
+                advice += "; if the file is right, correct the pose that is written beside it"
             note = Note("measured here", measured.at)
-            severity: Severity = "error" if measured.nominal else "warning"
-            yield finding(
-                "TF615", message, measured.named_at, help=advice, notes=[note], severity=severity
-            )
+            yield finding("TF615", message, measured.named_at, help=advice, notes=[note])
 
 
 def _if_inverse(measured: Calibration) -> str:
@@ -92,7 +92,7 @@ def _outside(robot: Robot, measured: Calibration, back: Pose, sensor: str | None
 def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
     for edge in robot.edges:
         measured = edge.calibration
-        if measured is None or _is_all_zero(measured):
+        if measured is None or _is_all_zero(measured) or _why_inverse(robot, edge):
             continue
         far, turned = measured.off(measured.pose)
         if far > measured.limit_m or turned > measured.limit_rad:
@@ -102,10 +102,21 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
             x, y, z = measured.pose.xyz
             if far > measured.limit_m >= measured.off(Pose((x / 1000, y / 1000, z / 1000)))[0]:
                 advice = "the file's positions are probably in millimetres: convert them to metres"
-            elif _why_inverse(robot, edge):
-                advice = _if_inverse(measured)
+            elif swapped := _with_w_first(measured):
+                advice = f"the file's quaternion probably has w first: write {swapped}"
             notes = [Note("measured here", measured.at)]
             yield finding("TF616", message, measured.named_at, help=advice, notes=notes)
+
+
+def _with_w_first(measured: Calibration) -> str:
+    """Return the quaternion as it is meant, if it fits the nominal pose with its w first."""
+    w, x, y, z = measured.entry.quat_xyzw
+    swapped = Pose(measured.entry.xyz, (x, y, z, w))
+    pose = swapped.inverse() if measured.inverted else swapped
+    is_far = measured.off(measured.pose)[1] > measured.limit_rad
+    if not is_far or measured.off(pose)[1] > measured.limit_rad:
+        return ""
+    return f"x: {x:g}, y: {y:g}, z: {z:g}, w: {w:g}"
 
 
 #: From here on angles are shown rounded to degrees.
@@ -187,7 +198,11 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
             message = f"{edge.sensor} and {other.sensor} are at the same pose in {edge.parent}"
             notes = [Note(f"{other.sensor} is mounted here", other.at)]
             yield finding(
-                "TF621", message, edge.at, help="measure the pose of one of them", notes=notes
+                "TF621",
+                message,
+                edge.xyz_at or edge.at,
+                help="measure the pose of one of them",
+                notes=notes,
             )
 
 
@@ -205,9 +220,9 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
             message = (
                 f"{edge.child} and {twin.child} are both at [{x:g}, {y:g}, {z:g}] in {edge.parent}"
             )
-            notes = [Note(f"{twin.child} is defined here", twin.at)]
+            notes = [Note(f"{twin.child} is defined here", twin.xyz_at or twin.at)]
             advice = "change the sign of one: y is positive to the left, x to the front"
-            yield finding("TF622", message, edge.at, help=advice, notes=notes)
+            yield finding("TF622", message, edge.xyz_at or edge.at, help=advice, notes=notes)
 
 
 @rule("TF625", follows="pose")
@@ -237,9 +252,9 @@ def sides_swapped(robot: Robot) -> Iterator[Finding]:
                 for one in (twin, edge)
             )
             message = f"{places} in {edge.parent}: each is on the other's side"
-            notes = [Note(f"{twin.child} is defined here", twin.at)]
+            notes = [Note(f"{twin.child} is defined here", twin.xyz_at or twin.at)]
             advice = "swap the signs, or the names: y is positive to the left, x to the front"
-            yield finding("TF625", message, edge.at, help=advice, notes=notes)
+            yield finding("TF625", message, edge.xyz_at or edge.at, help=advice, notes=notes)
 
 
 #: Parts of parameter names that tell two devices apart as a serial number does.
@@ -261,19 +276,29 @@ def serial_missing(robot: Robot) -> Iterator[Finding]:
                 (process.package, process.executable, sensor.serial_option), []
             ).append(sensor)
     for group in groups.values():
-        for sensor in group if len(group) > 1 else ():
+        nameless = [
+            sensor
+            for sensor in group
             if not (
                 sensor.serial
                 or robot.excuses(sensor.name)
                 or _names_device(processes[sensor.driver])
-            ):
-                other = next(one for one in group if one is not sensor)
-                message = (
-                    f"{sensor.name} has no serial number, and {other.name} has the same driver"
-                )
-                notes = [Note(f"{other.name} is defined here", other.at)]
-                advice = f'add options: {{{sensor.serial_option}: "…"}}'
-                yield finding("TF623", message, sensor.at, help=advice, notes=notes)
+            )
+        ]
+        if len(group) == 1 or not nameless:
+            continue
+        sensor = nameless[0]
+        others = [other for other in group if other is not sensor]
+        same = "the same driver"
+        if len(nameless) > 1:
+            message = (
+                f"{listed([each.name for each in nameless])} have no serial numbers, and {same}"
+            )
+        else:
+            message = f"{sensor.name} has no serial number, and {others[0].name} has {same}"
+        notes = [Note(f"{other.name} is defined here", other.at) for other in others]
+        advice = f'add options: {{{sensor.serial_option}: "…"}}'
+        yield finding("TF623", message, sensor.at, help=advice, notes=notes)
 
 
 def _names_device(process: Process) -> bool:

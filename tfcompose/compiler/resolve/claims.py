@@ -284,9 +284,10 @@ class _Work:
                 f"its switch, {switch_text(claim.off)}, stops its own edge too: name it as the"
                 f" owner of both{hint}"
             )
+        switch = switch_text(claim.off)
         return (
-            f"set {switch_text(claim.off)} where {claimant.process.name} is started, or name it as"
-            f" the owner{hint}"
+            f"set {switch} where {claimant.process.name} is started, and write"
+            f" params: {{{switch}}} here, so that lint knows; or name it as the owner{hint}"
         )
 
     def _undeclared(self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str) -> None:

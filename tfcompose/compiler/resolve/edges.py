@@ -107,6 +107,7 @@ def add_edge(  # noqa: PLR0913 (an edge has that many parts)
         free=free,
         joint_name=joint_name or "",
         joint_at=joint_at,
+        xyz_at=spec.spans.exactly_at((*at, "xyz")),
         child_at=spec.at((*at, "child")) if at[0] == "joints" else None,
         entry=at,
         owner_at=spec.at((*at, "owner")) if keys.owner else None,

@@ -23,7 +23,14 @@ from tfcompose.compiler.urdf.schema import (
     unknown_words,
     version_of,
 )
-from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
+from tfcompose.foundation.findings import (
+    Finding,
+    Note,
+    RejectedError,
+    did_you_mean,
+    finding,
+    nearest,
+)
 from tfcompose.foundation.geometry import norm
 from tfcompose.model.robot import (
     FREE,
@@ -222,6 +229,8 @@ def _edge(element: Element, values: AttributeReader) -> Edge | None:
     if kind and kind not in JOINT_TYPES:
         advice = did_you_mean(kind, JOINT_TYPES, f"one of: {', '.join(JOINT_TYPES)}")
         values.refuse(f"unknown joint type {kind}", element.at_value("type"), advice)
+        # What follows from it is judged as if it were right.
+        kind = nearest(kind, JOINT_TYPES) or kind
     ends = {}
     for tag in ("parent", "child"):
         end = element.first(tag)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding, slip_of
+from tfcompose.foundation.geometry import norm
 from tfcompose.foundation.text import listed, with_more
 from tfcompose.foundation.tree import loops, trees
+from tfcompose.tf.live.edges import LEAST_LENGTH
 from tfcompose.tf.live.state import who
 
 if TYPE_CHECKING:
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
 
 #: So many publishers are named of one frame.
 MOST_NOTES = 8
-_ZERO = 1e-9
 _FIX = "fix what the node computes it from; until then the frame does not exist"
 _FIX_SOME = "fix what the node computes it from; tf2 uses the messages before and after"
 _NORMALISE = (
@@ -98,10 +99,10 @@ def rejected_transforms(edge: EdgeState) -> Iterator[Finding]:
     what, why, advice = "which tf2 drops", stream.rejected.text, _FIX
     if stream.rejections < stream.arrivals.count:
         advice = _FIX_SOME
-    length = sum(part * part for part in (stream.rejected_row or stream.row)[7:11]) ** 0.5
+    length = norm((stream.rejected_row or stream.row)[7:11])
     if stream.rejected.name == "DENORMALISED":
         why = f"its quaternion has length {length:.3f}"
-        if length > _ZERO:
+        if length > LEAST_LENGTH:
             what, advice = "which is not a rotation", _NORMALISE
     name = f"{stream.parent or '(no frame)'} → {stream.child or '(no frame)'}"
     often = "" if stream.static else f" ({stream.rejections} of {stream.arrivals.count})"

@@ -152,7 +152,7 @@ class Edge(PlanEdge):
     floating joint, of which joint states say nothing. ``other_axes``: the vendor's name for the
     frame does not say whether it is optical, or says it wrongly. ``optical_edits`` returns the
     edits of the file that give the edge the optical rotation of REP-103; none where that is not
-    safe.
+    safe. ``xyz_at`` is where its position was written, if it was.
     """
 
     node: str = field(default="", kw_only=True)
@@ -166,6 +166,7 @@ class Edge(PlanEdge):
     owner_at: Span | None = field(default=None, kw_only=True)
     child_at: Span | None = field(default=None, kw_only=True)
     joint_at: Span | None = field(default=None, kw_only=True)
+    xyz_at: Span | None = field(default=None, kw_only=True)
     sensor: str | None = field(default=None, kw_only=True)
     nominal: bool = field(default=False, kw_only=True)
     rate_at: Span | None = field(default=None, kw_only=True)

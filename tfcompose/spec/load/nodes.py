@@ -156,7 +156,7 @@ class DocumentReader:
                 elif kind is DocumentStartEvent:
                     self._begin(event, single=single)
         except yaml.MarkedYAMLError as error:
-            raise RejectedError([no_syntax(error, text, self.file)]) from None
+            raise RejectedError(no_syntax(error, text, self.file)) from None
         except yaml.reader.ReaderError as error:
             raise RejectedError([no_character(error, text, self.file)]) from None
         except UnicodeEncodeError as error:

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import yaml
 
-from tfcompose.foundation.findings import Finding, Note, Span, finding
+from tfcompose.foundation.findings import Edit, Finding, Note, Span, finding
 from tfcompose.foundation.text import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 
 def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Finding:
@@ -30,8 +30,12 @@ def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Findin
     )
 
 
-def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
-    """Return the finding for text that the parser refuses, with where it began."""
+def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> list[Finding]:
+    """Return the finding for text that the parser refuses, with where it began.
+
+    Where an expression lacks its quotes, each other one in the text that does has a finding too:
+    the parser stops at the first.
+    """
     mark, began = error.problem_mark or error.context_mark, error.context_mark
     lines = text.splitlines()
     message = ", ".join(filter(None, (error.context, error.problem)))
@@ -41,6 +45,10 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
         (began.line, began.column) if began else None,
         message,
     )
+    if "parsing a flow" in message and "${" in fault.stopped:
+        bare = list(bare_expressions(text, file))
+        if any(one.span and one.span.line == fault.at[0] + 1 for one in bare):
+            return bare
     diagnosis = next((found for known in _DIAGNOSES if (found := known(fault))), None)
     line, column = diagnosis.at if diagnosis else fault.at
     place = Span(file, line + 1, column + 1, line + 1, column + 2)
@@ -49,8 +57,8 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
         first, left = fault.began
         notes = [Note("it began here", Span(file, first + 1, left + 1, first + 1, left + 2))]
     if diagnosis is None:
-        return finding("TF002", message, place, notes=notes)
-    return finding("TF002", diagnosis.message, place, help=diagnosis.help, notes=notes)
+        return [finding("TF002", message, place, notes=notes)]
+    return [finding("TF002", diagnosis.message, place, help=diagnosis.help, notes=notes)]
 
 
 def no_yaml(text: str, file: str) -> Finding:
@@ -67,6 +75,69 @@ def no_yaml(text: str, file: str) -> Finding:
         Span(file),
         help=advice if "<robot" in text else "",
     )
+
+
+#: What may stand in a line of YAML, as far as brackets and expressions go: a comment, a text in
+#: quotes, a bracket, the end of a value, a value without quotes that holds an expression, another.
+_TOKENS = re.compile(
+    r"""
+    (?P<comment> (?:(?<=\s)|^)\#.* )
+    | (?P<quoted> "(?:\\.|[^"\\])*" | '(?:''|[^'])*' )
+    | (?P<bare>
+        (?: [^\s,\[\]{}"'\#$] | \$(?!\{) )*
+        (?: \$\{[^{}"']*\} [^\s,\[\]{}"'$]* (?: \s*[-+*/]\s*(?=[\d$.]) )? )+
+        [\d.]*
+      )
+    | (?P<open> [\[{] ) | (?P<close> [\]}] )
+    | (?P<other> [^\s\[\]{}"'\#$]+ | . )
+    """,
+    re.MULTILINE | re.VERBOSE,
+)
+#: What is arithmetic around an expression, with the expressions taken out.
+_ARITHMETIC = re.compile(r"[-+*/().\d\s]*")
+
+
+def bare_expressions(text: str, file: str) -> Iterator[Finding]:
+    """Find expressions inside [ ] or { } that lack their quotes.
+
+    The edit puts the whole value into one pair of quotes, and arithmetic into the braces.
+    """
+    depth, line, begin = 0, 1, 0
+    for token in _TOKENS.finditer(text):
+        line += text.count("\n", begin, token.start())
+        begin = token.start()
+        if token.lastgroup == "open":
+            depth += 1
+        elif token.lastgroup == "close":
+            depth = max(0, depth - 1)
+        if token.lastgroup != "bare" or not depth:
+            continue
+        value = token[0].rstrip()
+        column = begin - text.rfind("\n", 0, begin)
+        span = Span(file, line, column, line, column + len(value))
+        quoted = f'"{_in_braces(value)}"'
+        yield finding(
+            "TF002",
+            f"{value} needs quotes inside [ ] or {{ }}",
+            span,
+            help=f"write {quoted}",
+            edits=[Edit(span, quoted)],
+        )
+
+
+def _in_braces(value: str) -> str:
+    """Return a value whose arithmetic is inside of the braces of its expression."""
+    rest = _EXPRESSION.sub("", value)
+    if not rest or not _ARITHMETIC.fullmatch(rest):
+        return value
+    inner = _EXPRESSION.sub(lambda found: _operand(found[0][2:-1].strip()), value)
+    return f"${{{inner}}}"
+
+
+def _operand(expression: str) -> str:
+    """Return an expression as an operand of a product: a sum needs brackets."""
+    is_sum = re.search(r"[^\s*/(+-]\s*[-+]", expression)
+    return f"({expression})" if is_sum else expression
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,19 +309,6 @@ def _comment(fault: _Fault) -> _Diagnosis | None:
     )
 
 
-def _bare_expression(fault: _Fault) -> _Diagnosis | None:
-    column = fault.at[1]
-    if (
-        "parsing a flow" not in fault.message
-        or "${" not in fault.stopped[max(0, column - 2) : column + 2]
-    ):
-        return None
-    expression = _EXPRESSION.search(fault.stopped)
-    example = expression[0] if expression else "${x}"
-    message = f"{example} needs quotes inside [ ] or {{ }}"
-    return _Diagnosis(fault.at, message, f'write "{example}"', has_beginning=True)
-
-
 def _open_bracket(fault: _Fault) -> _Diagnosis | None:
     """A bracket that is closed nowhere, or by one of the other kind."""
     if not fault.began or "parsing a flow" not in fault.message:
@@ -301,7 +359,6 @@ _DIAGNOSES: tuple[Callable[[_Fault], _Diagnosis | None], ...] = (
     _pair_above,
     _below_a_value,
     _between_levels,
-    _bare_expression,
     _open_bracket,
     _open_quote,
 )

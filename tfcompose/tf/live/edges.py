@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.geometry import Pose
+from tfcompose.foundation.geometry import Pose, norm
 from tfcompose.foundation.tree import below, children_of, drawn, loops, trees
 from tfcompose.tf.live.arrivals import Arrivals, Timing
 from tfcompose.tf.live.flood import MOST_EDGES, MOST_OF_ONE
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 SETTLE_S = 0.3
 #: A frame that stays in each parent for so many transforms, or more, in the mean, is handed over.
 MIN_RUN = 3
+#: A shorter quaternion is no rotation.
+LEAST_LENGTH = 1e-9
 _SECOND_NS = 1_000_000_000
 
 
@@ -96,6 +98,18 @@ class EdgeStream:
     slashed: bool = False
     handover: Handover | None = None
     begun: int = 0
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether tf2 takes any of it.
+
+        tf2 on Jazzy makes a matrix of a quaternion before it looks at it, which normalises one of
+        another length than 1; one of length 0 stays none.
+        """
+        if self.rejections < self.arrivals.count:
+            return True
+        is_rotation = norm(self.row[7:11]) > LEAST_LENGTH
+        return self.rejected is Rejection.DENORMALISED and is_rotation
 
     @property
     def pose(self) -> Pose:

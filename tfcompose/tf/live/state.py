@@ -139,7 +139,7 @@ class TreeState:
     @property
     def taken(self) -> list[EdgeState]:
         """The edges that tf2 takes, of each publisher."""
-        return [edge for edge in self.edges if edge.stream.rejections < edge.stream.arrivals.count]
+        return [edge for edge in self.edges if edge.stream.is_taken]
 
     @property
     def moving(self) -> list[EdgeState]:

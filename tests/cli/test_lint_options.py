@@ -59,6 +59,19 @@ def test_a_code_that_is_none_or_cannot_be_silenced_is_refused(codes: str, folder
     assert tfcompose_in(folder, "lint", "wrong.yaml", "--ignore", codes).returncode == 2
 
 
+def test_of_more_than_ten_findings_of_one_code_the_rest_is_counted(
+    folder: Path,
+) -> None:
+    links = "".join(f"  l{n}: {{parent: unknown{n}}}\n" for n in range(13))
+    (folder / "many.yaml").write_text(
+        f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{links}"
+    )
+    folded = tfcompose_in(folder, "lint", "many.yaml").stdout
+    assert (folded.count("[TF203]"), folded.count("3 more TF203")) == (10, 1)
+    every = tfcompose_in(folder, "lint", "--all", "many.yaml").stdout
+    assert (every.count("[TF203]"), every.count("more TF203")) == (13, 0)
+
+
 def test_standard_input_is_linted_with_its_lines(folder: Path) -> None:
     done = processes.run([sys.executable, "-m", "tfcompose", "lint", "-"], stdin=WRONG, cwd=folder)
     assert done.returncode == 1

@@ -18,7 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.reading import read_text
-from tfcompose.cli.terminal import fail, plain, print_findings, printable, reject
+from tfcompose.cli.terminal import (
+    MOST_OF_ONE_CODE,
+    fail,
+    plain,
+    print_findings,
+    printable,
+    reject,
+)
 from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.resolve import Library
 from tfcompose.compiler.urdf.inertia import UnmeasurableError
@@ -187,7 +194,7 @@ def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Com
         reject(error.findings)
     if compiled.robot is None or compiled.errors:
         reject(compiled.found)
-    print_findings(compiled.found, sys.stderr)
+    print_findings(compiled.found, sys.stderr, most=MOST_OF_ONE_CODE)
     return compiled.robot, compiled
 
 

@@ -6,6 +6,7 @@ import os
 import re
 import select
 import sys
+from collections import Counter
 from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
 
@@ -49,11 +50,29 @@ def fail(message: str, code: int = FAILED) -> NoReturn:
     raise SystemExit(code)
 
 
-def print_findings(found: Sequence[Finding], stream: TextIO) -> None:
-    """Print findings for people, with the lines that they are about."""
+#: So many findings of one code are printed of a file, unless all are requested.
+MOST_OF_ONE_CODE = 10
+
+
+def print_findings(found: Sequence[Finding], stream: TextIO, *, most: int | None = None) -> None:
+    """Print findings for people, with the lines that they are about.
+
+    ``most`` of one code are printed of a file, and how many more there are; None: all.
+    """
     from tfcompose.cli.reading import line_of
 
-    stream.write(render_text(found, line_of, colour=coloured(stream)))
+    shown: list[Finding] = []
+    counts: Counter[tuple[str, str]] = Counter()
+    for one in found:
+        place = (one.span.file if one.span else "", one.code)
+        counts[place] += 1
+        if most is None or counts[place] <= most:
+            shown.append(one)
+    stream.write(render_text(shown, line_of, colour=coloured(stream)))
+    for (file, code), count in counts.items():
+        if most is not None and count > most:
+            where, how = (f"{file}: ", "; tfcompose lint --all lists them") if file else ("", "")
+            stream.write(f"{where}and {count - most} more {code}{how}\n")
 
 
 def reject(found: Sequence[Finding], code: int | None = None) -> NoReturn:
@@ -62,7 +81,7 @@ def reject(found: Sequence[Finding], code: int | None = None) -> NoReturn:
     Raises:
         SystemExit: with the exit code, unless given that of ``exit_code_of``.
     """
-    print_findings(found, sys.stderr)
+    print_findings(found, sys.stderr, most=MOST_OF_ONE_CODE)
     raise SystemExit(code or exit_code_of(found))
 
 

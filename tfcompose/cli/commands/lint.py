@@ -16,6 +16,7 @@ from tfcompose import __version__
 from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
 from tfcompose.cli.robot_search import YAML_ENDINGS, is_robot, robots_in
 from tfcompose.cli.terminal import (
+    MOST_OF_ONE_CODE,
     UNREADABLE,
     can_redraw,
     exit_code_of,
@@ -94,6 +95,11 @@ def arguments(parser: ArgumentParser) -> None:
         default=[],
         metavar="CODES",
         help="do not report these codes",
+    )
+    parser.add_argument(
+        "--all",
+        action="store_true",
+        help=f"print each finding, not {MOST_OF_ONE_CODE} of one code of a file and how many more",
     )
     parser.add_argument(
         "--skip-foreign",
@@ -292,7 +298,7 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
         from tfcompose.compiler.render.text import summary
 
         stream = sys.stderr if arguments.diff else sys.stdout
-        print_findings(found, stream)
+        print_findings(found, stream, most=None if arguments.all else MOST_OF_ONE_CODE)
         stream.write(summary(found, files, warnings_fail=arguments.fail_on == "warning"))
     elif form == "json":
         from tfcompose.compiler.render.formats import render_json

@@ -23,7 +23,7 @@ from tfcompose.foundation.geometry import (
     quat_from_matrix,
     quat_from_rpy,
 )
-from tfcompose.foundation.units import Angle, Length, Number, Rate, WithUnit, refused
+from tfcompose.foundation.units import Angle, Length, Number, Rate, refused
 from tfcompose.spec.language.spec import Checked, Entry, Spec, key, several
 from tfcompose.spec.language.values import (
     Axis,
@@ -100,25 +100,6 @@ class AxisAngle(Spec):
     angle: Angle = key(..., "the angle of rotation")
 
 
-def _not_over_the_top(angle: float) -> float:
-    """Return the angle.
-
-    Raises:
-        PydanticCustomError: if it is more than a quarter turn.
-    """
-    is_in_degrees = not isinstance(angle, WithUnit) and abs(angle) > math.pi
-    if is_in_degrees or abs(angle) <= math.pi / 2 + UNIT_TOLERANCE:
-        return angle  # that degrees were meant is TF410
-    message = (
-        f"{math.degrees(angle):.4g} deg is beyond the vertical, where the view is upside down"
-    )
-    advice = "straight down or up is 90 deg; to look backwards add left: 180 deg"
-    raise refused("TF106", message, advice)
-
-
-Steep = TypeAliasType("Steep", Annotated[Angle, AfterValidator(_not_over_the_top)])
-
-
 class LookAngles(Checked):
     """A direction by the angles that lead to it from straight ahead."""
 
@@ -127,8 +108,8 @@ class LookAngles(Checked):
         frozenset({"left", "right"}),
     )
 
-    up: Steep | None = key(None, "how far the direction points up, at most 90 deg", "15 deg")
-    down: Steep | None = key(None, "how far the direction points down, at most 90 deg", "15 deg")
+    up: Angle | None = key(None, "how far the direction points up")
+    down: Angle | None = key(None, "how far the direction points down")
     left: Angle | None = key(None, "how far the direction points left")
     right: Angle | None = key(None, "how far the direction points right")
     roll: Angle = key(0.0, "roll about the viewing direction, right-handed")

@@ -212,6 +212,25 @@ def camera_looks_away(robot: Robot) -> Iterator[Finding]:
             yield finding("TF413", message, sensor.at, help=advice)
 
 
+_ROUNDING_RAD = 1e-6
+
+
+@rule("TF415")
+def look_past_vertical(robot: Robot) -> Iterator[Finding]:
+    for value in robot.source_numbers:
+        for index, step in enumerate(value.steps if value.key == "look" else ()):
+            angle = value.numbers[index]
+            if step not in {"up", "down"} or abs(angle) <= math.pi / 2 + _ROUNDING_RAD:
+                continue
+            degrees = math.degrees(angle)
+            message = f"{value.entry} looks {step} by {degrees:g} deg, past the vertical"
+            advice = (
+                "it looks back, upside down; if it is to be upright, write left: 180 deg and at"
+                f" most 90 deg {step}"
+            )
+            yield finding("TF415", message, value.place(index), help=advice)
+
+
 #: No part of an ordinary robot is farther from its mount; larger robots are known by their bodies
 #: and mounts.
 _USUAL_M = 5.0

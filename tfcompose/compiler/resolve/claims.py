@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
-from tfcompose.foundation.findings import Finding, RejectedError, Span, did_you_mean, finding
+from tfcompose.compiler.resolve.presets import node_preset, preset_of, unknown_node_preset
+from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
 from tfcompose.model.plan import switch_text
 from tfcompose.model.robot import BUILT_IN, Claim, Edge, Node, Process
 
@@ -32,7 +32,7 @@ def settle_claims(draft: Draft) -> Iterator[Finding]:
     """Settle claims by parameters, and yield those that cannot be settled."""
     robot = draft.robot
     if not any(
-        declared.nodes or declared.publishes or (declared.node and declared.node.preset)
+        declared.nodes or declared.publishes or preset_of(declared.node)
         for declared in draft.spec.processes.values()
     ):
         return
@@ -108,7 +108,7 @@ class _Work:
         name = (
             inner.preset
             if inner
-            else declared.node.preset
+            else preset_of(declared.node)
             if declared.node and not declared.nodes
             else None
         )
@@ -134,11 +134,7 @@ class _Work:
         try:
             return node_preset(name)
         except KeyError:
-            names = node_preset_names()
-            advice = did_you_mean(name, names, f"there is {', '.join(names)}")
-            self.found.append(
-                finding("TF601", f"unknown node preset {name}", self.spec.at(path), help=advice)
-            )
+            self.found.append(unknown_node_preset(name, self.spec.at(path)))
         except RejectedError as error:
             self.found += error.findings
         return None

@@ -242,7 +242,11 @@ def _numbers(numbers: dict[Any, float], path: Path, spans: Spans) -> SourceNumbe
     values = tuple(numbers.values())
     with_unit = tuple(isinstance(value, WithUnit) for value in values)
     return SourceNumbers(
-        path, tuple(map(float, values)), with_unit, lambda index: spans.at((*path, steps[index]))
+        path,
+        tuple(map(float, values)),
+        with_unit,
+        lambda index: spans.at((*path, steps[index])),
+        steps=tuple(steps),
     )
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Mapping
 
     from tfcompose.spec.language.preset import Option, PresetFrame
+    from tfcompose.spec.language.process import NamedNode
     from tfcompose.spec.language.robot import RobotSpec, SensorSpec
     from tfcompose.spec.load import Path, Source
 
@@ -383,12 +384,53 @@ def node_preset_names() -> tuple[str, ...]:
 
 @cache
 def node_preset(name: str) -> NodePresetSpec:
-    """Return the preset.
+    """Return the preset of this name, or of PACKAGE/NAME.
 
     Raises:
         KeyError: if there is none of that name.
         RejectedError: if the preset itself is wrong.
     """
-    file = _node_files()[name]
+    package, _, short = name.rpartition("/")
+    file = _node_files()[short]
     place = f"presets/nodes/{file.parent.name}/{file.name}"
-    return validate_file(NodePresetSpec, load(file.read_text("utf-8"), place))
+    preset = validate_file(NodePresetSpec, load(file.read_text("utf-8"), place))
+    if package not in {"", preset.package}:
+        raise KeyError(name)
+    return preset
+
+
+def is_node_preset(name: str) -> bool:
+    """Return whether there is a preset of this name, or of PACKAGE/NAME."""
+    try:
+        node_preset(name)
+    except KeyError:
+        return False
+    except RejectedError:
+        pass
+    return True
+
+
+def unknown_node_preset(name: str, at: Span) -> Finding:
+    """Return the finding for a name that no preset of a node has."""
+    names = node_preset_names()
+    advice = did_you_mean(name.rpartition("/")[2], names, f"there is {', '.join(names)}")
+    return finding("TF601", f"unknown node preset {name}", at, help=advice)
+
+
+def preset_of(node: NamedNode | None) -> str | None:
+    """Return the name of a node's preset, None where it has none.
+
+    A node's own name that is PACKAGE/NAME of a preset is that, too.
+    """
+    if node is None or node.preset is not None:
+        return node.preset if node else None
+    if node.name is not None and "/" in node.name and is_node_preset(node.name):
+        return node.name
+    return None
+
+
+def name_of(node: NamedNode | None) -> str | None:
+    """Return the name that a node was given, None where that is its preset's."""
+    if node is None or (node.preset is None and preset_of(node)):
+        return None
+    return node.name

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.compiler.resolve.poses import pose_of
-from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
+from tfcompose.compiler.resolve.presets import (
+    is_node_preset,
+    name_of,
+    node_preset,
+    preset_of,
+    unknown_node_preset,
+)
 from tfcompose.foundation.findings import Note, did_you_mean, finding
 from tfcompose.model.plan import Ready, Simulation, Sweep
 from tfcompose.model.robot import (
@@ -31,6 +37,7 @@ from tfcompose.spec.language.process import (
     SIMULATIONS,
     SWEEP,
     ReadySpec,
+    Run,
     ScheduleSpec,
     StopSpec,
     keys_of,
@@ -48,7 +55,6 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.process import (
         ContainerSpec,
         ProcessSpec,
-        Run,
         Simulate,
         Started,
     )
@@ -78,9 +84,10 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
     if declared.component and declared.container:
         process = Process(name, "component", at=place, ros_nodes=nodes)
         return replace(process, **how(declared, namespace, "component"))
-    if declared.run and declared.run.is_startable:
+    run = _run_of(declared)
+    if run and run.is_startable:
         process = Process(name, "run", at=place, ros_nodes=nodes)
-        started = program(declared.run, shell=bool(declared.shell))
+        started = program(run, shell=bool(declared.shell))
         return replace(process, **how(declared, namespace), **started)
     if _is_way_refused(name, validated):
         return None
@@ -88,6 +95,10 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
         advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
         message = f"{name}: run needs package and executable"
         yield finding("TF102", message, spec.at_key((*at, "run")), help=advice)
+        return None
+    preset = preset_of(declared.node)
+    if preset is not None and not is_node_preset(preset):
+        yield unknown_node_preset(preset, spec.at((*at, "node", "preset")))
         return None
     advice = (
         "run: {package: …, executable: …}, component: PACKAGE/CLASS, simulate: {…}, or external:"
@@ -143,7 +154,7 @@ def _is_way_refused(name: str, validated: Validated) -> bool:
         if path[:2] == ("processes", name) and len(path) > 2  # noqa: PLR2004
     ]
     return any(
-        way in RUNNING | {"container"} or habit(str(way), {"run"})
+        way in RUNNING | {"container", "preset"} or habit(str(way), {"run"})
         for way, *rest in refused
         if not rest or way != "run" or isinstance(rest[0], int) or rest[0] != "args"
     )
@@ -509,16 +520,30 @@ def names_files(params: dict[str, Any]) -> bool:
 
 def _usual(declared: ProcessSpec) -> str | None:
     """Return the name that a known node has where tfcompose cannot give it another."""
-    if (
-        declared.node is None
-        or declared.node.preset is None
-        or (declared.run and declared.run.package)
-    ):
+    preset = preset_of(declared.node)
+    run = _run_of(declared)
+    if preset is None or not is_node_preset(preset) or (run and run.package):
         return None
-    return (
-        node_preset(declared.node.preset).node
-        if declared.node.preset in node_preset_names()
-        else None
+    return node_preset(preset).node
+
+
+def _run_of(declared: ProcessSpec) -> Run | None:
+    """Return what starts a process: what is written, completed by its node's preset."""
+    run, preset = declared.run, preset_of(declared.node)
+    if run and run.is_startable:
+        return run
+    is_otherwise = declared.external or declared.simulate or declared.component
+    if is_otherwise or preset is None or not is_node_preset(preset):
+        return run
+    known = node_preset(preset)
+    if not known.executable:
+        return run
+    started = run or Run()
+    return started.model_copy(
+        update={
+            "package": started.package or known.package,
+            "executable": started.executable or known.executable,
+        }
     )
 
 
@@ -529,7 +554,7 @@ def nodes_of(
     at: Path = ("processes", name)
     if not declared.nodes:
         place = spec.at((*at, "node")) if declared.node else spec.at_key(at)
-        own_name = (declared.node.name if declared.node else None) or _usual(declared)
+        own_name = name_of(declared.node) or _usual(declared)
         node = full_name(namespace, own_name or name)
         return (Node(node, place, at, declared.params, declared.lifecycle),)
     if declared.publishes:

@@ -87,7 +87,8 @@ class SourceNumbers:
 
     ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each
     number whether it stands there with a unit, and ``place`` where the number of an index stands.
-    ``in_part`` is the entry's name in the whole robot where the file is that of a part.
+    ``in_part`` is the entry's name in the whole robot where the file is that of a part. ``steps``
+    are the keys or indices of the numbers, as far as they are known.
     """
 
     path: tuple[str | int, ...]
@@ -95,6 +96,7 @@ class SourceNumbers:
     with_unit: tuple[bool, ...]
     place: Callable[[int], Span] = field(compare=False, repr=False)
     in_part: str = ""
+    steps: tuple[str | int, ...] = ()
 
     @property
     def key(self) -> str:

@@ -205,7 +205,10 @@ _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
                 ),
             ),
         ),
-        ("preset", (("node", "the preset of a node is node: {preset: VALUE}"),)),
+        (
+            "preset",
+            (("node", "the preset of a node is node: {preset: VALUE}; it knows what to start"),),
+        ),
         (
             "namespace domain_id rmw frame_prefix clock discovery distro",
             (("ros", "it belongs under ros: {WORD: VALUE}"),),

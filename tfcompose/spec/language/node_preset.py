@@ -70,6 +70,9 @@ class NodePresetSpec(Spec):
     preset: Literal[1] = key(..., "the version of this language", 1)
     node: Text = key(..., "the node's own name", "slam_toolbox")
     package: Text = key(..., "its package", "slam_toolbox")
+    executable: Text = key(
+        "", "the executable that starts it; none where another program does", "ekf_node"
+    )
     about: Text = key(..., "what it is, in a sentence")
     frames: dict[str, Role] = key({}, "the parameter that names the frame of each role")
     publishes: tuple[ClaimSpec, ...] = key(..., "the edges that it publishes")

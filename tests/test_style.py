@@ -139,9 +139,9 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
     "foundation": 1_720,
-    "model": 2_106,
-    "spec": 4_800,
-    "compiler": 9_774,
+    "model": 2_107,
+    "spec": 4_801,
+    "compiler": 9_834,
     "tf": 5_384,
     "guard": 4_201,
     "launcher": 3_815,

@@ -76,7 +76,7 @@ def test_a_filter_that_sends_another_edge_than_its_own_is_found() -> None:
     output = {"preset: ekf}": "preset: ekf}, params: {base_link_frame_output: base_footprint}"}
     (found,) = compiled(**output).found
     assert found.code == "TF333"
-    assert {"base_link_frame_output", "base_footprint", "base_link"} <= words(found)
+    assert {"base_link_frame_output", "'base_footprint'", "'base_link'"} <= words(found)
 
 
 def test_unusual_names_are_set_too() -> None:

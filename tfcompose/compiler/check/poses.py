@@ -216,11 +216,13 @@ _ROUNDING_RAD = 1e-6
 
 
 @rule("TF415")
-def look_past_vertical(robot: Robot) -> Iterator[Finding]:
+def tilted_past_vertical(robot: Robot) -> Iterator[Finding]:
     for value in robot.source_numbers:
         for index, step in enumerate(value.steps if value.key == "look" else ()):
             angle = value.numbers[index]
-            if step not in {"up", "down"} or abs(angle) <= math.pi / 2 + _ROUNDING_RAD:
+            if step not in {"up", "down"} or not value.with_unit[index]:
+                continue  # without a unit it may be meant in degrees: TF410
+            if abs(angle) <= math.pi / 2 + _ROUNDING_RAD:
                 continue
             degrees = math.degrees(angle)
             message = f"{value.entry} looks {step} by {degrees:g} deg, past the vertical"

@@ -299,14 +299,14 @@ with open_node("far", ""):
 """
 
 
+@pytest.mark.alone
 @pytest.mark.slow
 def test_a_robot_in_another_domain_is_observed_by_its_process(domain: Any) -> None:
     """It runs on this machine, and it cannot be heard.
 
     The process says in which domain it was started.
 
-    It is slow so that it runs alone: of many such processes on a machine doctor names the first
-    few.
+    It runs alone: of many such processes on a machine doctor names the first few.
     """
     environment = {**domain.environment, "ROS_DOMAIN_ID": "101"}
     command = [sys.executable, "-c", FAR]

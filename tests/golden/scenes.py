@@ -92,9 +92,9 @@ from tfcompose.tf.bags import BagError
 from tfcompose.tf.live.publishers import Message, OtherRun, Publisher, Senders
 from tfcompose.tf.live.state import (
     NO_NODE,
-    JointSender,
     MovingJoint,
     RosProcess,
+    SentJoints,
     StampedData,
     TopicState,
     TreeState,
@@ -227,17 +227,17 @@ def _graphs() -> Iterator[TreeState]:
     yield sound_tree().observed(
         graph=(heard,),
         moving_joints=joints,
-        joint_senders=(_sender("/broadcaster", "sholder"),),
+        sent_joints=(_sender("/broadcaster", "sholder"),),
     )
     rogue = _sender("/rogue", "shoulder")
     for other in (_sender("/broadcaster", "shoulder", "elbow"), rogue):
         yield sound_tree().observed(
-            graph=(heard,), moving_joints=joints, joint_senders=(other, rogue)
+            graph=(heard,), moving_joints=joints, sent_joints=(other, rogue)
         )
 
 
-def _sender(node: str, *joints: str) -> JointSender:
-    return JointSender("/joint_states", node, frozenset(joints), 0, SECOND_NS)
+def _sender(node: str, *joints: str) -> SentJoints:
+    return SentJoints("/joint_states", node, frozenset(joints), 0, SECOND_NS)
 
 
 def _data() -> Iterator[TreeState]:

@@ -57,7 +57,7 @@ class JointWatch:
         for states in self._topics:
             states.take()
             states.forget(wall_ns() - SENDS_NO_MORE_NS)
-            senders = states.senders()
+            senders = states.sent()
             for wrong in (*sent_twice(senders), *unknown_joints(senders, self._joints)):
                 found[wrong.code, wrong.message] = wrong
         for key, wrong in found.items():

@@ -5,13 +5,13 @@ import pytest
 from tests.support.tree_history import SECOND_NS, sound_tree
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.joints import sent_twice, unknown_joints
-from tfcompose.tf.live.state import JointSender, MovingJoint, TopicState
+from tfcompose.tf.live.state import MovingJoint, SentJoints, TopicState
 
 TOPIC = "/joint_states"
 
 
-def sender(node: str, *joints: str, first_s: float = 0.0, last_s: float = 10.0) -> JointSender:
-    return JointSender(
+def sender(node: str, *joints: str, first_s: float = 0.0, last_s: float = 10.0) -> SentJoints:
+    return SentJoints(
         TOPIC, node, frozenset(joints), int(first_s * SECOND_NS), int(last_s * SECOND_NS)
     )
 
@@ -42,7 +42,7 @@ def sender(node: str, *joints: str, first_s: float = 0.0, last_s: float = 10.0) 
         ),
     ],
 )
-def test_a_joint_has_one_sender(senders: list[JointSender], names: list[str]) -> None:
+def test_a_joint_has_one_sender(senders: list[SentJoints], names: list[str]) -> None:
     found = list(sent_twice(senders))
     assert [one.code for one in found] == ["TF860"] * bool(names)
     assert all(name in one.message for one in found for name in names)
@@ -62,5 +62,5 @@ def test_doctor_judges_the_topic_of_this_robot_alone() -> None:
     heard = TopicState(TOPIC, "sensor_msgs/msg/JointState", ("/wheels", "/rogue"), ("/drive",))
     other = TopicState("/else/states", heard.type, heard.publishers, heard.readers)
     for topic, expected in ((heard, True), (other, False)):
-        state = sound_tree().observed(graph=(topic,), moving_joints=joints, joint_senders=senders)
+        state = sound_tree().observed(graph=(topic,), moving_joints=joints, sent_joints=senders)
         assert ("TF860" in {one.code for one in diagnose(state)}) is expected

@@ -13,7 +13,7 @@ from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.model.robot import Material, Robot, Shape
+    from tfcompose.model.robot import Link, Material, Robot, Shape
 
 
 @rule("TF709", of_urdf=True)
@@ -115,16 +115,13 @@ def _principal(
 
 
 _TIMES = 10
-#: So many grams are a kilogram, and so many times off still counts as that; what weighs less is
-#: rarely written in grams.
-_GRAMS, _GRAMS_ABOUT, _GRAMS_FROM = 1000.0, 3.0, 100.0
 
 
 @rule("TF711", of_urdf=True)
 def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
     for link in robot.links.values():
         inertial = link.inertial
-        if inertial is None or not inertial.of_shapes:
+        if inertial is None or not inertial.of_shapes or _density(link) > _DENSEST:
             continue
         trace = inertial.tensor[0] + inertial.tensor[3] + inertial.tensor[5]
         ratios = [trace / of_shape for of_shape in inertial.of_shapes if of_shape > 0]
@@ -134,10 +131,7 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
         at = inertial.at or link.at
         message = f"inertia of {link.name} is {ratio:.3g} times what its mass and shape give"
         advice = "give it in kg m², about the centre of mass"
-        is_heavy = inertial.mass >= _GRAMS_FROM
-        if is_heavy and 1 / _GRAMS_ABOUT < ratio * _GRAMS < _GRAMS_ABOUT:
-            advice = f"its mass is probably in grams: write {inertial.mass / _GRAMS:g} kg"
-        elif not robot.is_foreign(at):
+        if not robot.is_foreign(at):
             advice += ", or remove inertia: it is computed"
         yield finding("TF711", message, at, help=advice)
 
@@ -153,15 +147,11 @@ _LEAST_BODY_M3 = 1e-5
 @rule("TF732", of_urdf=True)
 def density_of_no_material(robot: Robot) -> Iterator[Finding]:
     for link in robot.links.values():
-        inertial = link.inertial
-        volume = max(_most_volume(link.visuals), _most_volume(link.collisions))
-        if inertial is None or not _LEAST_BODY_M3 < volume < math.inf:
-            continue
-        density = inertial.mass / volume
-        if density > _DENSEST:
+        density = _density(link)
+        if density > _DENSEST and (inertial := link.inertial):
             message = (
-                f"{link.name} has {inertial.mass:g} kg in {volume:.3g} m³: {density:.2g} kg/m³,"
-                " and the densest metal has 22600"
+                f"{link.name} has {inertial.mass:g} kg in {inertial.mass / density:.3g} m³:"
+                f" {density:.2g} kg/m³, and the densest metal has 22600"
             )
             grams = f"{inertial.mass / 1000:g}"
             if not robot.is_foreign(link.at):
@@ -170,6 +160,14 @@ def density_of_no_material(robot: Robot) -> Iterator[Finding]:
             if density > _DENSE_IN_GRAMS:
                 advice = f"if grams are meant, write {grams}; otherwise check its sizes, in m"
             yield finding("TF732", message, inertial.mass_at or link.at, help=advice)
+
+
+def _density(link: Link) -> float:
+    """Return a link's mass over the volume of its shapes in kg/m³; 0 where that says nothing."""
+    volume = max(_most_volume(link.visuals), _most_volume(link.collisions))
+    if link.inertial is None or not _LEAST_BODY_M3 < volume < math.inf:
+        return 0.0
+    return link.inertial.mass / volume
 
 
 def _most_volume(shapes: tuple[Shape, ...]) -> float:

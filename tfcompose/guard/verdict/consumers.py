@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from tfcompose.tf.live.state import StampedData, TreeState
 
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
 KEPT_S = KEPT_NS / 1e9
 #: Stamps that are older on arrival make lookups of "now", and of new data, fail for so long;
 #: costmaps wait 0.3 s.

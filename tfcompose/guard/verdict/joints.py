@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding, nearest
 from tfcompose.foundation.text import listed
+from tfcompose.guard.verdict.publishers import TOGETHER_S, two_publishers_message
 from tfcompose.tf.live.state import MovingJoint
+from tfcompose.tf.ros.joint_codec import JOINT_STATE_TYPE
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from tfcompose.model.plan import Plan
-    from tfcompose.tf.live.state import JointSender, TopicState, TreeState
+    from tfcompose.tf.live.state import SentJoints, TopicState, TreeState
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
-#: One that sends for so long after the other began has not only replaced it.
-TOGETHER_NS = 300_000_000
 _NAMED_AT_MOST = 8
 
 
@@ -84,7 +83,7 @@ def _sender_help(state: TreeState) -> str:
 
 def joint_without_state(state: TreeState) -> Iterator[Finding]:
     """Joint states come, and a joint of the description is not in them."""
-    sent = state.joints_sent
+    sent = state.joint_names
     if not sent:
         return
     absent = [joint for joint in _missing(state) if not joint.mimic and joint.name not in sent]
@@ -134,7 +133,9 @@ def _joint_topics(state: TreeState) -> list[TopicState]:
     neighbours = tuple(
         f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/")
     )
-    named = [topic for topic in state.typed(JOINT_STATE) if topic.name.endswith("/joint_states")]
+    named = [
+        topic for topic in state.typed(JOINT_STATE_TYPE) if topic.name.endswith("/joint_states")
+    ]
     return [
         topic
         for topic in named
@@ -157,12 +158,12 @@ def _transformers(state: TreeState, topic: TopicState) -> list[str]:
 def joint_senders(state: TreeState) -> Iterator[Finding]:
     """A joint has the states of two publishers, or the robot has no such joint."""
     heard = {topic.name for topic in _joint_topics(state)}
-    senders = [sender for sender in state.joint_senders if sender.topic in heard]
+    senders = [sender for sender in state.sent_joints if sender.topic in heard]
     yield from sent_twice(senders)
-    yield from unknown_joints(senders, joint_names(state))
+    yield from unknown_joints(senders, known_joints(state))
 
 
-def joint_names(state: TreeState) -> frozenset[str]:
+def known_joints(state: TreeState) -> frozenset[str]:
     """Return the names of the robot's joints, by its description and its plan."""
     described = {joint.name for joint in state.moving_joints}
     return frozenset(described | (planned_joints(state.plan) if state.plan else frozenset()))
@@ -173,7 +174,7 @@ def planned_joints(plan: Plan) -> frozenset[str]:
     return frozenset(edge.joint.name for edge in plan.edges if edge.joint is not None)
 
 
-def sent_twice(senders: Sequence[JointSender]) -> Iterator[Finding]:
+def sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
     """Find joints of which several publishers of a topic send states at the same time."""
     shared: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for topic in dict.fromkeys(sender.topic for sender in senders):
@@ -184,33 +185,32 @@ def sent_twice(senders: Sequence[JointSender]) -> Iterator[Finding]:
                 nodes = tuple(sorted(sender.node for sender in some))
                 shared.setdefault((topic, nodes), []).append(joint)
     for (topic, nodes), joints in shared.items():
-        names = list(dict.fromkeys(nodes))
-        by = f"twice by {names[0]}" if len(names) == 1 else f"by {' and by '.join(names)}"
-        verb = "is" if len(joints) == 1 else "are"
+        named = listed(joints, _NAMED_AT_MOST)
+        message = two_publishers_message(named, nodes, several=len(joints) > 1)
         yield finding(
             "TF860",
-            f"{listed(joints, _NAMED_AT_MOST)} {verb} sent {by} on {topic}",
+            f"{message}, on {topic}",
             None,
             help="end all but one of them, or let each send other joints: frames jump between the"
             " positions of the two",
         )
 
 
-def _together(senders: Sequence[JointSender]) -> list[JointSender]:
+def _together(senders: Sequence[SentJoints]) -> list[SentJoints]:
     """Return those that sent while another one did, and did not only replace it."""
     return [
         sender
         for sender in senders
         if any(
             other is not sender
-            and sender.last_ns >= other.first_ns + TOGETHER_NS
-            and other.last_ns >= sender.first_ns + TOGETHER_NS
+            and sender.last_ns >= other.first_ns + TOGETHER_S * 1e9
+            and other.last_ns >= sender.first_ns + TOGETHER_S * 1e9
             for other in senders
         )
     ]
 
 
-def unknown_joints(senders: Sequence[JointSender], known: Collection[str]) -> Iterator[Finding]:
+def unknown_joints(senders: Sequence[SentJoints], known: Collection[str]) -> Iterator[Finding]:
     """Find joints that the robot does not have; none where nothing is known of its joints."""
     for sender in senders if known else ():
         unknown = sorted(sender.joints.difference(known))

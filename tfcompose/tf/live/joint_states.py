@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import TYPE_CHECKING
 
-from tfcompose.tf.live.state import JointSender
+from tfcompose.tf.live.state import SentJoints
 from tfcompose.tf.ros.clock import wall_ns
 from tfcompose.tf.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.tf.ros.joint_codec import read_names
@@ -18,14 +19,24 @@ if TYPE_CHECKING:
     from tfcompose.tf.ros.node import Received
 
 
+#: A publisher that splits its joints over messages sends each list of names again and again.
+MOST_LISTS = 64
+
+
 @dataclass(slots=True)
 class _Sent:
-    """What a publisher sent: all joints, and the names of its newest message."""
+    """What a publisher sent: its newest lists of names, each with when it came last."""
 
     first_ns: int
-    last_ns: int
-    newest: JointNames
-    joints: set[str] = field(default_factory=set)
+    lists: list[tuple[JointNames, int]] = field(default_factory=list)
+
+    @property
+    def last_ns(self) -> int:
+        return self.lists[-1][1]
+
+    @property
+    def joints(self) -> frozenset[str]:
+        return frozenset(chain.from_iterable(names.names for names, _ in self.lists))
 
 
 class JointStates:
@@ -48,27 +59,24 @@ class JointStates:
     def _take(self, received: Received) -> None:
         gid = received.gid or received.raw_gid or b""
         now_ns = received.received_ns or wall_ns()
-        sent = self._sent.get(gid)
-        if sent is not None:
-            sent.last_ns = now_ns
-            if sent.newest.fit(received.data):
+        sent = self._sent.get(gid) or _Sent(now_ns)
+        names = next((names for names, _ in sent.lists if names.fit(received.data)), None)
+        if names is None:
+            try:
+                names = read_names(received.data)
+            except ValueError:
                 return
-        try:
-            names = read_names(received.data)
-        except ValueError:
-            return
-        if sent is None:
-            sent = self._sent[gid] = _Sent(now_ns, now_ns, names)
-        sent.newest = names
-        sent.joints.update(names.names)
+        others = [one for one in sent.lists if one[0] is not names]
+        sent.lists = [*others[1 - MOST_LISTS :], (names, now_ns)]
+        self._sent[gid] = sent
 
-    def senders(self) -> tuple[JointSender, ...]:
-        """Return who sent what until now, those that have left among them."""
+    def sent(self) -> tuple[SentJoints, ...]:
+        """Return what each publisher sent, those that have left among them."""
         return tuple(
-            JointSender(
+            SentJoints(
                 self.topic,
                 self._nodes.get(gid, ""),
-                frozenset(sent.joints),
+                sent.joints,
                 sent.first_ns,
                 sent.last_ns,
             )
@@ -76,8 +84,10 @@ class JointStates:
         )
 
     def forget(self, before_ns: int) -> None:
-        """Forget who sent nothing since then, in nanoseconds of the system's clock."""
-        self._sent = {gid: sent for gid, sent in self._sent.items() if sent.last_ns >= before_ns}
+        """Forget what was not sent since then, in nanoseconds of the system's clock."""
+        for sent in self._sent.values():
+            sent.lists = [one for one in sent.lists if one[1] >= before_ns]
+        self._sent = {gid: sent for gid, sent in self._sent.items() if sent.lists}
         self._nodes = {gid: node for gid, node in self._nodes.items() if gid in self._sent}
 
     def _ask_graph(self) -> None:

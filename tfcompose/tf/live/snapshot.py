@@ -16,9 +16,9 @@ from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 from tfcompose.tf.live.joint_states import JointStates
 from tfcompose.tf.live.listener import LAST_WAIT_S, TreeListener
 from tfcompose.tf.live.state import (
-    JointSender,
     MovingJoint,
     RosProcess,
+    SentJoints,
     StampedData,
     TopicState,
     TreeState,
@@ -26,11 +26,11 @@ from tfcompose.tf.live.state import (
 from tfcompose.tf.ros.clock import wall_ns
 from tfcompose.tf.ros.environment import RMW
 from tfcompose.tf.ros.graph import ends, nodes, topics, volatile_readers
+from tfcompose.tf.ros.joint_codec import JOINT_STATE_TYPE
 from tfcompose.tf.ros.node import LATCHED, TextSubscription, middleware, open_node
 from tfcompose.tf.ros.processes import ros_processes, settings_in
 from tfcompose.tf.ros.sensor_data import (
     HEADED,
-    JOINT_STATE_TYPE,
     HeaderSubscription,
 )
 
@@ -131,9 +131,9 @@ class SensorTopics:
             for (topic, frame), delays in sorted(self._delays.items())
         )
 
-    def joint_senders(self) -> tuple[JointSender, ...]:
+    def sent_joints(self) -> tuple[SentJoints, ...]:
         """Return who sent joint states, and of which joints."""
-        return tuple(sender for joints in self._joints.values() for sender in joints.senders())
+        return tuple(sent for joints in self._joints.values() for sent in joints.sent())
 
     def _end(self, subscription: HeaderSubscription) -> None:
         self._node.destroy_subscription(subscription.subscription)
@@ -303,7 +303,7 @@ class _TopicPair:
             skews_s=self.skews_s,
             stamped=self.sensors.stamped(),
             moving_joints=self.sensors.moving_joints,
-            joint_senders=self.sensors.joint_senders(),
+            sent_joints=self.sensors.sent_joints(),
         )
 
 

@@ -62,8 +62,8 @@ class MovingJoint:
 
 
 @dataclass(frozen=True, slots=True)
-class JointSender:
-    """A publisher of joint states, and the joints that it sent on a topic.
+class SentJoints:
+    """The joints that a publisher of joint states sent on a topic.
 
     ``node`` is its full name, empty while that is not known. ``first_ns`` and ``last_ns`` are when
     its first and newest message came, in nanoseconds of the system's clock.
@@ -100,7 +100,7 @@ class TreeState:
         clock_moves: whether that changed lately.
         stamped: what came with a header.
         moving_joints: the moving joints of the robot's description.
-        joint_senders: who sent joint states, and of which joints.
+        sent_joints: who sent joint states, and of which joints.
         settings: the variables by which ROS is set up here.
         processes: other processes of this machine with ROS, as far as they can be looked at.
         skews_s: how far the clock of a publisher's machine is ahead of this one's, at least
@@ -122,7 +122,7 @@ class TreeState:
     clock_moves: bool = False
     stamped: tuple[StampedData, ...] = ()
     moving_joints: tuple[MovingJoint, ...] = ()
-    joint_senders: tuple[JointSender, ...] = ()
+    sent_joints: tuple[SentJoints, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     processes: tuple[RosProcess, ...] = ()
     skews_s: Mapping[bytes, float] = field(default_factory=dict)
@@ -132,9 +132,9 @@ class TreeState:
     recorded: bool = False
 
     @property
-    def joints_sent(self) -> frozenset[str]:
+    def joint_names(self) -> frozenset[str]:
         """The joints that joint states speak of."""
-        return frozenset(joint for sender in self.joint_senders for joint in sender.joints)
+        return frozenset(joint for sent in self.sent_joints for joint in sent.joints)
 
     @property
     def taken(self) -> list[EdgeState]:

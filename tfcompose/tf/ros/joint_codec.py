@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+JOINT_STATE_TYPE = "sensor_msgs/msg/JointState"
 _HEADER = 4
 _STAMP_AT = 4
 _FRAME_AT = 12

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 
 JOINT_STATES_TOPIC = "joint_states"
-JOINT_STATE_TYPE = "sensor_msgs/msg/JointState"
 
 
 class JointStateSubscription(Subscription):

@@ -146,6 +146,14 @@ def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once
     assert len(found.notes) == 2
 
 
+def test_advice_that_programs_share_is_given_once(tmp_path: Path) -> None:
+    node = lidar("${executable:nope/no_node}")
+    launch = replace(lidar("${launch:nope/no.launch.py}"), name="stack")
+    _, (found,) = inspect(tmp_path, node, launch, env={"PATH": "/nowhere"})
+    assert found.code == "TF810"
+    assert found.help.count("setup file") == 1
+
+
 def test_a_relative_program_is_found_in_the_processs_folder(tmp_path: Path, prefix: Path) -> None:
     process = PlanProcess("lidar", "run", argv=("./sllidar_node",), cwd="ros/lib/sllidar_ros2")
     commands, _ = inspect(tmp_path, process)

@@ -278,7 +278,7 @@ class NotFound:
     program: str
     places: tuple[str, ...]
     path: str = ""
-    advice: str = ""
+    advice: tuple[str, ...] = ()
 
 
 def not_found(missing: Sequence[NotFound]) -> Finding:
@@ -289,10 +289,7 @@ def not_found(missing: Sequence[NotFound]) -> Finding:
         message = f"the executable {what} was not found"
     places = dict.fromkeys(place for one in missing for place in one.places)
     paths = ["looked in the folders of PATH"] if any(one.path for one in missing) else []
-    # Two programs may share a part of the advice.
-    advice = dict.fromkeys(
-        part for one in missing if one.advice for part in one.advice.split("; ")
-    )
+    advice = dict.fromkeys(part for one in missing for part in one.advice if part)
     return finding(
         "TF810",
         message,
@@ -316,19 +313,19 @@ def executable_of(
         path = folder / word
         if _can_run(path):
             return str(path)
-        advice = (
-            ""
-            if word.startswith("/")
-            else f"${{file({word})}} is relative to the robot file, wherever up is called"
-        )
+        relative = f"${{file({word})}} is relative to the robot file, wherever up is called"
+        advice = () if word.startswith("/") else (relative,)
         return NotFound(process.name, word, (_why_not(path),), advice=advice)
     path_variable = env.get("PATH", os.defpath)
-    advice = (
-        f"install {word}, or write its path; a node of a package is run: {{package: …, executable:"
-        f" {word}}}"
-    )
     return shutil.which(word, path=path_variable) or NotFound(
-        process.name, word, (), path_variable, advice
+        process.name,
+        word,
+        (),
+        path_variable,
+        (
+            f"install {word}, or write its path",
+            f"a node of a package is run: {{package: …, executable: {word}}}",
+        ),
     )
 
 
@@ -356,7 +353,7 @@ def _in_package(
         otherwise = (
             f"install the package {package} (on Ubuntu probably: sudo apt install {debian})"
         )
-    advice = did_you_mean(name, known, "" if known else otherwise)
+    advice = (did_you_mean(name, known),) if known else (otherwise,)
     return NotFound(process.name, f"{package}/{name}", tuple(notes), path_variable, advice)
 
 
@@ -388,8 +385,8 @@ def _launch_command(
     ros2 = shutil.which("ros2", path=path)
     if ros2 is None:
         advice = (
-            "source the setup file of your ROS installation first; ros2 launch comes with the"
-            " package ros2launch"
+            "source the setup file of your ROS installation first",
+            "ros2 launch comes with the package ros2launch",
         )
         return NotFound(process.name, f"ros2 (for launch {package}/{name})", (), path, advice)
     file = _find_launch_file(process, package, name, env)
@@ -433,5 +430,5 @@ def _find_launch_file(
         process.name,
         f"launch file {package}/{name}",
         notes or ("AMENT_PREFIX_PATH names no folder",),
-        advice=did_you_mean(name, known, listed),
+        advice=(did_you_mean(name, known, listed),),
     )

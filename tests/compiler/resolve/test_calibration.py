@@ -505,6 +505,20 @@ def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> Non
     assert [one.code for one in found] == ["TF616"]
 
 
+def test_a_quaternion_that_fits_with_its_w_first_is_given_in_the_right_order() -> None:
+    frames = (
+        "frames: {lens: {parent: base_link, xyz: [0, 0, 0.05], rpy: [0, 0, 90 deg],"
+        " calibration: c.yaml}}\n"
+    )
+    text = (
+        "header: {frame_id: base_link}\nchild_frame_id: lens\ntransform:\n"
+        "  translation: {x: 0, y: 0, z: 0.05}\n  rotation: {x: 0.7071, y: 0, z: 0, w: 0.7071}\n"
+    )
+    (found,) = compiled(frames, c_yaml=text).found
+    assert found.code == "TF616"
+    assert "x: 0, y: 0, z: 0.707107, w: 0.707107" in found.help
+
+
 def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> None:
     robot = (
         "frames: {kit: {parent: base_link, xyz: [5, 0, 0], look: left}, lens: {parent: kit,"

@@ -389,6 +389,14 @@ def test_where_some_are_dropped_it_is_not_reported_that_the_frame_is_missing() -
     assert always.help != some.help
 
 
+@pytest.mark.parametrize(("w", "found"), [(0.9, {"TF831"}), (0.0, {"TF830", "TF831"})])
+def test_a_frame_whose_quaternion_tf2_normalises_belongs_to_the_tree(
+    w: float, found: set[str]
+) -> None:
+    history = sound_tree().takes(row("base_link arm", END_NS, w=w), b"x").fixed("arm hand")
+    assert codes(history.observed()) == found
+
+
 def test_edges_of_a_publisher_that_replaced_another_have_one_publisher() -> None:
     """It was started anew, and the graph shows the killed one for some seconds still.
 

@@ -117,6 +117,61 @@ def test_a_command_that_is_nearly_one_is_named(folder: Path) -> None:
     assert re.search(r"\blnit\b.*\blint\b", tfcompose("lnit", cwd=folder).stderr)
 
 
+@pytest.mark.parametrize(
+    ("words", "instead"),
+    [
+        ("status", "ps"),
+        ("list", "ps"),
+        ("new", "init"),
+        ("run", "up"),
+        ("launch", "up"),
+        ("check", "lint"),
+        ("validate", "lint"),
+        ("kill", "down"),
+        ("kubernetes", "export k8s"),
+        ("help status", "ps"),
+        ("export kubernetes", "k8s"),
+        ("start rover.yaml", "up rover.yaml"),
+        ("stop rover.yaml", "down"),
+    ],
+)
+def test_a_word_that_other_programs_have_leads_to_the_command(
+    words: str, instead: str, folder: Path
+) -> None:
+    done = tfcompose(*words.split(), cwd=folder)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.search(rf"\b{instead}\b", done.stderr)
+
+
+OPTIONS_BETWEEN = {
+    "export": "export k8s --image X robot.yaml -o built",
+    "export by name": "export -o built launch robot.yaml --set robot=s",
+    "explain": "explain robot.yaml -p p base_link laser",
+    "pose": "pose --format json robot.yaml base_link --set robot=s laser",
+    "diff": "diff robot.yaml --format json robot.yaml",
+    "tree": "tree robot.yaml --format json n:=1 -p p",
+}
+
+
+@pytest.mark.parametrize("case", OPTIONS_BETWEEN)
+def test_options_may_stand_between_the_other_words(case: str, folder: Path) -> None:
+    text = (
+        "args: {n: 1}\nprofiles: {p: {}}\nframes: {laser: {parent: base_link, xyz: [1, 0, 0]}}\n"
+    )
+    (folder / "robot.yaml").write_text(f"{GOOD}{text}")
+    done = tfcompose(*OPTIONS_BETWEEN[case].split(), cwd=folder)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_profile_that_only_parts_have_leads_to_them(folder: Path) -> None:
+    (folder / "part.yaml").write_text(f"{GOOD}profiles: {{demo: {{robot: p}}}}\n")
+    parts = "parts: {r1: {spec: part.yaml, namespace: r1, prefix: r1_}, r2: {spec: none.yaml}}\n"
+    (folder / "robot.yaml").write_text(f"{GOOD}{parts}")
+    done = tfcompose("lint", "robot.yaml", "-p", "demo", cwd=folder)
+    assert re.search(r"error\[TF009\].*\n(.*\n)*.*help: .*r1: {profiles: \[demo\]}", done.stdout)
+    assert "r2" not in done.stdout
+
+
 def test_an_unknown_profile_is_named_with_the_nearest_one(folder: Path) -> None:
     done = tfcompose("build", str(ROBOTS / "my_robot.yaml"), "--profile", "dmeo", cwd=folder)
     assert done.returncode == 1

@@ -32,7 +32,7 @@ def show_args(arguments: Namespace) -> int:
         fail(f"{file} is a built plan, and arguments are those of a robot file", UNREADABLE)
     try:
         source = with_includes(load(read_text(file), file), read_text)
-        source = composed(source, arguments.profiles, overlays_of(arguments))
+        source = composed(source, arguments.profiles, overlays_of(arguments), read=read_text)
         args = validate(source, given=Given({}, os.environ)).spec.args
     except RejectedError as error:
         reject(error.findings)

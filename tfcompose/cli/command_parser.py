@@ -39,8 +39,7 @@ class Parser(ArgumentParser):
         takes_given = any(action.dest == "given" for action in self._actions)
         given = [word for word in words if _GIVEN.match(word)] if takes_given else []
         rest = [word for word in words if word not in given]
-        parse = super().parse_intermixed_args if self._may_lack_the_first() else super().parse_args
-        arguments = parse(rest, namespace)
+        arguments = super().parse_intermixed_args(rest, namespace)
         if takes_given:
             from tfcompose.cli.options import pairs
 
@@ -52,14 +51,6 @@ class Parser(ArgumentParser):
         options = takewhile(lambda argument: argument != "--", argv)
         names = {argument.partition("=")[0] for argument in options if argument.startswith("--")}
         return not names <= self._option_string_actions.keys()
-
-    def _may_lack_the_first(self) -> bool:
-        """Return whether required words follow an optional one.
-
-        Options must not part them then.
-        """
-        positional = [action for action in self._actions if not action.option_strings]
-        return len(positional) > 1 and positional[0].nargs == "?" and positional[1].nargs is None
 
 
 #: A word that gives an argument of a robot, xacro or launch file its value.

@@ -131,7 +131,7 @@ class _Variants:
         from tfcompose.spec.language.arguments import alternatives_of, combinations
 
         try:
-            laid_over = composed(self.source, profiles, self.overlays, self.given)
+            laid_over = composed(self.source, profiles, self.overlays, self.given, self.files.read)
             alternatives, first = alternatives_of(laid_over, self.given, self.source)
         except RejectedError as error:
             return list(error.findings), []

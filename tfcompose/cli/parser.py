@@ -256,7 +256,9 @@ def _unknown(command: str) -> int:
         sys.stderr.write(f"tfcompose: {missing}\n")
         return UNREADABLE
     near = difflib.get_close_matches(command, all_commands(), 1, cutoff=0.7)
-    advice = f"did you mean {near[0]}?" if near else "tfcompose --help lists them"
+    advice = tool_commands.instead_of(command) or (
+        f"did you mean {near[0]}?" if near else "tfcompose --help lists them"
+    )
     kind = "option" if command.startswith("-") else "command"
     sys.stderr.write(f"tfcompose: unknown {kind} {command}; {advice}\n")
     return UNREADABLE

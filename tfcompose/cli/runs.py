@@ -133,6 +133,10 @@ def request(place: RuntimeDir, question: Request, answer: type[A]) -> A | None:
 
 def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
     """Have the launcher do it with each of the named processes; return the exit code."""
+    files = [name for name in arguments.name if name.endswith((".yaml", ".yml"))]
+    if files:
+        advice = "down stops a robot" if verb == "stop" else f"up {files[0]} starts a robot"
+        fail(f"{verb} takes processes of a running robot; tfcompose {advice}", UNREADABLE)
     place = chosen_run(arguments.robot, shlex.join([verb, *arguments.name]))
     code = 0
     for name in arguments.name:

@@ -104,6 +104,30 @@ def find(name: str) -> ToolCommand | None:
     return None
 
 
+#: What other programs call a command of the core, and what to type instead.
+_SYNONYMS = {
+    "check": "lint",
+    "create": "init",
+    "kill": "down, or tfcompose stop PROCESS",
+    "launch": "up",
+    "list": "ps",
+    "log": "logs",
+    "ls": "ps",
+    "new": "init",
+    "run": "up",
+    "status": "ps",
+    "top": "ps",
+    "validate": "lint",
+}
+
+
+def instead_of(word: str) -> str:
+    """Return advice for a word that other programs have for a command; empty if none has."""
+    of_tools = (pair for _, command in installed().commands() for pair in command.synonyms)
+    command = (_SYNONYMS | dict(of_tools)).get(word)
+    return f"that is tfcompose {command}" if command else ""
+
+
 def add_options(name: str, parser: Parser, argv: Sequence[str]) -> list[ToolOption]:
     """Add the options that tools bring for a command, if it lacks one that is given.
 

@@ -87,7 +87,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     """Return what ``compile_robot`` does, from text that is loaded, with its includes."""
     try:
         validated = validate(
-            composed(source, profiles, overlays, given), profiles_in(source), given
+            composed(source, profiles, overlays, given, read), profiles_in(source), given
         )
     except RejectedError as error:
         return Compiled(None, error.findings)

@@ -36,6 +36,7 @@ class Command(NamedTuple):
 
     ``topic`` is the page that ``help`` prints below the options, by default that of the command's
     name. ``completes`` pairs arguments with the sections of the robot file whose names they take.
+    ``synonyms`` pairs words that other programs have for it with what to type instead.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Command(NamedTuple):
     group: str = "Tools"
     topic: str = ""
     completes: tuple[tuple[str, str], ...] = ()
+    synonyms: tuple[tuple[str, str], ...] = ()
 
 
 class Topic(NamedTuple):

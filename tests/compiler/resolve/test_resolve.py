@@ -366,7 +366,9 @@ def test_an_edge_with_several_parents_hangs_on_the_first_and_names_the_others_ev
     assert joint
     assert joint[1] == "base_link"
     more = robot_of(TOOL.replace("[base_link, rack]", "base_link"))
-    assert differences(robot, more) == ["switch base_link → tool: or on rack → no other parent"]
+    assert list(map(str, differences(robot, more))) == [
+        "switch base_link → tool: or on rack → no other parent"
+    ]
 
 
 def test_a_fixed_edge_has_the_name_of_a_joint_where_one_is_given() -> None:

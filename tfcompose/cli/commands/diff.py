@@ -6,14 +6,16 @@ removed, or got another parent or owner. Exit code 1 if anything differs.
 
 from __future__ import annotations
 
+import json
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from tfcompose.cli.options import add_variant
+from tfcompose.cli.options import add_format, add_variant
 from tfcompose.foundation.geometry import angle_between, norm
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Iterator
 
     from tfcompose.model.robot import Edge, Robot
 
@@ -27,24 +29,39 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("old", metavar="OLD", help="a robot file")
     parser.add_argument("new", metavar="NEW", help="the same robot, changed")
     add_variant(parser, "apply this profile to both")
+    add_format(parser)
+
+
+class Change(NamedTuple):
+    """What is different of a frame, or of the edge to its parent, ``A → B``."""
+
+    change: str
+    of: str
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.change:<6} {': '.join(filter(None, self[1:]))}"
 
 
 def run(arguments: Namespace) -> int:
     """Print the differences; exit code 0 without any, 1 with some."""
     from tfcompose.cli.compiling import compiled_robot
 
-    lines = differences(
+    found = differences(
         compiled_robot(arguments.old, arguments), compiled_robot(arguments.new, arguments)
     )
-    print("\n".join(lines) or "no difference between the two trees")
-    return int(bool(lines))
+    if arguments.format == "json":
+        print(json.dumps([one._asdict() for one in found], indent=2, ensure_ascii=False))
+    else:
+        print("\n".join(map(str, found)) or "no difference between the two trees")
+    return int(bool(found))
 
 
-def differences(old: Robot, new: Robot) -> list[str]:
-    """Return a line for each changed frame, in the new robot's order, removed ones last."""
+def differences(old: Robot, new: Robot) -> list[Change]:
+    """Return the changes of each frame, in the new robot's order, removed ones last."""
     before = {edge.child: edge for edge in old.edges}
-    lines = [
-        f"root   {frame} is new"
+    changes = [
+        Change("root", frame, "is new")
         for frame in new.frames
         if frame not in old.frames and new.parent_edge(frame) is None
     ]
@@ -52,30 +69,27 @@ def differences(old: Robot, new: Robot) -> list[str]:
         was = before.get(edge.child)
         if was is None:
             verb = "is new" if edge.child not in old.frames else "was a root"
-            lines.append(f"new    {edge.name}: {edge.child} {verb}, owned by {edge.owner}")
+            changes.append(Change("new", edge.name, f"{edge.child} {verb}, owned by {edge.owner}"))
         else:
-            lines += _changes(was, edge)
-    lines += [f"gone   {frame}" for frame in old.frames if frame not in new.frames]
-    return lines
+            changes += _changes(was, edge)
+    return changes + [Change("gone", frame) for frame in old.frames if frame not in new.frames]
 
 
-def _changes(was: Edge, now: Edge) -> list[str]:
-    lines = []
+def _changes(was: Edge, now: Edge) -> Iterator[Change]:
     if was.parent != now.parent:
-        lines.append(f"parent {now.child}: {was.parent} → {now.parent}")
+        yield Change("parent", now.child, f"{was.parent} → {now.parent}")
     far = norm(tuple(a - b for a, b in zip(was.pose.xyz, now.pose.xyz, strict=True)))
     turned = angle_between(was.pose.quat_xyzw, now.pose.quat_xyzw)
     if was.parent == now.parent and (far > MOVED_M or turned > TURNED_RAD):
-        lines.append(f"moved  {now.name}: {far * 1000:.3g} mm, {math.degrees(turned):.3g} deg")
+        yield Change("moved", now.name, f"{far * 1000:.3g} mm, {math.degrees(turned):.3g} deg")
     if set(was.switched) != set(now.switched):
-        lines.append(f"switch {now.name}: {_others(was)} → {_others(now)}")
+        yield Change("switch", now.name, f"{_others(was)} → {_others(now)}")
     if was.owner != now.owner:
-        lines.append(f"owner  {now.name}: {was.owner} → {now.owner}")
+        yield Change("owner", now.name, f"{was.owner} → {now.owner}")
     if was.kind != now.kind:
-        lines.append(f"kind   {now.name}: {was.kind} → {now.kind}")
+        yield Change("kind", now.name, f"{was.kind} → {now.kind}")
     if was.rate != now.rate:
-        lines.append(f"rate   {now.name}: {_hz(was.rate)} → {_hz(now.rate)}")
-    return lines
+        yield Change("rate", now.name, f"{_hz(was.rate)} → {_hz(now.rate)}")
 
 
 def _others(edge: Edge) -> str:

@@ -31,7 +31,7 @@ def run(arguments: Namespace) -> int:
 
     from tfcompose.cli.documentation import for_terminal, html, page, topics
     from tfcompose.cli.terminal import table_width
-    from tfcompose.cli.tool_commands import report_problems
+    from tfcompose.cli.tool_commands import instead_of, report_problems
     from tfcompose.foundation.findings import did_you_mean
 
     commands = arguments.commands()
@@ -54,7 +54,7 @@ def run(arguments: Namespace) -> int:
         from tfcompose.spec.language.reference import keys
 
         known = [*topics(), *commands, *keys()]
-        advice = did_you_mean(
+        advice = instead_of(arguments.word) or did_you_mean(
             arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(topics())}"
         )
         missing = absent(arguments.word.partition(".")[0], "command", "topic", "key", "language")

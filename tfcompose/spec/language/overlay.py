@@ -10,11 +10,13 @@ over what it includes; paths are relative to the file that writes them.
 
 from __future__ import annotations
 
+import contextlib
 import posixpath
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.foundation.text import listed
 from tfcompose.spec.language.args import Given
 from tfcompose.spec.language.conditions import holds
 from tfcompose.spec.language.expressions import ExpressionError
@@ -22,7 +24,7 @@ from tfcompose.spec.language.recognition import load_named
 from tfcompose.spec.language.spec import Spec, mappings_at
 from tfcompose.spec.language.tool_keys import robot_model
 from tfcompose.spec.language.variables import NothingNewError, Variables
-from tfcompose.spec.load import DEEPEST, Path, Place, Source, Spans, load
+from tfcompose.spec.load import DEEPEST, Path, Place, Source, Spans, load, path_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -40,10 +42,12 @@ def composed(
     profiles: Sequence[str] = (),
     overlays: Sequence[Source] = (),
     given: Given = _NOTHING,
+    read: Reader | None = None,
 ) -> Source:
     """Return the robot with its named profiles laid over it, in order, then the overlays.
 
-    Without ``profiles``.
+    Without ``profiles``. With ``read``, which gives a file's text, a profile that is missing is
+    looked for in the parts.
 
     Before the named ones come those whose own condition, ``when``, holds for what is ``given`` to
     the others. An overlay may bring profiles of its own.
@@ -60,7 +64,7 @@ def composed(
     missing = [name for name in dict.fromkeys(profiles) if name not in known]
     unusable = [name for name in profiles if not isinstance(known.get(name), dict)]
     if unusable:
-        unknown = (_unknown_profile(source, name, list(known)) for name in missing)
+        unknown = (_unknown_profile(source, name, read) for name in missing)
         raise RejectedError([*source.found, *wrong, *unknown])
     base = replace(without(source, "profiles"), found=(*source.found, *wrong))
     result = _laid_over_all(base, source, profiles, overlays)
@@ -396,10 +400,32 @@ def _wrong_profiles(source: Source) -> list[Finding]:
     return found
 
 
-def _unknown_profile(source: Source, name: str, known: list[str]) -> Finding:
+def _unknown_profile(source: Source, name: str, read: Reader | None) -> Finding:
+    known = list(source.mapping("profiles"))
     there = f"there is {', '.join(known)}" if known else "the file has no profiles"
+    advice = did_you_mean(name, known, there)
+    if parts := _parts_with_profile(source, name, read) if read else []:
+        entries = listed((f"{part}: {{profiles: [{name}]}}" for part in parts), 3)
+        advice = (
+            f"{'a part has' if len(parts) == 1 else 'parts have'} it: write"
+            f" profiles: {{{name}: {{parts: {{{entries}}}}}}}"
+        )
     span = source.at_key(("profiles",))
-    return finding("TF009", f"unknown profile {name}", span, help=did_you_mean(name, known, there))
+    return finding("TF009", f"unknown profile {name}", span, help=advice)
+
+
+def _parts_with_profile(source: Source, profile: str, read: Reader) -> list[str]:
+    """Return the parts whose robot files have the profile."""
+    parts = []
+    for part, inside in source.mapping("parts").items():
+        spec = inside.get("spec") if isinstance(inside, dict) else None
+        if not isinstance(spec, str):
+            continue
+        file = path_named(spec, source.at(("parts", part, "spec")))
+        with contextlib.suppress(RejectedError):
+            if profile in with_includes(load_named(read(file), file), read).mapping("profiles"):
+                parts.append(part)
+    return parts
 
 
 MOST_FILES = 50

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
+from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,7 @@ ROS_VARIABLES = (
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("kind", choices=KINDS, help="the launcher to export to")
+    parser.add_argument("kind", type=_kind, choices=KINDS, help="the launcher to export to")
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
     )
@@ -94,6 +95,17 @@ def arguments(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="compose: the image; default: $TFCOMPOSE_IMAGE at start; k8s: required",
     )
+
+
+def _kind(text: str) -> str:
+    """Return the launcher.
+
+    Raises:
+        ArgumentTypeError: if it is called otherwise here.
+    """
+    if text == "kubernetes":
+        raise ArgumentTypeError("kubernetes is k8s here")
+    return text
 
 
 def run(arguments: Namespace) -> int:

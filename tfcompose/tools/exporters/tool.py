@@ -13,6 +13,10 @@ TOOL = Tool(
             group="Ship",
             topic="exports",
             completes=(("host", "hosts"),),
+            synonyms=(
+                ("kubernetes", "export k8s"),
+                *((kind, f"export {kind}") for kind in ("k8s", "compose", "systemd")),
+            ),
         ),
     ),
     topics=(Topic("exports", "systemd, docker compose, Kubernetes and launch files"),),

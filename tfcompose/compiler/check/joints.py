@@ -325,6 +325,7 @@ _SLIDES = re.compile(
 )
 _ANGLES_RAD = (math.tau, math.pi, math.pi / 2, 3 * math.pi / 2)
 _ROUNDED = 0.002
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 @rule("TF734", of_urdf=True)
@@ -407,3 +408,24 @@ def _opening(edge: Edge) -> Vector:
 
 #: The cosine of 30 degrees.
 _ALIKE = 0.87
+
+
+@rule("TF737", of_urdf=True)
+def position_outside_limits(robot: Robot) -> Iterator[Finding]:
+    joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
+    for hardware in robot.hardware:
+        for component in hardware.components:
+            joint = joints.get(component.name)
+            if component.kind != "joint" or joint is None:
+                continue
+            for interface in component.state:
+                start = interface.params.get("initial_value", "")
+                if interface.name != "position" or not _NUMBER.fullmatch(start):
+                    continue
+                if limits := joint.exceeded_limits(float(start)):
+                    message = (
+                        f"{joint.name} starts at {joint.in_unit(float(start))}, outside its"
+                        f" limits, {limits}"
+                    )
+                    advice = "correct initial_value, or the limits"
+                    yield finding("TF737", message, component.at, help=advice)

@@ -51,28 +51,16 @@ _STEEP_RAD = math.radians(45)
 
 @rule("TF401", of_urdf=True, follows="pose")
 def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
-    above = {edge.child: edge for edge in robot.edges}
-    for edge in robot.edges:
-        is_fixed = edge.kind == "static" and edge.pose_known
-        if (
-            not is_fixed
-            or edge.other_axes
-            or not is_optical(edge.child)
-            or is_optical(edge.parent)
-        ):
-            continue
+    for edge in _turned_otherwise(robot):
         quat_xyzw = edge.pose.quat_xyzw
-        if edge.calibration or _is_optical_in_camera(edge, above) or not _is_wrong(edge, robot):
+        if _is_upside_down(edge, robot):
             continue
         off = math.degrees(angle_between(quat_xyzw, OPTICAL_XYZW))
         message = (
             f"{edge.child} is named like an optical frame but not rotated like one: it is"
             f" {off:.2f} deg off"
         )
-        advice = "rpy: [-90 deg, 0, -90 deg]"
-        if robot.is_foreign(edge.at):
-            advice = '<origin rpy="-1.5707963267948966 0 -1.5707963267948966"/>'
-        advice = f"an optical frame has {advice} in {edge.parent}"
+        advice = f"an optical frame has {_optical_rotation(edge, robot)} in {edge.parent}"
         edits = edge.optical_edits()
         if _is_base(edge.parent, robot) and not _is_at(
             quat_xyzw, IDENTITY_XYZW
@@ -85,6 +73,52 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
                 (),
             )
         yield finding("TF401", message, edge.at, help=advice, edits=edits)
+
+
+@rule("TF416", of_urdf=True, follows="pose")
+def camera_upside_down(robot: Robot) -> Iterator[Finding]:
+    for edge in _turned_otherwise(robot):
+        if _is_upside_down(edge, robot):
+            message = f"{edge.child} looks forward in {edge.parent}, but its image is upside down"
+            advice = (
+                f"an optical frame has {_optical_rotation(edge, robot)}; if the camera hangs"
+                " upside down, turn its body frame by 180 deg about x"
+            )
+            yield finding("TF416", message, edge.at, help=advice)
+
+
+def _turned_otherwise(robot: Robot) -> Iterator[Edge]:
+    """Yield the edges to optical frames whose rotation is neither optical nor intended."""
+    above = {edge.child: edge for edge in robot.edges}
+    for edge in robot.edges:
+        if (
+            edge.kind == "static"
+            and edge.pose_known
+            and not edge.other_axes
+            and not edge.calibration
+            and is_optical(edge.child)
+            and not is_optical(edge.parent)
+            and not _is_optical_in_camera(edge, above)
+            and _is_wrong(edge, robot)
+        ):
+            yield edge
+
+
+def _is_upside_down(edge: Edge, robot: Robot) -> bool:
+    """Return whether the image of a camera that looks forward is upside down.
+
+    On the robot's base a camera may look in any direction.
+    """
+    quat_xyzw = edge.pose.quat_xyzw
+    view, down = rotate(quat_xyzw, (0.0, 0.0, 1.0)), rotate(quat_xyzw, (0.0, 1.0, 0.0))
+    forward = math.hypot(*view[:2]) if _is_base(edge.parent, robot) else view[0]
+    return forward > math.cos(_STEEP_RAD) and down[2] > math.cos(_STEEP_RAD)
+
+
+def _optical_rotation(edge: Edge, robot: Robot) -> str:
+    if robot.is_foreign(edge.at):
+        return '<origin rpy="-1.5707963267948966 0 -1.5707963267948966"/>'
+    return "rpy: [-90 deg, 0, -90 deg]"
 
 
 def _is_optical_in_camera(edge: Edge, above: Mapping[str, Edge]) -> bool:

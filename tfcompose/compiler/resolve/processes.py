@@ -653,6 +653,9 @@ def _wrong_positions(
             yield finding(
                 "TF106", f"{name} slides and has no limits to sweep between", place, help=advice
             )
+        elif joint and isinstance(what, float) and (limits := joint.exceeded_limits(what)):
+            message = f"{name} is simulated at {joint.in_unit(what)}, outside its limits, {limits}"
+            yield finding("TF737", message, place, help="correct the position, or the limits")
 
 
 def _has_position(joint: Joint) -> bool:

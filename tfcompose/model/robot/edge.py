@@ -80,6 +80,10 @@ class ReferencePositions:
     falling: JointPosition | None = documented(None, "where the switch goes off")
 
 
+#: Limits of joints may be rounded by as much: 1.57 rad for 90 deg; rad or m.
+ROUNDED = 2e-3
+
+
 @dataclass(frozen=True, slots=True)
 class Joint(PlanJoint):
     """A joint of the plan, with what only the compiler knows of it.
@@ -100,6 +104,23 @@ class Joint(PlanJoint):
     dynamics: Dynamics | None = field(default=None, kw_only=True)
     safety: SafetyController | None = field(default=None, kw_only=True)
     reference: ReferencePositions | None = field(default=None, kw_only=True)
+
+    def exceeded_limits(self, position: float) -> str:
+        """Return the limits that a position in rad or m is outside of; empty if it is within."""
+        limit = self.limit
+        if self.type not in {"revolute", "prismatic"} or limit is None:
+            return ""
+        lower, upper = limit.lower, limit.upper
+        if lower is None or upper is None or lower > upper:  # another finding says so
+            return ""
+        is_within = lower - ROUNDED <= position <= upper + ROUNDED
+        return "" if is_within else f"{self.in_unit(lower)} to {self.in_unit(upper)}"
+
+    def in_unit(self, position: float) -> str:
+        """Return a position in rad or m as people read it."""
+        return (
+            f"{position:g} m" if self.type == "prismatic" else f"{math.degrees(position):.4g} deg"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,6 +57,19 @@ class Validated:
     source_data: dict[str, Any] = field(default_factory=dict)
 
 
+#: Sections whose entries bring names of frames.
+_BRINGS_FRAMES = frozenset({"frames", "joints", "links", "parts", "sensors"})
+
+
+def _entry(path: Path) -> tuple[str, str]:
+    """Return the entry that a refused path is in; without a name where it is a whole section.
+
+    Of a section that may have brought any frame, that of a part without a prefix.
+    """
+    section, name = (*map(str, path[:2]), "")[:2]
+    return ("parts" if not name and section in _BRINGS_FRAMES else section), name
+
+
 def _children(broken: set[tuple[str, str]], joints: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield the links, as entries, that have no parent only because their joints were refused."""
     for section, name in broken:
@@ -93,7 +106,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
         raise RejectedError(found)
     spec.carry(source)
     refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
-    entries = {(str(path[0]), str(path[1])) for path in refused if len(path) > 1}
+    entries = {_entry(path) for path in refused}
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
     from_outside = {"args given": args, "environment": variables.environment}
     return Validated(

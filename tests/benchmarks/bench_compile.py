@@ -184,7 +184,12 @@ def commands(one: str) -> dict[str, list[str]]:
     return {
         "tfcompose": build,
         "--read-back": [*build, "--read-back"],
-        "yourdfpy": ["-c", READER, f"out_{one}/robot.full.urdf", f"out_{one}/robot.urdf"],
+        "yourdfpy": [
+            "-c",
+            READER,
+            f"out_{one}/robot.urdf",
+            f"out_{one}/robot.state_publisher.urdf",
+        ],
         "xacro": ["-c", f"import xacro; open('x.urdf', 'w').write(xacro.process('{one}.xacro'))"],
     }
 

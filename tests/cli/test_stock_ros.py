@@ -96,7 +96,7 @@ def test_the_tree_is_complete_everybody_publishes_their_own_and_the_description_
     code = up.end()
     up.close()
     assert code == 0, up.output
-    built = (tmp_path / "build/rover/robot.full.urdf").read_text("utf-8")
+    built = (tmp_path / "build/rover/robot.urdf").read_text("utf-8")
     assert heard == built.replace('"../../mesh.stl"', f'"file://{tmp_path}/mesh.stl"')
     assert 'type="floating"' not in built.partition('name="swing"')[0].partition("<joint")[2]
     assert nodes == {"/rover/tfcompose_static"}

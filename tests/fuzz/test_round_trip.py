@@ -181,7 +181,7 @@ def test_the_urdf_holds_every_edge_below_base_with_its_pose_type_and_limits(
 ) -> None:
     spec, wanted = given
     read = yourdfpy.URDF.load(
-        io.StringIO(built(spec)["robot.full.urdf"]), build_scene_graph=False, load_meshes=False
+        io.StringIO(built(spec)["robot.urdf"]), build_scene_graph=False, load_meshes=False
     )
     joints = {joint.child: joint for joint in read.robot.joints}
     below = {edge.child: edge for edge in wanted if edge.child != "base_link"}
@@ -234,7 +234,9 @@ def test_in_the_urdf_for_a_stock_publisher_only_edges_of_others_float(
 ) -> None:
     spec, wanted = given
     read = yourdfpy.URDF.load(
-        io.StringIO(built(spec)["robot.urdf"]), build_scene_graph=False, load_meshes=False
+        io.StringIO(built(spec)["robot.state_publisher.urdf"]),
+        build_scene_graph=False,
+        load_meshes=False,
     )
     foreign = {edge.child for edge in wanted if edge.owner == "drive"} - {"base_link"}
     assert {joint.child for joint in read.robot.joints if joint.type == "floating"} == foreign

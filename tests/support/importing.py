@@ -19,7 +19,7 @@ def built(file: Path) -> str:
     assert compiled.robot, compiled.found
     assert not compiled.errors, [str(one) for one in compiled.errors][:3]
     files = {one.path: one.text for one in emit(compiled.robot, Target(folder=str(file.parent)))}
-    return files["robot.full.urdf"]
+    return files["robot.urdf"]
 
 
 def imported(urdf: str, folder: Path, *words: str) -> str:

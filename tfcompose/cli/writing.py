@@ -21,7 +21,7 @@ from tfcompose.compiler.emit import described, emit
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.reading import exists, is_file, is_folder
 from tfcompose.model.files import Target, unaddressed
-from tfcompose.model.plan import DESCRIPTION
+from tfcompose.model.plan import DESCRIPTION, STOCK_DESCRIPTION
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -257,7 +257,7 @@ def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Fi
     for part, described_robot in described(robot):
         folder = f"{part}/" if part else ""
         inside = replace(target, folder=posixpath.join(target.folder, folder))
-        for name, full in ((DESCRIPTION, True), ("robot.urdf", False)):
+        for name, full in ((DESCRIPTION, True), (STOCK_DESCRIPTION, False)):
             path = folder + name
             several = differences(described_robot, texts[path], inside, full=full)
             found += [finding("TF910", f"{path}: {one}", None, help=advice) for one in several]

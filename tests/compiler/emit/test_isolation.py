@@ -105,7 +105,7 @@ def test_what_the_guard_allows_is_allowed_under_the_final_name() -> None:
 def test_urdf_keeps_the_plain_names() -> None:
     links = {
         link.get("name")
-        for link in ET.fromstring(built("isolate: both")["robot.full.urdf"]).iter("link")  # noqa: S314
+        for link in ET.fromstring(built("isolate: both")["robot.urdf"]).iter("link")  # noqa: S314
     }
     assert "base_link" in links
 

@@ -85,7 +85,7 @@ def test_its_parameters_hold_robot_urdf_word_for_word_and_the_prefix() -> None:
         "publish_frequency": 1000.0,
         "ignore_timestamp": True,
         "frame_prefix": "r1/",
-        "robot_description": files["robot.urdf"],
+        "robot_description": files["robot.state_publisher.urdf"],
     }
     assert "frame_prefix" not in built()[1]["params/joints.yaml"]
 
@@ -114,7 +114,10 @@ def test_its_frequency_is_a_double_as_it_declares_it_also_where_the_file_has_an_
 
 def test_robot_urdf_is_one_tree_whose_root_has_no_inertia_and_foreign_edges_float() -> None:
     _, files = built()
-    stock, full = (ET.fromstring(files[name]) for name in ("robot.urdf", "robot.full.urdf"))  # noqa: S314 (ours)
+    stock, full = (
+        ET.fromstring(files[name])  # noqa: S314 (ours)
+        for name in ("robot.state_publisher.urdf", "robot.urdf")
+    )
     kinds = {
         str(end.get("link")): joint.get("type")
         for joint in stock.iter("joint")
@@ -184,8 +187,8 @@ def test_only_a_part_that_is_a_robot_has_a_stock_publisher_of_its_own() -> None:
         "ros__parameters"
     ]
     assert (params["robot_description"], params["frame_prefix"]) == (
-        files["one/robot.urdf"],
+        files["one/robot.state_publisher.urdf"],
         "r1/",
     )
     assert owners["arm_hand"] in {"static", "joints"}
-    assert '<child link="arm_hand"/>' in files["robot.urdf"]
+    assert '<child link="arm_hand"/>' in files["robot.state_publisher.urdf"]

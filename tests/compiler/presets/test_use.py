@@ -312,7 +312,7 @@ def test_where_only_the_driver_knows_a_frame_is_its_edge_is_declared_without_a_p
     ]
     (driven,) = next(process for process in plan["processes"] if process["name"] == "s")["drives"]
     assert driven["frames"]["s_color_frame"] == "unknown"
-    for path in ("r.urdf", "robot.urdf", "robot.full.urdf"):
+    for path in ("r.urdf", "robot.state_publisher.urdf", "robot.urdf"):
         text = files.get(path)
         if text is not None:
             links = set(re.findall(r'<link name="([^"]+)"', text))

@@ -137,7 +137,7 @@ RIGHT = (
 
 
 def test_an_urdf_is_taken_twice_with_everything_in_it_renamed(cell: Any) -> None:
-    text = files(cell(LEFT, RIGHT))["robot.full.urdf"]
+    text = files(cell(LEFT, RIGHT))["robot.urdf"]
     root = ET.fromstring(text)  # noqa: S314 (our own text)
     for kind in ("link", "joint", "transmission"):
         names = [one.get("name") for one in root.findall(kind)]
@@ -163,7 +163,7 @@ def test_a_shape_is_there_though_readers_of_the_urdf_alone_would_stumble_over_it
         '<robot name="p"><link name="flat"><visual><geometry><box'
         ' size="1\n\t2\t3"/></geometry></visual></link></robot>'
     )
-    text = files(cell("plate: {urdf: plate.urdf, parent: table}"))["robot.full.urdf"]
+    text = files(cell("plate: {urdf: plate.urdf, parent: table}"))["robot.urdf"]
     assert '<box size="1 2 3"/>' in text
 
 
@@ -201,7 +201,7 @@ def test_what_is_about_links_and_joints_that_are_removed_is_removed_too(
         "</robot>", f"{cart}{both}{control.format('one', joint.format('roll'))}</robot>"
     )
     (tmp_path / "third/arm/arm.urdf").write_text(text, encoding="utf-8")
-    root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
+    root = ET.fromstring(files(cell(LEFT))["robot.urdf"])  # noqa: S314 (our own text)
     assert [one.get("reference") for one in root.findall("gazebo")] == [
         "left_upper",
         None,
@@ -219,7 +219,7 @@ def test_names_with_other_characters_are_taken_from_others_and_renamed_everywher
         '"shoulder"', '"shoulder-joint 1.0"'
     )
     (tmp_path / "third/arm/arm.urdf").write_text(text, encoding="utf-8")
-    root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
+    root = ET.fromstring(files(cell(LEFT))["robot.urdf"])  # noqa: S314 (our own text)
     assert root.find("link[@name='left_upper & <arm>']") is not None
     assert [one.get("reference") for one in root.findall("gazebo")] == ["left_upper & <arm>", None]
     (joint,) = (one.get("name") for one in root.findall("transmission/joint"))
@@ -361,7 +361,7 @@ def test_a_floating_joint_of_a_foreign_file_is_reported_where_it_can_have_an_own
 
 
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
-    root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
+    root = ET.fromstring(files(cell(LEFT))["robot.urdf"])  # noqa: S314 (our own text)
     joint = next(one for one in root.findall("joint") if one.get("name") == "left_shoulder")
     output = {child.tag: child.attrib for child in joint}
     assert output["limit"] == {"lower": "-3", "upper": "3", "effort": "10", "velocity": "1"}
@@ -381,7 +381,7 @@ def test_every_frame_is_where_an_independent_reader_of_the_urdf_has_it(
     cell: Any, tmp_path: Path
 ) -> None:
     full = tmp_path / "whole.urdf"
-    full.write_text(files(cell(LEFT))["robot.full.urdf"], encoding="utf-8")
+    full.write_text(files(cell(LEFT))["robot.urdf"], encoding="utf-8")
     load = {"load_meshes": False, "build_scene_graph": True}
     mine, theirs = (
         yourdfpy.URDF.load(str(full), **load),
@@ -426,7 +426,7 @@ def test_an_urdf_can_be_a_robot_of_its_own(cell: Any) -> None:
     plan = read_plan(out["plan.json"], "plan.json")
     assert plan.process("left/joints").nodes == ("/left/tfcompose_joints",)
     assert {edge.joint.name for edge in plan.edges if edge.joint} == {"shoulder", "follow"}
-    assert '<link name="upper"/>' in out["left/robot.full.urdf"]
+    assert '<link name="upper"/>' in out["left/robot.urdf"]
 
 
 def test_a_xacro_file_is_expanded_with_arguments_and_the_robots_own_packages(cell: Any) -> None:

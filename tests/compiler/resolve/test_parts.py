@@ -145,7 +145,7 @@ def test_processes_of_a_part_are_in_its_namespace_and_know_final_frame_names() -
 def test_a_robot_of_its_own_has_its_own_publishers_description_and_joint_names() -> None:
     files = built(FLEET)
     plan = read_plan(files["plan.json"], "plan.json")
-    assert plan.process("one/joints").description == "one/robot.full.urdf"
+    assert plan.process("one/joints").description == "one/robot.urdf"
     assert plan.process("one/joints").nodes == ("/first/tfcompose_joints",)
     assert {edge.joint.name for edge in plan.edges if edge.joint} == {
         "wheel_joint",
@@ -155,7 +155,7 @@ def test_a_robot_of_its_own_has_its_own_publishers_description_and_joint_names()
     simulate = plan.process("two/wheels").simulate
     assert simulate
     assert simulate.joints == {"wheel_joint": 1.0}
-    two, full = (ET.fromstring(files[f"{part}robot.full.urdf"]) for part in ("two/", ""))  # noqa: S314 (our own text)
+    two, full = (ET.fromstring(files[f"{part}robot.urdf"]) for part in ("two/", ""))  # noqa: S314 (our own text)
     links = {link.get("name") for link in two.iter("link")}
     assert {"base_link", "wheel_link"} <= links
     assert not any(name and name.startswith("r2/") for name in links)
@@ -212,7 +212,7 @@ def test_a_part_without_a_namespace_is_a_piece_of_the_robot() -> None:
     assert shaker.simulate
     assert shaker.simulate.joints == {"left_shoulder": 0.0}
     assert shaker.after == {"static": "started"}
-    assert "left_shoulder" in files["robot.full.urdf"]
+    assert "left_shoulder" in files["robot.urdf"]
 
 
 def test_a_frame_of_the_part_is_placed_and_the_mount_edge_solved() -> None:

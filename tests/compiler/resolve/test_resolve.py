@@ -362,7 +362,7 @@ def test_an_edge_with_several_parents_hangs_on_the_first_and_names_the_others_ev
     ]
     assert (planned.parent, planned.switched) == ("r/base_link", ("r/rack",))
     assert "or on r/rack" in files["tree.txt"]
-    joint = re.search(r'<parent link="(\w+)"/>\s*<child link="tool"/>', files["robot.full.urdf"])
+    joint = re.search(r'<parent link="(\w+)"/>\s*<child link="tool"/>', files["robot.urdf"])
     assert joint
     assert joint[1] == "base_link"
     more = robot_of(TOOL.replace("[base_link, rack]", "base_link"))
@@ -381,7 +381,7 @@ def test_a_fixed_edge_has_the_name_of_a_joint_where_one_is_given() -> None:
         "c_bottom_screw_frame": "c_fix",
         "c_color_frame": "lens_fix",
     }
-    urdf = next(one.text for one in emit(robot) if one.path == "robot.urdf")
+    urdf = next(one.text for one in emit(robot) if one.path == "robot.state_publisher.urdf")
     assert all(f'<joint name="{name}" type="fixed">' in urdf for name in named.values())
     assert '<joint name="c_bottom_screw_frame_to_c_link" type="fixed">' in urdf
 

@@ -23,7 +23,7 @@ def urdfs(text: str) -> list[ET.Element]:
     assert not compiled.errors, compiled.errors
     assert compiled.robot
     files = {file.path: file.text for file in emit(compiled.robot)}
-    return [ET.fromstring(files[name]) for name in ("robot.full.urdf", "robot.urdf")]  # noqa: S314 (we wrote it)
+    return [ET.fromstring(files[name]) for name in ("robot.urdf", "robot.state_publisher.urdf")]  # noqa: S314 (we wrote it)
 
 
 HARDWARE = """
@@ -98,7 +98,7 @@ def test_a_raw_block_is_emitted_as_it_stands_in_both_files() -> None:
         assert urdf.findtext("gazebo/mu1") == "1.2"
     compiled = compile_robot(HEAD + text, "r.yaml", library())
     assert compiled.robot
-    full = next(file.text for file in emit(compiled.robot) if file.path == "robot.full.urdf")
+    full = next(file.text for file in emit(compiled.robot) if file.path == "robot.urdf")
     assert "<!-- worn: 0.9 -->" in full
 
 
@@ -168,7 +168,7 @@ processes: {x: {external: true}}
     compiled = compile_robot(holder, "r.yaml", library(), read=texts.__getitem__)
     assert not compiled.found, compiled.found
     assert compiled.robot
-    urdf = ET.fromstring(next(f.text for f in emit(compiled.robot) if f.path == "robot.full.urdf"))  # noqa: S314 (ours)
+    urdf = ET.fromstring(next(f.text for f in emit(compiled.robot) if f.path == "robot.urdf"))  # noqa: S314 (ours)
     names = [one.get("name") for one in urdf.findall("ros2_control")]
     assert names == ["left_motors", "right_motors"]
     assert [one.get("name") for one in urdf.findall("ros2_control/joint")] == [

@@ -112,9 +112,7 @@ def test_what_build_writes_has_no_findings(robot: str, tmp_path: Path) -> None:
             (tmp_path / file.path).write_text(file.text, encoding="utf-8")
             found = lint_urdf(str(tmp_path / file.path))
             root_body = (
-                {"TF712"}
-                if file.path == "robot.full.urdf" and robot == "autonomous_robot"
-                else set()
+                {"TF712"} if file.path == "robot.urdf" and robot == "autonomous_robot" else set()
             )
             assert {one.code for one in found} == root_body
 

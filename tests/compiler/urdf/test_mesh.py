@@ -56,7 +56,10 @@ def build(
 
 
 def addresses(folder: Path) -> list[str]:
-    both = [ET.parse(folder / name).iter("mesh") for name in ("robot.full.urdf", "robot.urdf")]  # noqa: S314 (our own)
+    both = [
+        ET.parse(folder / name).iter("mesh")  # noqa: S314 (our own)
+        for name in ("robot.urdf", "robot.state_publisher.urdf")
+    ]
     full, short = ([str(mesh.get("filename")) for mesh in meshes] for meshes in both)
     assert full == short
     return full

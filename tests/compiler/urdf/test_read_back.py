@@ -95,7 +95,7 @@ def test_whatever_value_is_another_one_is_noticed(text: str) -> None:
     robot = robot_of(text)
     files, observed = texts(robot), 0
     joints = {edge.joint_name for edge in robot.edges if edge.joint_name}
-    for name, full in (("robot.full.urdf", True), ("robot.urdf", False)):
+    for name, full in (("robot.urdf", True), ("robot.state_publisher.urdf", False)):
         assert not list(differences(robot, files[name], TARGET, full=full))
         for again, what in changed(files[name], joints):
             assert list(differences(robot, again, TARGET, full=full)), what
@@ -106,7 +106,7 @@ def test_whatever_value_is_another_one_is_noticed(text: str) -> None:
 @pytest.mark.parametrize("text", SPECS)
 def test_whatever_is_missing_or_there_twice_is_noticed(text: str) -> None:
     robot = robot_of(text)
-    complete = texts(robot)["robot.full.urdf"]
+    complete = texts(robot)["robot.urdf"]
     pieces = re.findall(
         r"^  <(?:link|joint) (?:[^>]*/>|.*?^  </(?:link|joint)>)\n",
         complete,
@@ -146,7 +146,7 @@ def test_what_yourdfpy_does_not_read_is_not_claimed(case: str) -> None:
     Where a new yourdfpy sees more, they can say so.
     """
     robot = robot_of(MORE)
-    complete = texts(robot)["robot.full.urdf"]
+    complete = texts(robot)["robot.urdf"]
     changed_text = complete.replace(*UNSEEN[case], 1)
     assert changed_text != complete
     assert not list(differences(robot, changed_text, TARGET, full=True))
@@ -173,7 +173,7 @@ def test_nothing_is_emitted_that_is_not_the_robot(
     monkeypatch.setattr("tfcompose.cli.writing.emit", wrong)
     words = ["build", str(ROBOTS / "rover.yaml"), "-o", str(tmp_path / "out")]
     assert main([*words, "--read-back"]) == 1
-    assert "error[TF910] robot.full.urdf: the joint " in capsys.readouterr().err
+    assert "error[TF910] robot.urdf: the joint " in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
     assert main(words) == 0
 
@@ -203,7 +203,7 @@ def test_what_is_no_robot_is_reported_and_is_no_traceback(text: str) -> None:
 @pytest.mark.parametrize(("key", "by"), [("xyz", 1e-9), ("rpy", 1e-9)])
 def test_a_pose_is_compared_to_the_last_digits_of_its_text(key: str, by: float) -> None:
     robot = robot_of(MORE.replace("rpy: [0.1, 0.2, 0.3]", "xyz: [1, 2, 3], rpy: [0.1, 0.2, 0.3]"))
-    text = texts(robot)["robot.full.urdf"]
+    text = texts(robot)["robot.urdf"]
     numbers = re.search(f'{key}="([^"]+)"', text[text.index('<joint name="j"') :])
     assert numbers
     first, *others = numbers[1].split()

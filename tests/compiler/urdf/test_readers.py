@@ -206,7 +206,7 @@ def test_a_reader_finds_every_frame_and_every_body_of_a_generated_robot(
 ) -> None:
     robot = generated(seed, name)
     files = source_text(robot)
-    reader = READERS[name](files["robot.full.urdf"], robot.base or "")
+    reader = READERS[name](files["robot.urdf"], robot.base or "")
     assert reader.moving >= {e.joint.name for e in robot.edges if e.joint and not e.joint.mimic}
     compare_poses(robot, reader, files)
     assert compare_bodies(robot, name, reader) >= 3
@@ -223,10 +223,10 @@ def test_a_reader_finds_every_frame_and_every_body_of_an_example(file: Path, nam
         files = source_text(robot)
         if name == "mujoco":
             reader: Reader = MuJoCo(
-                files["robot.full.urdf"], robot.base or "", 'boundmass="1e-6" boundinertia="1e-9"'
+                files["robot.urdf"], robot.base or "", 'boundmass="1e-6" boundinertia="1e-9"'
             )
         else:
-            reader = READERS[name](files["robot.full.urdf"], robot.base or "")
+            reader = READERS[name](files["robot.urdf"], robot.base or "")
             compare_bodies(robot, name, reader)
         compare_poses(robot, reader, files)
 
@@ -260,7 +260,7 @@ FREE = {
 def test_what_a_reader_cannot_read_it_cannot_read() -> None:
     robot = robot_of(json.dumps(FREE))
     files = source_text(robot)
-    urdf = files["robot.full.urdf"]
+    urdf = files["robot.urdf"]
     with pytest.raises(ValueError, match="free joint can only be used on top level"):
         MuJoCo(urdf, "base_link")
     with pytest.raises(AssertionError, match=r"b|c"):
@@ -270,9 +270,7 @@ def test_what_a_reader_cannot_read_it_cannot_read() -> None:
     compare_poses(robot, Pinocchio(urdf, "base_link"), files)
     with pytest.raises(ValueError, match="mass and inertia of moving bodies"):
         MuJoCo(
-            source_text(robot_of((ROBOTS / "my_robot.yaml").read_text("utf-8")))[
-                "robot.full.urdf"
-            ],
+            source_text(robot_of((ROBOTS / "my_robot.yaml").read_text("utf-8")))["robot.urdf"],
             "base_link",
         )
 

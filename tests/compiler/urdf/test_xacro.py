@@ -63,7 +63,7 @@ def robots() -> list[Any]:
 @pytest.mark.parametrize("text", robots())
 def test_by_its_defaults_it_is_the_robot(text: str, tmp_path: Path) -> None:
     files = files_of(text, tmp_path)
-    full = ET.fromstring(files["robot.full.urdf"])  # noqa: S314 (we wrote it)
+    full = ET.fromstring(files["robot.urdf"])  # noqa: S314 (we wrote it)
     assert tree(expanded(tmp_path / "robot.urdf.xacro")) == tree(full)
 
 
@@ -81,7 +81,7 @@ def test_twice_in_somebody_elses_xacro_it_is_two_robots_where_they_were_put(
         <xacro:{name} prefix="left_" parent="table" xyz="0 ${{away}} 0" rpy="0 0 ${{pi / 2}}" {meshes}/>
         <xacro:{name} prefix="right_" parent="left_{base_of(files)}"/>
         </robot>""")  # noqa: E501 (a text as its reader has it)
-    found, single = expanded(outer), ET.fromstring(files["robot.full.urdf"])  # noqa: S314 (as above)
+    found, single = expanded(outer), ET.fromstring(files["robot.urdf"])  # noqa: S314 (as above)
     links = [str(link.get("name")) for link in single.iter("link") if link.get("name")]
     assert [link.get("name") for link in found.findall("link")] == [
         "table",

@@ -83,7 +83,7 @@ def test_files_are_with_what_they_name_and_every_address_leads_to_them(folder: P
         "office.yaml",
         "office.pgm",
     }
-    for description in ("robot.urdf", "robot.full.urdf"):
+    for description in ("robot.state_publisher.urdf", "robot.urdf"):
         (mesh,) = re.findall(r'filename="([^"]+)"', (there / description).read_text())
         assert (there / mesh).is_file()
         assert (there / mesh).parent.joinpath("textures/rubber.png").is_file()

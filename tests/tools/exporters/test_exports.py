@@ -376,9 +376,11 @@ def launched(
 ) -> tuple[Plan, list[Recorded]]:
     files = built(text, *profiles)
     plan = read_plan(files["plan.json"], "plan.json")
-    (folder / "robot.urdf").write_text(files["robot.urdf"], "utf-8")
+    (folder / "robot.state_publisher.urdf").write_text(
+        files["robot.state_publisher.urdf"], "utf-8"
+    )
     (folder / "launch").mkdir()
-    (file,), _ = launch(plan, Machine(".."), files["robot.urdf"])
+    (file,), _ = launch(plan, Machine(".."), files["robot.state_publisher.urdf"])
     return plan, load(file.text, folder / "launch" / file.path, monkeypatch)
 
 
@@ -556,7 +558,9 @@ processes:
 
 
 def test_whom_launch_does_not_wait_for_is_reported_and_a_time_is_waited_for() -> None:
-    _, gaps = launch(compiled_plan(TIMED), Machine(".."), built(TIMED)["robot.urdf"])
+    _, gaps = launch(
+        compiled_plan(TIMED), Machine(".."), built(TIMED)["robot.state_publisher.urdf"]
+    )
     waits = {line.split()[0]: words_of(line) for line in gaps if "does not wait" in line}
     assert set(waits) == {"filter", "other"}
     assert "camera" in waits["filter"]
@@ -630,7 +634,7 @@ def test_a_launch_file_of_the_plan_is_included(
     ]
     assert include.words[0].words == (str(file),)
     assert include.launch_arguments == [("camera_name", "front"), ("config", f"{tmp_path}/x.yaml")]
-    _, gaps = launch(plan, Machine(".."), built(INCLUDING)["robot.urdf"])
+    _, gaps = launch(plan, Machine(".."), built(INCLUDING)["robot.state_publisher.urdf"])
     assert [words for line in gaps if (words := words_of(line)) >= {"camera", "again"}]
 
 
@@ -640,7 +644,9 @@ def test_a_launch_file_of_the_plan_is_included(
 def test_no_line_of_a_launch_file_is_long(text: str, profiles: tuple[str, ...]) -> None:
     files = built(text, *profiles)
     (file,), _ = launch(
-        read_plan(files["plan.json"], "plan.json"), Machine(".."), files["robot.urdf"]
+        read_plan(files["plan.json"], "plan.json"),
+        Machine(".."),
+        files["robot.state_publisher.urdf"],
     )
     assert max(map(len, file.text.splitlines())) <= 120
     assert all(
@@ -651,7 +657,9 @@ def test_no_line_of_a_launch_file_is_long(text: str, profiles: tuple[str, ...]) 
 
 def test_what_launch_does_otherwise_with_a_process_is_reported() -> None:
     text = DRIVEN.replace("node: slam,", "node: slam, lifecycle: active,")
-    _, output = launch(compiled_plan(text), Machine(".."), built(text)["robot.urdf"])
+    _, output = launch(
+        compiled_plan(text), Machine(".."), built(text)["robot.state_publisher.urdf"]
+    )
     ours = [words_of(line) for line in output if line.startswith(("drive", "/r1", "slam"))]
     for names in (
         {"drive", "limit"},

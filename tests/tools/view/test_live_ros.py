@@ -115,7 +115,7 @@ def wheel_process(folder: Path, start: Callable[..., Any]) -> Session:
     file.write_text(WHEEL, "utf-8")
     session = session_of(file)
     (folder / "plan.json").write_text(write_plan(plan_of(session.robot)), "utf-8")
-    (folder / "robot.full.urdf").write_text("<robot name='r'/>", "utf-8")
+    (folder / "robot.urdf").write_text("<robot name='r'/>", "utf-8")
     start("joints", folder / "plan.json", "joints")
     return session
 

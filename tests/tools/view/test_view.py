@@ -406,7 +406,7 @@ def test_a_built_plan_is_shown_with_its_bodies_and_frames(rover: Path) -> None:
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
     plan = read_plan((rover.parent / "out" / "plan.json").read_text("utf-8"), "plan.json")
     urdf = (rover.parent / "out" / plan.description).read_text("utf-8")
-    robot = robot_of_plan(plan, urdf, "robot.full.urdf", Packages().asset)
+    robot = robot_of_plan(plan, urdf, "robot.urdf", Packages().asset)
     meant = session_of(rover).robot
     assert robot.frames.keys() == meant.frames.keys()
     bodies = {frame for frame, link in robot.links.items() if link.visuals or link.collisions}

@@ -40,7 +40,12 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Build; exit code 0, 1 with errors in the robot, 2 if something is unreadable."""
     from tfcompose.cli.writing import build
+    from tfcompose.model.plan import DESCRIPTION, STOCK_DESCRIPTION
 
     folder, names, _ = build(arguments)
     print(f"wrote {folder}: {', '.join(names)}")
+    print(
+        f"{STOCK_DESCRIPTION} is {DESCRIPTION} for a stock robot_state_publisher: the root has no"
+        " inertia, of which KDL would warn, and edges of other owners are floating"
+    )
     return 0

@@ -14,7 +14,7 @@ from tfcompose.compiler.render.tree import graph_of, tree
 from tfcompose.compiler.urdf.macro import MACRO, caller, macro
 from tfcompose.compiler.urdf.write import urdf
 from tfcompose.model.files import AS_IN_SOURCE, File, Target
-from tfcompose.model.plan import DESCRIPTION
+from tfcompose.model.plan import DESCRIPTION, STOCK_DESCRIPTION
 from tfcompose.model.plan.file import write_plan
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File,
     full, stock = urdf(robot, target)
     return (
         File(f"{folder}{DESCRIPTION}", full),
-        File(f"{folder}robot.urdf", stock),
+        File(f"{folder}{STOCK_DESCRIPTION}", stock),
         File(f"{folder}robot.urdf.xacro", caller(robot)),
         File(f"{folder}{MACRO}", macro(robot, target)),
     )

@@ -474,7 +474,9 @@ def switch_text(switch: dict[str, Any]) -> str:
 VERSION: Literal[2] = 2
 
 #: The file beside the plan that holds the whole robot's description.
-DESCRIPTION = "robot.full.urdf"
+DESCRIPTION = "robot.urdf"
+#: The file beside it that holds what a stock robot_state_publisher is given.
+STOCK_DESCRIPTION = "robot.state_publisher.urdf"
 #: What no name of a node may hold.
 _NO_NAME = re.compile(r"\W")
 

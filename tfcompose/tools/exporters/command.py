@@ -179,9 +179,10 @@ def _exported(
     if arguments.kind == "launch":
         from tfcompose.cli.plans import is_plan
         from tfcompose.cli.reading import read_text
+        from tfcompose.model.plan import STOCK_DESCRIPTION
         from tfcompose.tools.exporters.launch import launch
 
-        urdf = read_text(str(file.parent / "robot.urdf"))
+        urdf = read_text(str(file.parent / STOCK_DESCRIPTION))
         if is_plan(arguments.file):
             return launch(plan, Machine(relative), urdf)
         from tfcompose.tools.exporters.launch_arguments import launch_values

@@ -15,6 +15,7 @@ from xml.etree import ElementTree as ET
 from tfcompose.foundation.numbers import number
 from tfcompose.launcher.program import ANYWHERE_PARTS
 from tfcompose.model.files import File
+from tfcompose.model.plan import STOCK_DESCRIPTION
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
 from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, PythonCode
@@ -96,10 +97,11 @@ def process(name, **more):
 '''
     ),
     "description": (
-        '''
+        f'''
 def description():
     """What robot_state_publisher is given."""
-    return ParameterValue((BUILD / "robot.urdf").read_text(encoding="utf-8"), value_type=str)
+    urdf = (BUILD / "{STOCK_DESCRIPTION}").read_text(encoding="utf-8")
+    return ParameterValue(urdf, value_type=str)
 '''
     ),
     "fixed": (
@@ -159,7 +161,7 @@ def launch(
 ) -> tuple[tuple[File, ...], list[str]]:
     """Return the launch file, and what it does not keep of the plan.
 
-    ``urdf`` is the text of the plan's robot.urdf.
+    ``urdf`` is the text of ``STOCK_DESCRIPTION``, beside the plan.
 
     A stock robot_state_publisher sends what that URDF holds as fixed or jointed, and a
     static_transform_publisher each fixed edge elsewhere; where the URDF is not all of what
@@ -280,8 +282,8 @@ class _Export:
                 *(_fixed(plan, edge, names[edge.child]) for edge in stock),
             )
             self.gaps.append(
-                "robot_description is robot.urdf, in which edges of other owners are floating"
-                " joints"
+                f"robot_description is {STOCK_DESCRIPTION}, in which edges of other owners are"
+                " floating joints"
             )
         for name in self._awaited(stock):
             self._variables[name] = _variable_name(name, self._variables.values())

@@ -8,7 +8,7 @@ from tests.support.cli import tfcompose_in
 from tfcompose.cli.commands import tree
 from tfcompose.cli.console import Console
 from tfcompose.foundation.findings import Note, finding
-from tfcompose.model.messages import Ended, FindingShown, LogLine
+from tfcompose.model.messages import Ended, FindingShown, LogLine, Replanned
 from tfcompose.model.plan import OutputPlace, Plan, PlanProcess, RosSettings
 
 PLAN = Plan("rover", "", None, RosSettings(), (), (PlanProcess("drive", "run"),))
@@ -50,6 +50,15 @@ def test_lines_that_were_not_printed_are_quoted() -> None:
     output = Printed()
     Console(PLAN, output, colour=False)(FindingShown(FAILED))
     assert output.text.count("boom") == 1
+
+
+def test_names_of_any_length_align_also_of_processes_that_are_new() -> None:
+    output = Printed()
+    console = Console(PLAN, output, colour=False)
+    console(Replanned((), ("the_driver_of_a_camera_with_a_long_name",), ()))
+    console(LogLine("the_driver_of_a_camera_with_a_long_name", "stdout", "a"))
+    console(LogLine("drive", "stdout", "b"))
+    assert len({line.index("|") for line in output.text.splitlines()}) == 1
 
 
 def test_a_tree_on_a_terminal_has_each_frame_in_its_place_and_does_not_wrap(

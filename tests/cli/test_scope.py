@@ -4,6 +4,7 @@ The one of this ROS domain, else of the file here, else nobody's.
 """
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -16,6 +17,7 @@ from tfcompose.cli import main
 from tfcompose.cli.commands import monitor
 from tfcompose.cli.runs import chosen_run, other_domains, run_of_domain
 from tfcompose.foundation.geometry import Pose
+from tfcompose.launcher.output import Logs
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir, runtime_dir_of
 from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.model.plan.file import write_plan
@@ -103,6 +105,41 @@ def test_logs_are_those_of_the_newest_run_in_the_domain(
     out = capsys.readouterr().out
     assert "near" in out
     assert "far" not in out
+
+
+@pytest.mark.parametrize(
+    ("words", "printed"),
+    [
+        ("logs", ["arm/driver_of_the_left_hand | third", "b                           | third"]),
+        ("logs b --previous", ["b | second"]),
+        ("logs b --since 1h", ["b | first", "b | second", "b | third"]),
+    ],
+)
+def test_logs_begin_at_this_run_and_names_of_any_length_align(
+    words: str, printed: list[str], runs: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = runs("rover", 67)
+    for run in ("first", "second", "third"):
+        logs = Logs(place.logs)
+        for name in ("arm/driver_of_the_left_hand", "b"):
+            assert logs.write(name, run) is None
+        logs.close()
+        time.sleep(0.002)
+    assert main(words.split()) == 0
+    assert capsys.readouterr().out.splitlines() == printed
+
+
+@pytest.mark.parametrize(
+    ("words", "code"), [("logs --previous", 1), ("logs -f --previous", 2), ("logs --since x", 2)]
+)
+def test_a_run_that_is_not_there_is_refused(
+    words: str, code: int, runs: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    logs = Logs(runs("rover", 67).logs)
+    assert logs.write("b", "only") is None
+    logs.close()
+    assert main(words.split()) == code
+    assert capsys.readouterr().out == ""
 
 
 def replace_name(place: RuntimeDir, name: str, tmp_path: Path) -> RuntimeDir:

@@ -4,11 +4,22 @@ import errno
 import os
 import stat
 import time
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 import pytest
 
-from tfcompose.launcher.output import KEPT_FILES, Follower, Logs, last_modified, logged, read_logs
+from tfcompose.cli.commands.logs import since
+from tfcompose.launcher.output import (
+    KEPT_FILES,
+    KEPT_RUNS,
+    Follower,
+    Logs,
+    last_modified,
+    logged,
+    read_logs,
+    runs_of,
+)
 
 
 def texts(folder: Path, *names: str) -> list[str]:
@@ -64,7 +75,7 @@ def test_a_file_that_is_full_is_turned_over_and_the_oldest_lines_go(tmp_path: Pa
     for number in range(1000):
         logs.write("a", f"line {number}")
     logs.close()
-    files = sorted(tmp_path.iterdir())
+    files = sorted(tmp_path.glob("a.log*"))
     assert len(files) == KEPT_FILES + 1
     assert all(file.stat().st_size <= 1000 for file in files)
     kept = texts(tmp_path, "a")
@@ -147,3 +158,51 @@ def test_a_folder_that_another_user_could_exchange_gets_no_logs(
     )
     assert "another user" in (Logs(tmp_path / "robot").write("a", "text") or "")
     assert list((tmp_path / "robot").iterdir()) == []
+
+
+def test_the_lines_of_each_run_are_known_from_its_first_to_its_last(tmp_path: Path) -> None:
+    for run in ("first", "second", "third"):
+        logs = Logs(tmp_path, file_bytes=200)
+        for name in ("a", "b"):
+            assert logs.write(name, run) is None
+        logs.close()
+        time.sleep(0.002)
+    begins = runs_of(tmp_path)
+    for run, begin, end in zip(
+        ("first", "second", "third"), begins, (*begins[1:], 2e9), strict=True
+    ):
+        lines = read_logs(tmp_path, ["a", "b"], begin, end)
+        assert [(name, text) for _, name, text in lines] == [("a", run), ("b", run)]
+    assert logged(tmp_path) == ["a", "b"]
+
+
+def test_the_begin_of_old_runs_is_forgotten(tmp_path: Path) -> None:
+    (tmp_path / "runs").write_text("2026-01-01T00:00:00.000+00:00\ntorn\n" * KEPT_RUNS, "utf-8")
+    logs = Logs(tmp_path)
+    assert logs.write("a", "text") is None
+    logs.close()
+    runs = runs_of(tmp_path)
+    assert len(runs) == KEPT_RUNS
+    assert abs(runs[-1] - time.time()) < 60
+
+
+@pytest.mark.parametrize(
+    ("text", "ago_s"),
+    [("90s", 90), ("10m", 600), ("1.5 min", 90), ("2h", 7200), ("3d", 259200)],
+)
+def test_a_time_that_is_so_long_ago_is_read(text: str, ago_s: float) -> None:
+    assert abs(time.time() - since(text) - ago_s) < 5
+
+
+def test_a_local_time_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = time.mktime(time.strptime("2026-11-26 14:03", "%Y-%m-%d %H:%M"))
+    assert since("2026-11-26T14:03") == begin
+    monkeypatch.setattr(time, "strftime", lambda _: "2026-11-26")
+    assert since("14:03") == since("14:03:00") == begin
+    assert since("9:05") == begin - 4 * 3600 - 58 * 60
+
+
+@pytest.mark.parametrize("text", ["", "yesterday", "10", "10x", "-5m", "25:00", "14:3", "9:99"])
+def test_what_is_no_time_is_refused(text: str) -> None:
+    with pytest.raises(ArgumentTypeError):
+        since(text)

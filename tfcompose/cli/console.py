@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))
 #: Whose lines the launcher's own are.
 LAUNCHER = "tfcompose"
-#: A longer name before a line does not move all lines to the right.
-WIDEST_NAME = 24
 NAMED_AT_MOST = 4
 #: Of so many last lines of a process it is known that they were printed; findings quote fewer.
 QUOTED_AT_MOST = 40
@@ -60,11 +58,6 @@ _CLEAR_LINE = "\r\033[K"
 def prefix_of(name: str, width: int) -> str:
     """Return what stands before each line of the process."""
     return f"{name:<{width}} |"
-
-
-def prefix_width(names: list[str]) -> int:
-    """Return how wide the names before lines are: as the longest, within bounds."""
-    return min(max(map(len, names), default=0), WIDEST_NAME)
 
 
 class Output(Protocol):
@@ -117,7 +110,7 @@ class Console:
         self._keep = keep
         self._status = status
         self._colour = colour
-        self._width = prefix_width([*names, LAUNCHER])
+        self._width = max(map(len, [*names, LAUNCHER]))
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
         self._outputs = {
@@ -221,6 +214,7 @@ class Console:
 
     @_write.register
     def _(self, notice: Replanned) -> None:
+        self._width = max(self._width, *map(len, ("", *notice.added)))
         parts = (("changed", notice.changed), ("new", notice.added), ("gone", notice.removed))
         changes = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
         self._say(f"another plan: {changes or 'nothing to restart'}")

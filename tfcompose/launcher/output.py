@@ -7,8 +7,9 @@ be written at once is kept, up to a limit; beyond it, lines of processes are lef
 and they are in the logs.
 
 A log is one file for each process, ``TIME TEXT`` a line, rotated when it is full. The times are
-local, with milliseconds and zone, so that lines of several files can be merged. A disk that is
-full costs lines, and stops nobody.
+local, with milliseconds and zone, so that lines of several files can be merged. The file ``runs``
+beside them has a line for each run, when it began. A disk that is full costs lines, and stops
+nobody.
 """
 
 from __future__ import annotations
@@ -16,13 +17,16 @@ from __future__ import annotations
 import contextlib
 import errno
 import heapq
+import math
 import os
 import select
 import selectors
 import stat
 import time
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import partial
+from itertools import dropwhile, takewhile
 from typing import TYPE_CHECKING
 
 from tfcompose.launcher.control import Control
@@ -203,6 +207,8 @@ class Notifier:
 #: A file is turned over beyond this size; so many old ones are kept beside it.
 FILE_BYTES = 8_000_000
 KEPT_FILES = 2
+#: Of so many runs it is known when they began.
+KEPT_RUNS = 100
 #: After a failure the disk is left alone for so long, in seconds.
 LEFT_ALONE_S = 5.0
 
@@ -222,21 +228,22 @@ class Logs:
     file_bytes: int = FILE_BYTES
     lost: int = 0
     _open: dict[str, _Log] = field(default_factory=dict)
+    _has_begun: bool = False
     _failed: float = -LEFT_ALONE_S
     _second: int = -1
     _stamp: tuple[str, str] = ("", "")
 
     def write(self, process: str, text: str) -> str | None:
         """Append a line; return why that failed, the first time, and None otherwise."""
-        now = time.time()
+        stamp = self._time(time.time())
         if time.monotonic() - self._failed < LEFT_ALONE_S:
             self.lost += 1
             return None
-        data = f"{self._time(now)} {text}\n".encode(errors="replace")
+        data = f"{stamp} {text}\n".encode(errors="replace")
         try:
-            log = self._open.get(process) or self._begin(process)
+            log = self._open.get(process) or self._begin(process, stamp)
             if log.size + len(data) > self.file_bytes:
-                log = self._rotate(process, log)
+                log = self._rotate(process, log, stamp)
             if os.write(log.fd, data) != len(data):
                 os.write(log.fd, b"\n")  # no room for all of it: the next attempt says why
             log.size += len(data)
@@ -251,24 +258,30 @@ class Logs:
             os.close(log.fd)
         self._open.clear()
 
-    def _begin(self, process: str) -> _Log:
+    def _begin(self, process: str, stamp: str) -> _Log:
         path = self.folder / f"{process}.log"  # of a part in a folder: arm/driver
         path.parent.mkdir(parents=True, exist_ok=True)
         for folder in {self.folder, path.parent}:
             _ensure_own(folder)
         _ensure_kept(self.folder.parent)
+        if not self._has_begun:
+            self._has_begun = True
+            runs = [*_run_lines(self.folder)[1 - KEPT_RUNS :], stamp]
+            new = self.folder / f".runs.{os.getpid()}"
+            new.write_text("".join(f"{run}\n" for run in runs), encoding="utf-8")
+            new.replace(self.folder / "runs")
         fd = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW, 0o640)
         log = self._open[process] = _Log(path, fd, os.fstat(fd).st_size)
         return log
 
-    def _rotate(self, process: str, log: _Log) -> _Log:
+    def _rotate(self, process: str, log: _Log, stamp: str) -> _Log:
         os.close(log.fd)
         del self._open[process]
         for number in range(KEPT_FILES, 0, -1):
             newer = log.path.with_suffix(f".log.{number - 1}") if number > 1 else log.path
             with contextlib.suppress(FileNotFoundError):
                 newer.replace(log.path.with_suffix(f".log.{number}"))
-        return self._begin(process)
+        return self._begin(process, stamp)
 
     def _time(self, now: float) -> str:
         second = int(now)
@@ -322,9 +335,36 @@ def last_modified(folder: Path) -> float:
     return max((file.stat().st_mtime for file in folder.rglob("*.log")), default=0.0)
 
 
-def read_logs(folder: Path, names: list[str]) -> Iterator[tuple[str, str, str]]:
-    """Yield (time, process, text) of these processes' lines, oldest first."""
-    return heapq.merge(*(_lines(folder, name) for name in names), key=lambda line: line[0])
+def read_logs(
+    folder: Path, names: list[str], begin_s: float = 0.0, end_s: float = math.inf
+) -> Iterator[tuple[str, str, str]]:
+    """Yield (time, process, text) of these processes' lines, oldest first.
+
+    Only of those from ``begin_s`` on, and before ``end_s``, in seconds since 1970.
+    """
+    lines: Iterator[tuple[str, str, str]]
+    lines = heapq.merge(*(_lines(folder, name) for name in names), key=lambda line: line[0])
+    lines = dropwhile(lambda line: _instant(line[0]) < begin_s, lines) if begin_s else lines
+    return takewhile(lambda line: _instant(line[0]) < end_s, lines) if end_s < math.inf else lines
+
+
+def runs_of(folder: Path) -> list[float]:
+    """Return when the runs with these logs began, in seconds since 1970, the newest last."""
+    return [_instant(line) for line in _run_lines(folder)]
+
+
+def _run_lines(folder: Path) -> list[str]:
+    with contextlib.suppress(OSError):
+        return (folder / "runs").read_text(encoding="utf-8", errors="replace").splitlines()
+    return []
+
+
+def _instant(stamp: str) -> float:
+    """Return the time of a line in seconds since 1970; 0 where the line was torn."""
+    try:
+        return datetime.fromisoformat(stamp).timestamp()
+    except ValueError:
+        return 0.0
 
 
 def _lines(folder: Path, name: str) -> Iterator[tuple[str, str, str]]:

@@ -1,20 +1,25 @@
 """Print the logs of a robot's processes, also after it has ended.
 
-Print the logs of a running or ended robot, oldest line first. Logs are kept on disk and rotated.
-Lines of the launcher itself are those of tfcompose.
+Print the logs of the robot's run, or of its last one where it has ended, oldest line first. Logs
+are kept on disk and rotated, those of earlier runs too. Lines of the launcher itself are those of
+tfcompose.
 """
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import shlex
 import sys
 import time
+from argparse import ArgumentTypeError
 from collections import deque
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_robot, count
-from tfcompose.cli.terminal import coloured, fail, has_reader
+from tfcompose.cli.terminal import UNREADABLE, coloured, fail, has_reader
 from tfcompose.compiler.render.text import PLAIN
 
 if TYPE_CHECKING:
@@ -42,13 +47,41 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-t", "--times", action="store_true", help="print the time before each line"
     )
+    past = parser.add_mutually_exclusive_group()
+    past.add_argument(
+        "--since",
+        type=since,
+        metavar="TIME",
+        help="begin so long ago (90s, 10m, 2h, 3d) or at a time (14:03, 2026-11-26T14:03), in "
+        "earlier runs too",
+    )
+    past.add_argument("--previous", action="store_true", help="print the run before this one")
     add_robot(parser)
+
+
+_AGO = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|m|h|d)")
+_UNIT_S = {"s": 1, "m": 60, "min": 60, "h": 3600, "d": 86400}
+
+
+def since(text: str) -> float:
+    """Read how long ago, or a local time, as seconds since 1970.
+
+    Raises:
+        ArgumentTypeError: if it is neither.
+    """
+    if ago := _AGO.fullmatch(text):
+        return time.time() - float(ago[1]) * _UNIT_S[ago[2]]
+    try:
+        stamp = f"{time.strftime('%Y-%m-%d')}T{text:>05}" if ":" in text[:3] else text
+        return datetime.fromisoformat(stamp).timestamp()
+    except ValueError:
+        raise ArgumentTypeError(f"{text} is no time, such as 10m, 14:03 or 2026-11-26") from None
 
 
 def run(arguments: Namespace) -> int:
     """Print the logs; exit code 0, 1 where there are none."""
     from tfcompose.foundation.findings import did_you_mean
-    from tfcompose.launcher.output import Follower, logged, read_logs
+    from tfcompose.launcher.output import Follower, logged, read_logs, runs_of
 
     place = _place(arguments.robot, shlex.join(["logs", *arguments.name]))
     known = logged(place.logs)
@@ -57,9 +90,19 @@ def run(arguments: Namespace) -> int:
             advice = did_you_mean(name, known, f"there are logs of {', '.join(known)}")
             fail(f"{place.name} has no log of {name}; {advice}")
     names = arguments.name or known
+    if arguments.previous and arguments.follow:
+        fail("--previous prints a run that has ended: leave out --follow", UNREADABLE)
+    *earlier, begin_s = [0.0, *runs_of(place.logs)]
+    end_s = math.inf
+    if arguments.previous:
+        if not any(earlier):
+            fail(f"no run of {place.name} before this one is known")
+        begin_s, end_s = earlier[-1], begin_s
+    elif arguments.since is not None:
+        begin_s = arguments.since
     follower = Follower(place.logs, names)
-    printer = _LogPrinter(known, times=arguments.times)
-    lines = read_logs(place.logs, names)
+    printer = _LogPrinter(known, names, times=arguments.times)
+    lines = read_logs(place.logs, names, begin_s, end_s)
     printer.print(lines if arguments.lines is None else deque(lines, maxlen=arguments.lines))
     while arguments.follow:
         ended = place.holder() is None
@@ -91,15 +134,15 @@ def _place(robot: str | None, command: str) -> RuntimeDir:
 
 
 class _LogPrinter:
-    def __init__(self, names: list[str], *, times: bool) -> None:
-        from tfcompose.cli.console import COLOURS, prefix_of, prefix_width
+    def __init__(self, known: list[str], names: list[str], *, times: bool) -> None:
+        from tfcompose.cli.console import COLOURS, prefix_of
 
-        width = prefix_width(names)
+        width = max(map(len, names), default=0)
         colours = COLOURS if coloured(sys.stdout) else ("",)
         ends = PLAIN if coloured(sys.stdout) else ""
         self._prefixes = {
             name: f"{colours[index % len(colours)]}{prefix_of(name, width)}{ends}"
-            for index, name in enumerate(names)
+            for index, name in enumerate(known)
         }
         self._times = times
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_trust
@@ -44,7 +45,9 @@ def run(command: str, arguments: Namespace) -> int | None:
 def _options(arguments: Namespace) -> list[str]:
     """Return the options of the command itself, as they are passed on to each host."""
     values = vars(arguments)
-    options = [f"--{name}" for name in ("leftovers", "follow", "times") if values.get(name)]
+    options = [
+        f"--{name}" for name in ("leftovers", "follow", "times", "previous") if values.get(name)
+    ]
     if "format" in values:
         options += ["--format", arguments.format]
     if "timeout" in values:
@@ -53,4 +56,6 @@ def _options(arguments: Namespace) -> list[str]:
         options += ["--fail-on", arguments.fail_on]
     if values.get("lines") is not None:
         options += ["--lines", str(arguments.lines)]
+    if values.get("since") is not None:
+        options += ["--since", datetime.fromtimestamp(arguments.since).astimezone().isoformat()]
     return options

@@ -17,7 +17,7 @@ from tfcompose.cli.console import Console
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.compiler.resolve import resolve
 from tfcompose.foundation.catalogue import read_code
-from tfcompose.model.messages import GUARD_EVENTS, Clear, FindingShown
+from tfcompose.model.messages import GUARD_EVENTS, Clear, FindingShown, line_of
 from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.spec.language import validate
 from tfcompose.spec.load import load
@@ -95,7 +95,7 @@ def test_tf801_has_the_forms_of_its_way() -> None:
         guard.repeat(guard.joins(name), "map odom", 10)
     (event,) = [event for event in guard.events if isinstance(event, FindingShown)]
     assert event.found.code == "TF801"
-    launcher = begin(GUARD).feed(Clear(), GUARD_EVENTS.read(GUARD_EVENTS.line(event)))
+    launcher = begin(GUARD).feed(Clear(), GUARD_EVENTS.decode(line_of(event)))
     (notice,) = launcher.all(FindingShown)
     assert notice.found == event.found
     output = Lines()

@@ -64,6 +64,7 @@ ONLY_IN: dict[str, set[str]] = {
     "resvg_py": {"compiler.draw"},
     "font_lato": {"compiler.draw"},
     "argcomplete": {"cli"},
+    "msgspec": {"cli", "guard", "launcher", "model", "tools.exporters"},
     "regex": {"launcher"},
     "rich": {"cli"},
     "rclpy": {"tf.ros"},
@@ -335,13 +336,13 @@ def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> No
 @pytest.mark.parametrize(
     "words", [("ps",), ("down",), ("logs",), ("up", "plan.json", "--dry-run")]
 )
-def test_commands_after_the_plan_load_nothing_from_elsewhere_and_no_compiler(
+def test_commands_after_the_plan_load_msgspec_alone_from_elsewhere_and_no_compiler(
     words: tuple[str, ...], bare: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     built = "tests/golden/my_robot/plan.json"
     loaded = loaded_by(command(*(built if word == "plan.json" else word for word in words)))
-    assert not foreign(loaded, bare)
+    assert foreign(loaded, bare) == {"msgspec", "typing_extensions"}
     assert {"launcher", "model"} & wings_in(loaded)
     assert not rooms_in(
         loaded, {"spec", "compiler.resolve", "compiler.check", "compiler.compile", "compiler.emit"}
@@ -351,7 +352,7 @@ def test_commands_after_the_plan_load_nothing_from_elsewhere_and_no_compiler(
 @pytest.mark.parametrize(
     "words", [("lint",), ("tree",), ("build", "-o")], ids=lambda words: words[0]
 )
-def test_commands_before_the_plan_load_yaml_and_pydantic_and_nothing_else_from_elsewhere(
+def test_commands_before_the_plan_load_yaml_pydantic_and_msgspec_alone_from_elsewhere(
     words: tuple[str, ...], bare: set[str], tmp_path: Path
 ) -> None:
     more = [str(tmp_path)] if "-o" in words else []
@@ -364,15 +365,15 @@ def test_commands_before_the_plan_load_yaml_and_pydantic_and_nothing_else_from_e
         "typing_extensions",
         "typing_inspection",
     }
-    assert foreign(loaded, bare) - {"cython_runtime"} == {"yaml", *pydantic}
+    assert foreign(loaded, bare) - {"cython_runtime"} == {"msgspec", "yaml", *pydantic}
     assert not wings_in(loaded) & {"tf", "launcher", "guard"}
 
 
-def test_reading_and_supervising_a_plan_loads_no_compiler_and_regex_alone_from_elsewhere(
+def test_reading_and_supervising_a_plan_loads_no_compiler_and_little_from_elsewhere(
     bare: set[str],
 ) -> None:
     loaded = loaded_by("import tfcompose.model.plan.file, tfcompose.launcher.supervisor")
-    assert foreign(loaded, bare) - {"cython_runtime"} == {"regex"}
+    assert foreign(loaded, bare) - {"cython_runtime", "typing_extensions"} == {"msgspec", "regex"}
     assert wings_in(loaded) == {"foundation", "launcher", "model", "tf"}
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
 from tfcompose.cli.dashboard import KEPT_LINES, Dashboard
 from tfcompose.cli.screen import KeyDecoder
@@ -85,8 +86,10 @@ def edge_of(number: int) -> PlanEdge:
 def dashboard(count: int = 3, edges: int = 2, **changes: object) -> Dashboard:
     """Return the view of a robot whose processes all run and whose edges are all live."""
     names = ["drive", *(f"process_{number}" for number in range(1, count))]
-    states = [replace(RUNNING, name=name, pid=100 + number) for number, name in enumerate(names)]
-    states[0] = replace(states[0], edges=edges, live=edges)
+    states = [
+        structs.replace(RUNNING, name=name, pid=100 + number) for number, name in enumerate(names)
+    ]
+    states[0] = structs.replace(states[0], edges=edges, live=edges)
     status = RobotStatus(
         robot="rover",
         host=None,
@@ -108,7 +111,9 @@ def dashboard(count: int = 3, edges: int = 2, **changes: object) -> Dashboard:
         tuple(map(edge_of, range(edges))),
         tuple(PlanProcess(n, "run") for n in names),
     )
-    return Dashboard("rover@0", plan, clock=lambda: NOON, status=replace(status, **changes))  # type: ignore[arg-type]
+    return Dashboard(
+        "rover@0", plan, clock=lambda: NOON, status=structs.replace(status, **changes)
+    )
 
 
 def shown(view: Dashboard, columns: int = 80, rows: int = 24) -> str:

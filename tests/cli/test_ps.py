@@ -1,9 +1,9 @@
 """What ``ps`` makes of a robot's findings: its lines, its JSON and its exit code."""
 
 import json
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from tests.golden.test_views import STATUS, process
 from tfcompose.cli.commands import ps

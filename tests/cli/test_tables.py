@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import get_args
 
+import msgspec
 import pytest
 
 from tfcompose.cli import preset_page
@@ -20,7 +21,6 @@ from tfcompose.compiler.render.tree import pose_text, tree
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tree import drawn
 from tfcompose.model.messages import ProcessState, ProcessStatus, StateName, notice_line
-from tfcompose.model.plan.codec import encode
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
@@ -141,7 +141,7 @@ def test_a_state_is_one_word_in_text_in_json_and_in_the_help(state: StateName) -
         (),
     )
     event = json.loads(notice_line(ProcessState("drive", state), 0))
-    assert row(status, {})[1] == encode(status)["state"] == event["state"]
+    assert row(status, {})[1] == msgspec.to_builtins(status)["state"] == event["state"]
     assert f"`{state}`" in topic("background")
 
 

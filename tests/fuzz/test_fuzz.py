@@ -165,14 +165,13 @@ def test_any_change_of_a_plan_is_read_or_refused(data: Any) -> None:
 @pytest.mark.parametrize(
     "value", [10**400, -(10**400), 1e308, float("nan"), float("inf"), True, None, "1", [], {}]
 )
-@pytest.mark.parametrize("key", ["xyz", "quat_xyzw", "rate", "source", "owner", "joint"])
+@pytest.mark.parametrize("key", ["xyz", "quat_xyzw", "pose", "rate", "source", "owner", "joint"])
 def test_a_plan_with_a_wrong_value_in_an_edge_is_refused_or_read_and_never_crashes(
     key: str, value: Any
 ) -> None:
     data = json.loads(PLANS[0])
-    data["edges"][0][key] = (
-        [value] * 3 if key == "xyz" else [0, 0, 0, value] if key == "quat_xyzw" else value
-    )
+    poses = {"xyz": [[value] * 3, [0, 0, 0, 1]], "quat_xyzw": [[0] * 3, [0, 0, 0, value]]}
+    data["edges"][0] |= {"pose": poses[key]} if key in poses else {key: value}
     try:
         read_plan(json.dumps(data), "plan.json")
     except RejectedError as error:

@@ -21,6 +21,7 @@ from tfcompose.model.messages import (
     OwnerReady,
     RecoveredShown,
     TreeComplete,
+    line_of,
 )
 from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 
@@ -104,7 +105,7 @@ def test_what_comes_in_one_message_is_announced_in_few_events(
     ]
     assert [len(event.children) for event in live] == [1000, 1000, 500]
     assert [child for event in live for child in event.children] == names
-    assert [GUARD_EVENTS.read(GUARD_EVENTS.line(event)) for event in live] == live
+    assert [GUARD_EVENTS.decode(line_of(event)) for event in live] == live
 
 
 def test_edges_owners_and_the_tree_are_each_announced_once(watch: Callable[..., History]) -> None:

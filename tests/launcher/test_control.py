@@ -14,7 +14,7 @@ from tfcompose.launcher import answers
 from tfcompose.launcher.answers import answer
 from tfcompose.launcher.control import LONGEST_REQUEST, Control
 from tfcompose.launcher.state import initial
-from tfcompose.model.messages import REQUESTS, Done, Refusal, Request, UpdateRequest
+from tfcompose.model.messages import Done, Refusal, Request, UpdateRequest, line_of
 from tfcompose.model.plan import Plan, RosSettings
 
 PLAN = Plan("rover", "", None, RosSettings(), (), ())
@@ -75,7 +75,7 @@ def test_what_is_no_request_is_answered_with_an_error_and_the_next_is_heard(
 ) -> None:
     assert "error" in json.loads(connection.ask(line + b"\n"))
     update = UpdateRequest("plan.json", "/")
-    assert "error" not in json.loads(connection.ask(REQUESTS.line(update).encode()))
+    assert "error" not in json.loads(connection.ask(line_of(update)))
     assert connection.requests == [update]
 
 

@@ -14,11 +14,11 @@ from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.foundation.signals import Stop
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import (
-    GUARD_EVENTS,
     Clear,
     LogLine,
     Notice,
     ProcessState,
+    line_of,
 )
 from tfcompose.model.plan import PlanProcess
 from tfcompose.model.variables import GO, HOLD_FD
@@ -39,10 +39,7 @@ time.sleep(180)
 def observing_until(file: str) -> PlanProcess:
     """Return a guard whose look before the start ends when there is such a file."""
     observation = f"import os, time\nwhile not os.path.exists({file!r}): time.sleep(0.01)\n"
-    say = (
-        "os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']),"
-        f" {GUARD_EVENTS.line(Clear()).encode()!r}); {SLEEPER}"
-    )
+    say = f"os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {line_of(Clear())!r}); {SLEEPER}"
     return program("guard", f"{LISTEN}; {observation}{say}", kind="guard", cwd=".")
 
 

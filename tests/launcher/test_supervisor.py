@@ -22,7 +22,6 @@ from tfcompose.launcher.child import READ_SIZE
 from tfcompose.launcher.state import Times
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import (
-    GUARD_EVENTS,
     Clear,
     Ended,
     FindingShown,
@@ -34,6 +33,7 @@ from tfcompose.model.messages import (
     Remember,
     Stopping,
     TreeComplete,
+    line_of,
 )
 from tfcompose.model.plan import Plan, PlanProcess, Ready, RosSettings
 
@@ -398,8 +398,8 @@ if "TFCOMPOSE_MEMORY_FD" in os.environ:
         time.sleep(0.01)
 os.write(int(os.environ["TFCOMPOSE_EVENTS_FD"]), SAID)
 """
-    output = GUARD_EVENTS.line(Clear()) + GUARD_EVENTS.line(Remember({"é": [1, None]}))
-    dies = program("guard", code.replace("SAID", repr(output.encode())), kind="guard", cwd=".")
+    output = line_of(Clear()) + line_of(Remember({"é": [1, None]}))
+    dies = program("guard", code.replace("SAID", repr(output)), kind="guard", cwd=".")
     remembered: list[str] = []
     counted: list[int] = []
 
@@ -412,7 +412,7 @@ os.write(int(os.environ["TFCOMPOSE_EVENTS_FD"]), SAID)
     times = Times(backoff_s=0.05, backoff_limit_s=0.05)
     plan = plan_of(dies, program("a", SLEEPER))
     assert supervise(plan, tmp_path / "plan.json", report=report, times=times) == 1
-    assert remembered == ['remembers {"\\u00e9": [1, null]}'] * 5
+    assert remembered == ['remembers {"é":[1,null]}'] * 5
     assert len(set(counted)) == 1, counted
 
 

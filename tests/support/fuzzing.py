@@ -31,7 +31,7 @@ from tfcompose.compiler.render.text import render_text
 from tfcompose.compiler.urdf.lint import lint_urdf
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import Finding, RejectedError
-from tfcompose.model.messages import GUARD_EVENTS, GUARD_ORDERS, REQUESTS, read_notice
+from tfcompose.model.messages import GUARD_EVENTS, GUARD_ORDERS, REQUESTS, UNREADABLE, read_notice
 from tfcompose.model.plan.file import read_plan
 from tfcompose.spec.load.params import load_params
 from tfcompose.tf.ros.tf_codec import Decoder, decode
@@ -243,8 +243,8 @@ def plan(data: bytes, folder: Path) -> None:
 
 def message(data: bytes, _folder: Path) -> None:
     """A line between processes: a request, a notice, an event or an order."""
-    for read in (REQUESTS.read, read_notice, GUARD_EVENTS.read, GUARD_ORDERS.read):
-        with suppress(ValueError, RecursionError):
+    for read in (REQUESTS.decode, read_notice, GUARD_EVENTS.decode, GUARD_ORDERS.decode):
+        with suppress(*UNREADABLE):
             read(data)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
@@ -25,7 +26,6 @@ from tfcompose.model.plan import (
     RosSettings,
     SourceLine,
 )
-from tfcompose.model.plan.codec import decode, encode
 from tfcompose.tf.live.publishers import Message, OtherRun
 from tfcompose.tf.live.publishers import Publisher as TFPublisher
 
@@ -224,7 +224,7 @@ class History:
 
     def dies(self, down_s: float = 1.5) -> History:
         """Let another judge continue with this one's memory after a gap, and forget events."""
-        memory = decode(JudgeMemory, json.loads(json.dumps(encode(self.judge.memory()))))
+        memory = msgspec.json.decode(msgspec.json.encode(self.judge.memory()), type=JudgeMemory)
         self.now += down_s
         self.judge = Judge(self.judge.plan, 0.0, self.now, 0)
         self.events = self.judge.recall(memory, self.now)

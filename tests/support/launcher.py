@@ -13,7 +13,7 @@ import psutil
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, complete_lines
-from tfcompose.model.messages import GUARD_EVENTS
+from tfcompose.model.messages import line_of
 from tfcompose.model.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.model.plan.file import write_plan
 
@@ -39,12 +39,11 @@ def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
 
 def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
     """Return a guard that says these events, or lines, and then sleeps."""
-    lines = "".join(
-        event if isinstance(event, str) else GUARD_EVENTS.line(event) for event in events
+    lines = b"".join(
+        event.encode() if isinstance(event, str) else line_of(event) for event in events
     )
     say = (
-        f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']),"
-        f" {lines.encode()!r}); {end}"
+        f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines!r}); {end}"
     )
     return program("guard", say, kind="guard")
 

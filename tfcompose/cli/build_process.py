@@ -6,7 +6,6 @@ The launcher, which lives as long as the robot runs, never holds the compiler.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import sys
@@ -14,10 +13,11 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from tfcompose.cli.terminal import FAILED, INTERRUPTED, UNREADABLE, fail
 from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.signals import take_interrupt
-from tfcompose.model.plan.codec import decode, encode
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -83,7 +83,7 @@ class BuildProcess:
             fail(f"the build was ended by {signal.Signals(-code).name}")
         if code == 0:
             file, _, found = answer.partition(b"\0")
-            return Path(os.fsdecode(file)), [decode(Finding, one) for one in json.loads(found)]
+            return Path(os.fsdecode(file)), msgspec.json.decode(found, type=list[Finding])
         if answer:
             raise OSError(int(answer), os.strerror(int(answer)))
         raise SystemExit(code)
@@ -116,11 +116,7 @@ def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
 
         folder, _, found = build(arguments)
         with open(answer, "wb", closefd=False) as pipe:
-            pipe.write(
-                os.fsencode(folder / PLAN)
-                + b"\0"
-                + json.dumps([encode(one) for one in found]).encode()
-            )
+            pipe.write(os.fsencode(folder / PLAN) + b"\0" + msgspec.json.encode(found))
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else UNREADABLE

@@ -8,13 +8,14 @@ ends it.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import selectors
 import signal
 import sys
 import time
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from tfcompose.cli.console import Console
 from tfcompose.cli.runs import plan_of_run
@@ -25,7 +26,6 @@ from tfcompose.launcher.output import Follower, NonBlockingOutput
 from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.supervisor import ENDING, Signals
 from tfcompose.model.messages import (
-    REQUESTS,
     Ended,
     EventsRequest,
     FindingShown,
@@ -34,9 +34,9 @@ from tfcompose.model.messages import (
     RobotStatus,
     StatusRequest,
     Stopping,
+    line_of,
     read_notice,
 )
-from tfcompose.model.plan.codec import decode
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -117,7 +117,7 @@ class _LauncherConnection:
 
     def send(self, request: Request) -> None:
         """Send a request; raises OSError."""
-        self._socket.sendall(REQUESTS.line(request).encode())
+        self._socket.sendall(line_of(request))
 
     def lines(self) -> list[bytes]:
         """Return the lines that came.
@@ -257,7 +257,7 @@ class _LiveView:
             self._states = None
             return
         for line in lines:
-            self._dashboard.status = decode(RobotStatus, json.loads(line))
+            self._dashboard.status = msgspec.json.decode(line, type=RobotStatus)
             self._requested, self._stale = False, True
 
     def _drop(self, connection: _LauncherConnection | None) -> None:

@@ -17,12 +17,12 @@ from tfcompose.launcher.control import RequestRefusedError, ask, connect
 from tfcompose.launcher.procfs import environment_of, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
 from tfcompose.model.messages import (
-    REQUESTS,
     Done,
     EventsRequest,
     ProcessRequest,
     RobotStatus,
     StatusRequest,
+    line_of,
     read_notice,
 )
 from tfcompose.model.plan.file import read_plan
@@ -163,7 +163,7 @@ def notices(
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(place) as connection:
-        connection.sendall(REQUESTS.line(EventsRequest()).encode())
+        connection.sendall(line_of(EventsRequest()))
         rest = b""
         while True:
             left = None if end is None else end - time.monotonic()

@@ -172,8 +172,8 @@ def _parameter_files(folder: Path) -> list[str]:
         return []
     try:
         processes = json.loads((folder / "plan.json").read_text("utf-8"))["processes"]
-        named = [process["params_file"] for process in processes]
-    except (OSError, ValueError, LookupError, TypeError):
+        named = [process.get("params_file") for process in processes]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return []
     return [
         name

@@ -10,16 +10,16 @@ with the memory, one JSON object, by the TF topics that a judge watches.
 
 from __future__ import annotations
 
-import json
 import os
 import select
 import sys
 import time
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from tfcompose.guard.liveness import MOST_NAMED
 from tfcompose.model.messages import (
-    GUARD_EVENTS,
     GUARD_ORDERS,
     Absent,
     Alive,
@@ -36,8 +36,8 @@ from tfcompose.model.messages import (
     Remember,
     Silent,
     TreeComplete,
+    line_of,
 )
-from tfcompose.model.plan.codec import encode
 from tfcompose.model.variables import EVENTS_FD, MEMORY_FD, ORDERS_FD
 from tfcompose.tf.process import say
 
@@ -88,7 +88,7 @@ class OrderReader:
     def take(self) -> None:
         """Carry out pending orders, and check the gates and components that are to load."""
         for line in self._lines():
-            match GUARD_ORDERS.read(line):
+            match GUARD_ORDERS.decode(line):
                 case Absent(process):
                     for judge in self._judges:
                         judge.absent(process)
@@ -104,13 +104,13 @@ class OrderReader:
         self._gates.check()
         self._components.check()
 
-    def _lines(self) -> list[str]:
+    def _lines(self) -> list[bytes]:
         try:
             data = os.read(self._fd, 64 * 1024) if self._fd is not None else b""
         except BlockingIOError:
             return []
         *lines, self._rest = (self._rest + data).split(b"\n")
-        return [line.decode() for line in lines]
+        return lines
 
 
 class EventWriter:
@@ -118,7 +118,7 @@ class EventWriter:
 
     def __init__(self, *, judges: bool) -> None:
         self._judges = judges
-        self._lines: list[str] = []
+        self._lines: list[bytes] = []
         self._pipe = int(os.environ[EVENTS_FD]) if EVENTS_FD in os.environ else None
         self._alive_due = 0.0
 
@@ -127,9 +127,9 @@ class EventWriter:
         if not self._judges and not isinstance(event, _OBSERVATIONS):
             return
         if self._pipe is not None:
-            self._lines.append(GUARD_EVENTS.line(event))
+            self._lines.append(line_of(event))
         elif not isinstance(event, (CurrentFindings, Remember, Silent)):
-            say(GUARD_EVENTS.line(event).rstrip())
+            say(line_of(event).decode().rstrip())
 
     def heartbeat(self) -> None:
         """Write a heartbeat when it is due; never wait for a launcher that does not read."""
@@ -144,7 +144,7 @@ class EventWriter:
         """Write what was taken."""
         if not self._lines or self._pipe is None:
             return
-        data = memoryview("".join(self._lines).encode())
+        data = memoryview(b"".join(self._lines))
         self._lines.clear()
         try:
             while data:
@@ -210,7 +210,7 @@ def recalled(env: Mapping[str, str]) -> dict[str, Any]:
     if MEMORY_FD not in env:
         return {}
     with os.fdopen(int(env[MEMORY_FD]), "rb") as file:
-        left: dict[str, Any] = json.loads(file.read())
+        left: dict[str, Any] = msgspec.json.decode(file.read())
     by_topics: dict[str, Any] = {}
     for key, value in left.items():
         topics, _, part = key.rpartition(" ")
@@ -237,10 +237,12 @@ class Memory:
         if mark == self._mark:
             return
         self._mark = mark
-        known = encode(self._judge.memory()) | (self._relay.memory() if self._relay else {})
+        known = msgspec.to_builtins(self._judge.memory()) | (
+            self._relay.memory() if self._relay else {}
+        )
         gone = dict.fromkeys(self._left.keys() - known.keys())
         for part, value in (known | gone).items():
-            if self._left.get(part) != value and len(json.dumps(value)) < LONGEST:
+            if self._left.get(part) != value and len(msgspec.json.encode(value)) < LONGEST:
                 self._emit(Remember({f"{self._topics} {part}": value}))
         self._left = known
 

@@ -9,15 +9,15 @@ loads what it does not have: also into one that was started again.
 
 from __future__ import annotations
 
-import json
 import time
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from tfcompose.model.messages import ComponentOrder, ComponentState
-from tfcompose.model.plan.codec import decode
 from tfcompose.model.plan.components import LoadRequest, load_request
 from tfcompose.tf.process import say
 
@@ -77,8 +77,8 @@ class Components:
     def take(self, order: ComponentOrder) -> None:
         """Carry out an order of the launcher: it replaces one for the same component."""
         try:
-            request = decode(LoadRequest, json.loads(Path(order.file).read_text(encoding="utf-8")))
-        except (OSError, ValueError) as error:
+            request = msgspec.json.decode(Path(order.file).read_bytes(), type=LoadRequest)
+        except (OSError, UnicodeDecodeError, msgspec.DecodeError) as error:
             self._answer(order, f"{order.file} cannot be read: {error}")
             return
         self.add(order, request)

@@ -14,6 +14,8 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.text import counted
 from tfcompose.guard.channel import (
@@ -34,7 +36,6 @@ from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.ledger import MOST_UNDECLARED
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.model.messages import Clear, TreeComplete
-from tfcompose.model.plan.codec import decode
 from tfcompose.model.plan.middleware import IMPLEMENTATIONS
 from tfcompose.model.plan.topics import GLOBAL, parts_of, private_topics
 from tfcompose.model.variables import (
@@ -124,7 +125,7 @@ class TopicWatch:
         self._pass_on(
             self.judge.tick(now)
             if memory is None
-            else self.judge.recall(decode(JudgeMemory, memory), now)
+            else self.judge.recall(msgspec.convert(memory, JudgeMemory), now)
         )
         if self.relay and memory:
             self.relay.recall(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import os
 import signal
 import subprocess
@@ -12,6 +11,7 @@ from dataclasses import replace
 from selectors import EVENT_READ
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import regex
 
 from tfcompose.foundation.signals import SIGNALS
@@ -33,7 +33,7 @@ from tfcompose.launcher.procfs import (
     leftovers_of,
     signal_leftovers,
 )
-from tfcompose.model.messages import GUARD_EVENTS, GUARD_ORDERS, LogLine
+from tfcompose.model.messages import GUARD_EVENTS, UNREADABLE, LogLine, line_of
 from tfcompose.model.variables import (
     EVENTS_FD,
     GO,
@@ -289,8 +289,8 @@ class Children:
 
     def _guard_line(self, name: str, line: str) -> None:
         try:
-            event = GUARD_EVENTS.read(line)
-        except (ValueError, RecursionError):
+            event = GUARD_EVENTS.decode(line)
+        except UNREADABLE:
             self._notify(LogLine(name, "stderr", f"not an event: {line}"))
         else:
             self._happened(event)
@@ -361,7 +361,7 @@ class GuardPipes:
         if memory:
             memory_fd = os.memfd_create("tfcompose-guard-memory")
             with open(memory_fd, "wb", closefd=False) as file:
-                file.write(json.dumps(memory).encode())
+                file.write(msgspec.json.encode(memory))
             os.lseek(memory_fd, 0, os.SEEK_SET)
             self.theirs += (memory_fd,)
             self.env[MEMORY_FD] = str(memory_fd)
@@ -374,7 +374,7 @@ class GuardPipes:
     def order(self, order: GuardOrder) -> None:
         """Send the guard an order; one that is stuck gets nothing."""
         with contextlib.suppress(OSError):
-            os.write(self._orders, GUARD_ORDERS.line(order).encode())
+            os.write(self._orders, line_of(order))
 
     def close(self) -> None:
         """Close the launcher's end for orders; that for events is closed by whoever reads it."""

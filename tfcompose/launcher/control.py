@@ -8,7 +8,6 @@ user who runs the robot is answered.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import selectors
 import socket
@@ -17,15 +16,16 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
+import msgspec
+
 from tfcompose.launcher.procfs import is_suspended
-from tfcompose.model.messages import REQUESTS, EventsRequest, Refusal
-from tfcompose.model.plan.codec import decode, encode
+from tfcompose.model.messages import REQUESTS, UNREADABLE, EventsRequest, Refusal, line_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from tfcompose.launcher.runtime_dir import RuntimeDir
-    from tfcompose.model.messages import Request
+    from tfcompose.model.messages import Message, Request
 
 A = TypeVar("A")
 
@@ -117,17 +117,17 @@ def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
         OSError: if no launcher runs the robot, or it does not answer.
     """
     with connect(place) as connection:
-        connection.sendall(REQUESTS.line(request).encode())
+        connection.sendall(line_of(request))
         with connection.makefile("rb") as lines:
             line = lines.readline()
     if not line:
         raise ConnectionResetError("the launcher has ended")
     try:
-        data = json.loads(line)
+        data = msgspec.json.decode(line)
         if "error" in data:
-            raise RequestRefusedError(decode(Refusal, data).error)
-        return decode(answer, data)
-    except (ValueError, TypeError) as error:
+            raise RequestRefusedError(msgspec.convert(data, Refusal).error)
+        return msgspec.convert(data, answer)
+    except (*UNREADABLE, TypeError) as error:
         raise ConnectionError(
             f"its launcher answers what this tfcompose does not understand: {error}"
         ) from None
@@ -140,20 +140,21 @@ class Control:
         self,
         listener: socket.socket,
         selector: selectors.BaseSelector,
-        answer: Callable[[Request], object],
+        answer: Callable[[Request], Message],
     ) -> None:
         self._listener = listener
         self._selector = selector
         self._answer = answer
         self._clients: set[Client] = set()
-        self._lines: deque[str] = deque(maxlen=KEPT_LINES)
+        self._lines: deque[bytes] = deque(maxlen=KEPT_LINES)
         selector.register(listener, selectors.EVENT_READ, self._accept)
 
     def publish(self, line: str) -> None:
         """Send a line to all who listen, and keep it for those who come later."""
-        self._lines.append(line)
+        sent = f"{line}\n".encode()
+        self._lines.append(sent)
         for client in [client for client in self._clients if client.listens]:
-            self._send(client, line)
+            self._send(client, sent)
 
     def listen(self, listener: socket.socket) -> None:
         """Take requests at another socket from now on; clients that are connected stay."""
@@ -208,19 +209,19 @@ class Control:
 
     def _take(self, client: Client, line: bytes) -> None:
         try:
-            request = REQUESTS.read(line)
-        except (ValueError, RecursionError) as error:
-            self._send(client, json.dumps(encode(Refusal(f"not a request: {error}"))))
+            request = REQUESTS.decode(line)
+        except UNREADABLE as error:
+            self._send(client, line_of(Refusal(f"not a request: {error}")))
             return
         if isinstance(request, EventsRequest):
             client.listens = True
             for kept in self._lines:
                 self._send(client, kept)
         else:
-            self._send(client, json.dumps(encode(self._answer(request))))
+            self._send(client, line_of(self._answer(request)))
 
-    def _send(self, client: Client, line: str) -> None:
-        client.unsent += line.encode() + b"\n"
+    def _send(self, client: Client, line: bytes) -> None:
+        client.unsent += line
         if len(client.unsent) > LONGEST_BACKLOG:
             self._leave(client)
         else:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import errno
 import fcntl
-import json
 import os
 import pwd
 import stat
@@ -22,7 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.model.plan.codec import decode, encode
+import msgspec
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -133,7 +132,7 @@ class Lock:
 
     def _write_holder(self) -> None:
         os.ftruncate(self.fd, 0)
-        os.pwrite(self.fd, json.dumps(encode(self._holder)).encode(), 0)
+        os.pwrite(self.fd, msgspec.json.encode(self._holder), 0)
 
 
 def _open_lock(directory: RuntimeDir) -> int:
@@ -176,8 +175,8 @@ def _take(descriptor: int) -> None:
 def _read_holder(descriptor: int) -> Holder | None:
     for _ in range(500):  # it is written a moment after it is taken
         try:
-            return decode(Holder, json.loads(os.pread(descriptor, 4096, 0)))
-        except ValueError:
+            return msgspec.json.decode(os.pread(descriptor, 4096, 0), type=Holder)
+        except (msgspec.DecodeError, UnicodeDecodeError):
             time.sleep(0.01)
     return Holder(0, 0.0, "")
 

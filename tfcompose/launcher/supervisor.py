@@ -8,7 +8,6 @@ waits in its own pipe; nothing piles up here.
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import os
 import selectors
@@ -19,6 +18,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, final
+
+import msgspec
 
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.findings import Note
@@ -53,7 +54,6 @@ from tfcompose.model.messages import (
     FindingShown,
     UpdateRequest,
 )
-from tfcompose.model.plan.codec import encode
 from tfcompose.model.plan.components import load_file
 from tfcompose.tf.ros.environment import child_environment
 
@@ -336,7 +336,7 @@ class _Supervisor:
         """Write what the container is asked beside the plan, and have the guard ask it."""
         name = order.process
         if order.do == "load":
-            text = json.dumps(encode(self._commands[name].load), ensure_ascii=False)
+            text = msgspec.json.encode(self._commands[name].load).decode()
             try:
                 file = self._write_request(name, text)
             except OSError as error:
@@ -348,7 +348,7 @@ class _Supervisor:
             if not file.is_file():
                 with contextlib.suppress(OSError):  # the guard says that it cannot read it
                     file = self._write_request(name, text)
-        self._children.order(replace(order, file=str(file)))
+        self._children.order(msgspec.structs.replace(order, file=str(file)))
 
     def _write_request(self, name: str, text: str) -> Path:
         self._restore_files()

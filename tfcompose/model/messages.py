@@ -7,39 +7,59 @@ notices that a person at ``up`` reads too.
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal
+
+import msgspec
 
 from tfcompose.foundation.findings import Finding  # noqa: TC001 (messages are read by these types)
 from tfcompose.model.plan import LifecycleState, ProcessKind  # noqa: TC001
-from tfcompose.model.plan.codec import OMITTED, TaggedUnion, decode
+
+#: What a decoder raises for a line that is no message.
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+class Message(msgspec.Struct, frozen=True):
+    """What one process tells another, or a part of that."""
+
+
+class Event(Message, frozen=True, tag_field="event", tag=True):
+    """What happened: an event of the guard, a notice, or both."""
+
+
+class Order(Message, frozen=True, tag_field="order", tag=True):
+    """What the launcher has the guard do."""
+
+
+class Request(Message, frozen=True, tag_field="request", tag=True):
+    """What another command asks of the launcher."""
+
+
+def line_of(message: Message) -> bytes:
+    """Return the message as one line of JSON, newline included."""
+    return msgspec.json.encode(message) + b"\n"
+
 
 # Events: from the guard to the launcher.
 
 
-@dataclass(frozen=True, slots=True)
-class Clear:
+class Clear(Event, frozen=True):
     """The look before the start is over and no planned edge was published by anybody."""
 
 
-@dataclass(frozen=True, slots=True)
-class Taken:
+class Taken(Event, frozen=True):
     """A planned edge was published before the start: the plan must not start, or must end."""
 
     found: Finding
 
 
-@dataclass(frozen=True, slots=True)
-class Live:
+class Live(Event, frozen=True):
     """Edges, named by their children, were received from their owner for the first time."""
 
     owner: str
     children: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Silent:
+class Silent(Event, frozen=True):
     """Edges, named by their children, that were live come no more.
 
     Or, if that is ``over``, come again.
@@ -49,15 +69,13 @@ class Silent:
     over: bool
 
 
-@dataclass(frozen=True, slots=True)
-class OwnerReady:
+class OwnerReady(Event, frozen=True):
     """All edges of a process are live."""
 
     process: str
 
 
-@dataclass(frozen=True, slots=True)
-class TreeComplete:
+class TreeComplete(Event, frozen=True):
     """Every edge of the plan is live: a notice too.
 
     ``seconds`` is how long after the start; the guard, which does not know it, leaves it at 0.
@@ -67,26 +85,23 @@ class TreeComplete:
     seconds: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class FindingShown:
+class FindingShown(Event, frozen=True, omit_defaults=True):
     """Something is wrong: a notice too, as it goes on to people.
 
     ``process`` is the plan's process that did it, where it can be stopped for it.
     """
 
     found: Finding
-    process: str = field(default="", metadata=OMITTED)
+    process: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class CurrentFindings:
+class CurrentFindings(Event, frozen=True):
     """All that is wrong now, worst first; what was sent before does not count any more."""
 
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class RecoveredShown:
+class RecoveredShown(Event, frozen=True):
     """A case that was reported is over; the text says which. A notice too.
 
     ``seconds`` is how long after the start, as in ``TreeComplete``.
@@ -96,8 +111,7 @@ class RecoveredShown:
     seconds: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Unfenced:
+class Unfenced(Event, frozen=True):
     """A process of a strict plan sends past the fence.
 
     It must be stopped, whatever else is only reported.
@@ -110,8 +124,7 @@ class Unfenced:
     pid: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class GateState:
+class GateState(Event, frozen=True):
     """A process's gate, looked at: whether what it waits for is there.
 
     ``seen`` says what is there, or what is there instead.
@@ -122,8 +135,7 @@ class GateState:
     is_open: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Remember:
+class Remember(Event, frozen=True):
     """What the next guard must know, should this one die.
 
     The launcher keeps it by key and does not look into it.
@@ -135,8 +147,7 @@ class Remember:
 LoadState = Literal["loaded", "not loaded", "unloaded"]
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentState:
+class ComponentState(Event, frozen=True):
     """What has become of a component; ``number`` is that of the order that is answered.
 
     It is unloaded, too, where its container has it no more or does not answer. ``why`` says why it
@@ -149,8 +160,7 @@ class ComponentState:
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Alive:
+class Alive(Event, frozen=True):
     """The guard looks; it says so once a second."""
 
 
@@ -171,28 +181,25 @@ GuardEvent = (
     | ComponentState
 )
 
-GUARD_EVENTS = TaggedUnion[GuardEvent]("event", get_args(GuardEvent))
+GUARD_EVENTS = msgspec.json.Decoder(GuardEvent)
 
 
 # Orders: from the launcher to the guard.
 
 
-@dataclass(frozen=True, slots=True)
-class Absent:
+class Absent(Order, frozen=True):
     """A process of the plan was stopped on purpose, or ended: its silence is nobody's fault."""
 
     process: str
 
 
-@dataclass(frozen=True, slots=True)
-class Present:
+class Present(Order, frozen=True):
     """A process of the plan is started, again: its edges are to be seen anew."""
 
     process: str
 
 
-@dataclass(frozen=True, slots=True)
-class Gate:
+class Gate(Order, frozen=True):
     """Say when this is there: a topic with a publisher, a service, or nodes in lifecycle states.
 
     ``topic`` and ``service`` are full names, or empty. ``nodes`` holds the lifecycle states that
@@ -204,13 +211,12 @@ class Gate:
     process: str
     topic: str = ""
     service: str = ""
-    nodes: dict[str, LifecycleState] = field(default_factory=dict)
+    nodes: dict[str, LifecycleState] = {}
     drive: bool = False
     writers: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentOrder:
+class ComponentOrder(Order, frozen=True):
     """Have a container load or unload a component, as the file says.
 
     A ``ComponentState`` with the order's ``number`` answers it. ``again`` says that a guard before
@@ -226,7 +232,7 @@ class ComponentOrder:
 
 GuardOrder = Absent | Present | Gate | ComponentOrder
 
-GUARD_ORDERS = TaggedUnion[GuardOrder]("order", get_args(GuardOrder))
+GUARD_ORDERS = msgspec.json.Decoder(GuardOrder)
 
 
 # Notices: from the launcher to a person, and to clients of its control socket.
@@ -238,8 +244,7 @@ StateName = Literal[
 Stream = Literal["stdout", "stderr"]
 
 
-@dataclass(frozen=True, slots=True)
-class LogLine:
+class LogLine(Event, frozen=True):
     """A line that a process wrote, without its end. A line longer than 64 KiB comes in pieces."""
 
     process: str
@@ -247,8 +252,7 @@ class LogLine:
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessState:
+class ProcessState(Event, frozen=True):
     """A process went into this state.
 
     ``detail`` says why, where there is more to say: "exit code 3; again in 2 s".
@@ -260,8 +264,7 @@ class ProcessState:
     detail: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class OwnerLive:
+class OwnerLive(Event, frozen=True):
     """All edges of an owner were received from it, ``seconds`` after the start.
 
     ``edges`` are their names.
@@ -273,8 +276,7 @@ class OwnerLive:
     seconds: float
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessReady:
+class ProcessReady(Event, frozen=True):
     """A process that waited for something of its own is ready, ``seconds`` after the start.
 
     ``seen`` says by what.
@@ -285,8 +287,7 @@ class ProcessReady:
     seconds: float
 
 
-@dataclass(frozen=True, slots=True)
-class AllStarted:
+class AllStarted(Event, frozen=True):
     """Whatever can be started was.
 
     ``waiting`` are processes that wait for others to be ready, or done.
@@ -297,8 +298,7 @@ class AllStarted:
     seconds: float
 
 
-@dataclass(frozen=True, slots=True)
-class StartRow:
+class StartRow(Message, frozen=True):
     """When a process was started and ready, in seconds after the start; None: it is external."""
 
     process: str
@@ -306,8 +306,7 @@ class StartRow:
     ready: float
 
 
-@dataclass(frozen=True, slots=True)
-class AllReady:
+class AllReady(Event, frozen=True):
     """Every process is ready and every edge live, ``seconds`` after the start.
 
     But for those that were given up.
@@ -318,8 +317,7 @@ class AllReady:
     without: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Replanned:
+class Replanned(Event, frozen=True):
     """A changed plan is followed from now on.
 
     The names of processes, and the frames that listeners will still hold.
@@ -331,8 +329,7 @@ class Replanned:
     held: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Missing:
+class Missing(Message, frozen=True):
     """The unpublished edges of one owner, in the plan's order, of ``owned`` ones."""
 
     owner: str
@@ -341,15 +338,13 @@ class Missing:
     owned: int
 
 
-@dataclass(frozen=True, slots=True)
-class Waiting:
+class Waiting(Event, frozen=True):
     """Edges that nobody has published yet, by owner."""
 
     missing: tuple[Missing, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class FilesRestored:
+class FilesRestored(Event, frozen=True):
     """The files of the run were removed.
 
     They are in ``folder`` again, or nowhere, for the reason ``why``.
@@ -359,15 +354,13 @@ class FilesRestored:
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Stopping:
+class Stopping(Event, frozen=True):
     """Everything is being stopped, for this reason."""
 
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
+class Ended(Event, frozen=True):
     """Nothing runs any more: the last notice.
 
     ``because`` is the failure that came first, and what was said last.
@@ -394,7 +387,11 @@ Notice = (
     | Ended
 )
 
-NOTICES = TaggedUnion[Notice]("event", get_args(Notice))
+NOTICES = msgspec.json.Decoder(Notice)
+
+
+class _Sent(Message, frozen=True):
+    at: float
 
 
 def notice_line(notice: Notice, at: float) -> str:
@@ -402,20 +399,17 @@ def notice_line(notice: Notice, at: float) -> str:
 
     ``at`` is when, in seconds since 1970.
     """
-    return json.dumps(
-        {"event": "", "at": round(at, 3)} | NOTICES.encode(notice), ensure_ascii=False
-    )
+    data = {"event": "", "at": round(at, 3)} | msgspec.to_builtins(notice)
+    return msgspec.json.encode(data).decode()
 
 
 def read_notice(line: bytes) -> tuple[Notice, float]:
     """Return the notice that ``notice_line`` wrote, and when.
 
     Raises:
-        ValueError: if the line is none.
+        UNREADABLE: if the line is none.
     """
-    data = json.loads(line)
-    notice = NOTICES.decode(data)
-    return notice, decode(float, data.get("at"))
+    return NOTICES.decode(line), msgspec.json.decode(line, type=_Sent).at
 
 
 # Requests: what other commands ask of the launcher, and its answers.
@@ -423,37 +417,26 @@ def read_notice(line: bytes) -> tuple[Notice, float]:
 Verb = Literal["stop", "start", "restart"]
 
 
-@dataclass(frozen=True, slots=True)
-class StatusRequest:
+class StatusRequest(Request, frozen=True):
     """What is known of the run? Answered by a ``RobotStatus``."""
 
-    do: Literal["ps"] = "ps"
 
-
-@dataclass(frozen=True, slots=True)
-class EventsRequest:
+class EventsRequest(Request, frozen=True):
     """From now on, the notices: first those that were sent already. Answered by these alone."""
 
-    do: Literal["events"] = "events"
 
-
-@dataclass(frozen=True, slots=True)
-class DownRequest:
+class DownRequest(Request, frozen=True):
     """Stop everything. Answered by ``Done``."""
 
-    do: Literal["down"] = "down"
 
-
-@dataclass(frozen=True, slots=True)
-class ProcessRequest:
+class ProcessRequest(Request, frozen=True):
     """Stop, start or restart one process. Answered by ``Done``."""
 
     do: Verb
     name: str
 
 
-@dataclass(frozen=True, slots=True)
-class UpdateRequest:
+class UpdateRequest(Request, frozen=True):
     """Follow another plan: its file, and the folder that it was built in.
 
     Answered by a ``PlanChange``.
@@ -461,31 +444,27 @@ class UpdateRequest:
 
     plan: str
     base: str
-    do: Literal["update"] = "update"
 
 
-Request = StatusRequest | EventsRequest | DownRequest | ProcessRequest | UpdateRequest
+REQUESTS = msgspec.json.Decoder(
+    StatusRequest | EventsRequest | DownRequest | ProcessRequest | UpdateRequest
+)
 
-REQUESTS = TaggedUnion[Request]("do", get_args(Request))
 
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
+class Refusal(Message, frozen=True):
     """Nothing was done, for this reason."""
 
     error: str
 
 
-@dataclass(frozen=True, slots=True)
-class Done:
+class Done(Message, frozen=True):
     """It is being done; ``waits`` says what a process that is started waits for first."""
 
     ok: Literal[True] = True
-    waits: str = field(default="", metadata=OMITTED)
+    waits: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class PlanChange:
+class PlanChange(Message, frozen=True):
     """What another plan changes.
 
     The processes that are different, new, and no more, and the fixed edges that vanish.
@@ -500,8 +479,7 @@ class PlanChange:
     ok: Literal[True] = True
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessStatus:
+class ProcessStatus(Message, frozen=True):
     """One process.
 
     ``detail`` says why it is in its state, ``waits`` what it is without, ``seen`` what is there
@@ -527,8 +505,7 @@ class ProcessStatus:
     nodes: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class RobotStatus:
+class RobotStatus(Message, frozen=True):
     """All that is known of a run.
 
     ``plan`` is the digest of what it was made from, ``uptime`` is in seconds, ``findings`` are

@@ -292,28 +292,6 @@ def test_a_stand_in_is_kept_and_ended_as_what_it_stands_in_for() -> None:
     assert (stand_in.cwd, stand_in.ready, stand_in.params) == (None, None, {})
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('"required": null', '"required": 1'),
-        ('"signal": "SIGINT"', '"signal": "SIGFOO"'),
-        ('"timeout_s": null', '"timeout_s": "3"'),
-        ('"lifecycle": {}', '"lifecycle": {"/a": "on"}'),
-        ('"log_level": null', '"log_level": "loud"'),
-        (
-            '"ready": null',
-            '"ready": {"kind": "soon", "text": "", "number": 0.0, "timeout_s": null}',
-        ),
-        ('"max_restarts": null', '"max_restarts": 1.5'),
-    ],
-)
-def test_a_plan_with_another_value_is_refused(old: str, new: str) -> None:
-    text = files_of(f"a: {{{EXE}}}")["plan.json"]
-    assert old in text
-    with pytest.raises(RejectedError):
-        read_plan(text.replace(old, new), "plan.json")
-
-
 FILES = """tfcompose: 1
 robot: r
 frames: {map: {}}

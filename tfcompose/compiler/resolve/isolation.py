@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
+from tfcompose.model.fields import narrowed
 from tfcompose.model.plan import RosSettings, known_at_launch
-from tfcompose.model.plan.codec import narrowed
 from tfcompose.spec.language.variables import CALLS
 from tfcompose.spec.load import path_named
 

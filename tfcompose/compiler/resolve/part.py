@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from tfcompose.compiler.resolve.renamed import Names, renamed
 from tfcompose.compiler.urdf.blocks import with_joints, within
 from tfcompose.foundation.findings import Finding, RejectedError, did_you_mean, finding
+from tfcompose.model.fields import narrowed
 from tfcompose.model.plan import RosSettings
-from tfcompose.model.plan.codec import narrowed
 from tfcompose.model.robot import Part
 from tfcompose.spec.language import GivenArg, as_part
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.model.plan.plan import Component  # noqa: TC001 (the codec reads annotations)
+from tfcompose.model.plan.plan import Component  # noqa: TC001 (read by its annotations)
 from tfcompose.model.plan.topics import GLOBAL, private_topics
 
 if TYPE_CHECKING:

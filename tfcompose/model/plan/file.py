@@ -1,4 +1,4 @@
-"""The plan as a file: JSON, written and read with the standard library alone."""
+"""The plan as a file: JSON, in which fields at their defaults are left out."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import graphlib
 import json
 import re
 from collections import Counter
+from dataclasses import MISSING, Field, fields, is_dataclass
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
+from tfcompose.foundation.geometry import norm
 from tfcompose.model.plan import VERSION, Plan
-from tfcompose.model.plan.codec import DecodeError, decode, encode, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,6 +27,11 @@ _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-
 _HOST = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 #: Control characters, and halves of characters.
 _CONTROL = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
+#: What was written is normalised to the last bit.
+_UNIT = 1e-6
+#: So much of a value is shown in an error, in characters.
+_LONGEST_SHOWN, _LONGEST_QUOTED = 60, 100
+_BYTE = re.compile(r"\(byte (\d+)\)")
 #: Keys below which text may hold lines and tabs: what programs are given.
 _FOR_PROGRAMS = frozenset({"argv", "env", "switches", "component"})
 
@@ -34,10 +42,24 @@ def write_plan(plan: Plan) -> str:
     One line an edge and a process, the same bytes for the same plan.
     """
     lines = []
-    for key, value in encode(plan).items():
+    for key, value in ({"version": VERSION} | _data(plan)).items():
         text = _rows(value) if isinstance(value, list) else _json(value)
         lines.append(f"  {_json(key)}: {text}")
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _data(value: Any) -> Any:
+    """Return a value of a plan as JSON has it."""
+    if is_dataclass(value):
+        held = {one: getattr(value, one.name) for one in fields(value)}
+        return {one.name: _data(part) for one, part in held.items() if part != _default(one)}
+    if isinstance(value, dict):
+        return {key: _data(part) for key, part in value.items()}
+    return [_data(part) for part in value] if isinstance(value, (list, tuple)) else value
+
+
+def _default(of: Field[Any]) -> Any:
+    return of.default if of.default_factory is MISSING else of.default_factory()
 
 
 def read_plan(text: str, file: str) -> Plan:
@@ -47,28 +69,37 @@ def read_plan(text: str, file: str) -> Plan:
         RejectedError: with a TF902 finding, if the text is no plan of this version.
     """
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        line, column = getattr(error, "lineno", 1), getattr(error, "colno", 1)
-        raise RejectedError(
-            [_bad(f"not a plan: {error}", Span(file, line, column, line, column + 1))]
-        ) from None
+        data = msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError, UnicodeEncodeError) as error:
+        raise RejectedError([_bad(f"not a plan: {error}", _place(error, text, file))]) from None
     if not isinstance(data, dict) or "edges" not in data or "processes" not in data:
         raise RejectedError([_bad("not a plan: it has no edges or processes", Span(file))])
     if data.get("version") != VERSION or data["version"] is True:
         message = (
-            f"the plan has version {shown(data.get('version'))}; this tfcompose reads version"
+            f"the plan has version {_shown(data.get('version'))}; this tfcompose reads version"
             f" {VERSION}"
         )
         raise RejectedError([_bad(message, Span(file))])
     try:
-        plan = decode(Plan, data)
-    except DecodeError as error:
-        raise RejectedError([_bad(f"not a valid plan: {error}", Span(file))]) from None
+        plan = msgspec.convert(data, Plan)
+    except msgspec.ValidationError as error:
+        raise RejectedError([_bad(f"not a valid plan: {_short(error)}", Span(file))]) from None
     wrong = [*_wrong_text(data), *_wrong_names(plan)]
     if wrong:
         raise RejectedError([_bad(f"not a valid plan: {one}", Span(file)) for one in wrong])
     return plan
+
+
+def _place(error: Exception, text: str, file: str) -> Span:
+    """Return where msgspec found that a text is no JSON: its message holds the byte."""
+    byte = _BYTE.search(str(error))
+    lines = (
+        text.encode(errors="replace")[: int(byte[1])].decode(errors="replace").split("\n")
+        if byte
+        else [""]
+    )
+    line, column = len(lines), len(lines[-1]) + 1
+    return Span(file, line, column, line, column + 1)
 
 
 def _wrong_text(data: Any) -> Iterator[str]:
@@ -98,20 +129,20 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
     Those that no robot file can give, of nothing, and of files elsewhere.
     """
     if not _ROBOT.fullmatch(plan.robot):
-        yield f"robot is {shown(plan.robot)}, not a name of lower case letters, digits and _"
+        yield f"robot is {_shown(plan.robot)}, not a name of lower case letters, digits and _"
     known = Counter(process.name for process in plan.processes)
     for name, times in known.items():
         if not _PROCESS.fullmatch(name):
-            yield f"a process is named {shown(name)}, not with letters, digits, _, - and ."
+            yield f"a process is named {_shown(name)}, not with letters, digits, _, - and ."
         if times > 1:
             yield f"{times} processes are named {name}"
     yield from (
-        f"the owner of {edge.name} is {shown(edge.owner)}, which is not a process"
+        f"the owner of {edge.name} is {_shown(edge.owner)}, which is not a process"
         for edge in plan.edges
         if edge.owner not in known
     )
     yield from (
-        f"{process.name} waits for {shown(other)}, which is not a process"
+        f"{process.name} waits for {_shown(other)}, which is not a process"
         for process in plan.processes
         for other in process.after
         if other not in known
@@ -120,11 +151,18 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
         yield from _wrong_order(plan)
     for ready, name in ((process.ready, process.name) for process in plan.processes):
         if ready and ready.kind == "log" and (error := _regex_error(ready.text)):
-            yield f"{name} is ready at {shown(ready.text)}, not a regular expression: {error}"
+            yield f"{name} is ready at {_shown(ready.text)}, not a regular expression: {error}"
     yield from _wrong_components(plan)
+    poses = {edge.name: edge.pose for edge in plan.edges}
+    poses |= {one.name: one.simulate.pose for one in plan.processes if one.simulate}
+    yield from (
+        f"the pose of {name} has a quaternion of length {norm(pose.quat_xyzw):g}, not 1"
+        for name, pose in poses.items()
+        if abs(norm(pose.quat_xyzw) - 1) > _UNIT
+    )
     yield from _wrong_files(plan)
     yield from (
-        f"a host is named {shown(name)}, not with letters, digits, _, - and ."
+        f"a host is named {_shown(name)}, not with letters, digits, _, - and ."
         for name in _wrong_hosts(plan)
     )
 
@@ -143,7 +181,7 @@ def _wrong_components(plan: Plan) -> Iterator[str]:
             )
         elif component and component.container not in containers:
             yield (
-                f"the container of {process.name} is {shown(component.container)}, which is no"
+                f"the container of {process.name} is {_shown(component.container)}, which is no"
                 " process with a node"
             )
         elif component and not process.nodes:
@@ -156,7 +194,7 @@ def _wrong_order(plan: Plan) -> Iterator[str]:
             {process.name: process.after for process in plan.processes}
         ).prepare()
     except graphlib.CycleError as error:
-        yield f"processes wait for each other: {', '.join(map(shown, error.args[1]))}"
+        yield f"processes wait for each other: {', '.join(map(_shown, error.args[1]))}"
 
 
 def _wrong_files(plan: Plan) -> Iterator[str]:
@@ -167,7 +205,7 @@ def _wrong_files(plan: Plan) -> Iterator[str]:
     for file in dict.fromkeys(filter(None, files)):
         path = PurePosixPath(file)
         if path.is_absolute() or ".." in path.parts:
-            yield f"the file {shown(file)} is not in the plan's folder"
+            yield f"the file {_shown(file)} is not in the plan's folder"
 
 
 def _wrong_hosts(plan: Plan) -> Iterator[str]:
@@ -185,6 +223,22 @@ def _regex_error(pattern: str) -> str:
 
 def _bad(message: str, span: Span) -> Finding:
     return finding("TF902", message, span, help="build it again: tfcompose build robot.yaml")
+
+
+def _short(error: msgspec.ValidationError) -> str:
+    """Return what msgspec says, without most of a long value that is quoted in it."""
+    what, at, place = str(error).rpartition(" - at ")
+    return (
+        f"{what}{at}{place}"
+        if len(what) <= _LONGEST_QUOTED
+        else f"{what[:_LONGEST_QUOTED]}…{at}{place}"
+    )
+
+
+def _shown(value: Any) -> str:
+    """Return a value that was read as an error shows it, shortened."""
+    text = _json(value)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
 
 
 _json = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode

@@ -11,8 +11,10 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
-from tfcompose.foundation.geometry import Pose, norm
-from tfcompose.model.plan.codec import FLAT, OMITTED, Rule, documented
+from msgspec import Meta
+
+from tfcompose.foundation.geometry import Pose
+from tfcompose.model.fields import documented
 
 #: Who moves an edge: nobody, joint states, or its owner.
 EdgeKind = Literal["static", "joint", "dynamic"]
@@ -81,20 +83,8 @@ SLOW_BELOW = 0.8
 MAX_RESTARTS = 5
 
 
-def _unit_quaternion(pose: Pose) -> None:
-    if abs(norm(pose.quat_xyzw) - 1) > 1e-6:  # noqa: PLR2004 (what was written is normalised to the last bit)
-        raise ValueError("has a quat_xyzw that is not a unit quaternion")
-
-
-def _above_0(value: float) -> None:
-    if value <= 0:
-        raise ValueError(f"is {value:g}, not above 0")
-
-
-#: A pose as it is read from a plan.
-UnitPose = Annotated[Pose, Rule(_unit_quaternion)]
 #: A time or rate.
-AboveZero = Annotated[float, Rule(_above_0, {"exclusiveMinimum": 0})]
+AboveZero = Annotated[float, Meta(gt=0)]
 
 
 class SourceLine(NamedTuple):
@@ -144,12 +134,12 @@ class PlanEdge:
     kind: EdgeKind
     owner: str
     node: str
-    pose: UnitPose = field(metadata=FLAT)
+    pose: Pose
     rate: float | None
     source: SourceLine
-    joint: Joint | None = field(default=None, metadata=OMITTED)
-    switched: tuple[str, ...] = field(default=(), metadata=OMITTED)
-    pose_known: bool = field(default=True, metadata=OMITTED)
+    joint: Joint | None = None
+    switched: tuple[str, ...] = ()
+    pose_known: bool = True
 
     @property
     def name(self) -> str:
@@ -207,7 +197,7 @@ class Simulation:
     speed: float = 0.0
     joints: dict[str, float] = field(default_factory=dict)
     sweep: dict[str, Sweep] = field(default_factory=dict)
-    pose: UnitPose = field(default_factory=Pose, metadata=FLAT)
+    pose: Pose = field(default_factory=Pose)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +226,7 @@ class StopRule:
 
     signal: StopSignal = "SIGINT"
     timeout_s: float | None = None
-    kill_timeout_s: float | None = field(default=None, metadata=OMITTED)
+    kill_timeout_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,19 +319,19 @@ class PlanProcess:
     ready: Ready | None = None
     host: str | None = None
     owns: tuple[tuple[str, str], ...] = ()
-    description: str | None = field(default=None, metadata=OMITTED)
-    drives: tuple[Driven, ...] = field(default=(), metadata=OMITTED)
-    switches: dict[str, dict[str, ParameterValue]] = field(default_factory=dict, metadata=OMITTED)
-    namespace: str | None = field(default=None, metadata=OMITTED)
-    simulate: Simulation | None = field(default=None, metadata=OMITTED)
-    restart_delay: float | None = field(default=None, metadata=OMITTED)
-    prefix: tuple[str, ...] = field(default=(), metadata=OMITTED)
-    schedule: Schedule | None = field(default=None, metadata=OMITTED)
-    component: Component | None = field(default=None, metadata=OMITTED)
-    output: OutputPlace = field(default="both", metadata=OMITTED)
-    emulate_tty: bool = field(default=False, metadata=OMITTED)
-    oom_score_adj: int | None = field(default=None, metadata=OMITTED)
-    open_files: int | None = field(default=None, metadata=OMITTED)
+    description: str | None = None
+    drives: tuple[Driven, ...] = ()
+    switches: dict[str, dict[str, ParameterValue]] = field(default_factory=dict)
+    namespace: str | None = None
+    simulate: Simulation | None = None
+    restart_delay: float | None = None
+    prefix: tuple[str, ...] = ()
+    schedule: Schedule | None = None
+    component: Component | None = None
+    output: OutputPlace = "both"
+    emulate_tty: bool = False
+    oom_score_adj: int | None = None
+    open_files: int | None = None
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -385,20 +375,18 @@ class RosSettings:
         None, "how far discovery reaches; default: the environment's"
     )
     rmw: Rmw | None = documented(
-        None, "the middleware of all processes; default: the environment's", "zenoh", **OMITTED
+        None, "the middleware of all processes; default: the environment's", "zenoh"
     )
     distro: Distro | None = documented(
         None,
         "the release of ROS that they are from; default: the environment's",
         "kilted",
-        **OMITTED,
     )
     router: str | None = documented(
         None,
         "with rmw: zenoh, where every process reaches the router; default: port 7447 of its own"
         " computer",
         "tcp/10.0.0.2:7447",
-        **OMITTED,
     )
     clock: Clock = documented("wall", "one clock for the whole plan; sim: the time of /clock")
     frame_prefix: str = documented(
@@ -417,10 +405,10 @@ class PlanHost:
     """
 
     ssh: str
-    port: int | None = field(default=None, metadata=OMITTED)
-    python: str | None = field(default=None, metadata=OMITTED)
-    setup: tuple[str, ...] = field(default=(), metadata=OMITTED)
-    node_selector: dict[str, str] = field(default_factory=dict, metadata=OMITTED)
+    port: int | None = None
+    python: str | None = None
+    setup: tuple[str, ...] = ()
+    node_selector: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -447,7 +435,6 @@ class GuardPolicy:
         "auto",
         "how strict fences processes off: by a DDS partition, which needs Fast DDS, or by"
         " remapping /tf and /tf_static",
-        **OMITTED,
     )
 
 
@@ -471,7 +458,7 @@ def switch_text(switch: dict[str, Any]) -> str:
     )
 
 
-VERSION: Literal[2] = 2
+VERSION: Literal[3] = 3
 
 #: The file beside the plan that holds the whole robot's description.
 DESCRIPTION = "robot.urdf"
@@ -493,21 +480,21 @@ class Plan:
     those of tools, by the names of their keys.
     """
 
-    version: Literal[2] = field(default=VERSION, kw_only=True)
+    version: Literal[3] = field(default=VERSION, kw_only=True)
     robot: str
     spec_digest: str
     description: str = field(default=DESCRIPTION, kw_only=True)
     base: str | None
-    host: str | None = field(default=None, kw_only=True, metadata=OMITTED)
+    host: str | None = field(default=None, kw_only=True)
     ros: RosSettings
     edges: tuple[PlanEdge, ...]
     processes: tuple[PlanProcess, ...]
     claims: tuple[PlanClaim, ...] = field(default=(), kw_only=True)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
-    args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
-    environment: dict[str, str] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
-    hosts: dict[str, PlanHost] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
-    sections: dict[str, Any] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
+    args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True)
+    environment: dict[str, str] = field(default_factory=dict, kw_only=True)
+    hosts: dict[str, PlanHost] = field(default_factory=dict, kw_only=True)
+    sections: dict[str, Any] = field(default_factory=dict, kw_only=True)
 
     def process(self, name: str) -> PlanProcess:
         """Return the process of that name.

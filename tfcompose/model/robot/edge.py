@@ -14,9 +14,9 @@ from tfcompose.foundation.units import (  # noqa: TC001 (read by them)
     JointVelocity,
     Number,
 )
+from tfcompose.model.fields import documented, narrowed
 from tfcompose.model.plan import Joint as PlanJoint
 from tfcompose.model.plan import PlanEdge, SourceLine
-from tfcompose.model.plan.codec import documented, narrowed
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.model.fields import narrowed
 from tfcompose.model.plan import PlanClaim, PlanHost, PlanProcess, switch_text
-from tfcompose.model.plan.codec import narrowed
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
 BUILT_IN = (STATIC, JOINTS, GUARD)

@@ -26,6 +26,7 @@ from tfcompose.foundation.units import (
     shown,
     with_article,
 )
+from tfcompose.model.fields import documented
 from tfcompose.model.plan import (
     GuardPolicy,
     Isolation,
@@ -34,7 +35,6 @@ from tfcompose.model.plan import (
     SensorPublisher,
     StatePublisher,
 )
-from tfcompose.model.plan.codec import documented
 from tfcompose.model.plan.middleware import ENDPOINT
 from tfcompose.model.robot import Dynamics, Limit, ReferencePositions, SafetyController
 from tfcompose.spec.language.args import Args

@@ -10,13 +10,13 @@ even with ``Recreate``.
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from tfcompose.model.files import File
-from tfcompose.model.plan.codec import encode
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import OWN_KINDS
 from tfcompose.model.process_keys import PROCESS_KEYS
@@ -274,8 +274,8 @@ def _digest(plan: Plan, process: PlanProcess, texts: Mapping[str, str]) -> str:
     Its part of the plan, and the files that it reads.
     """
     files = [texts[path] for path in files_of(plan, process) if path != _PLAN]
-    text = json.dumps([plan.started_with(process), files], default=encode)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    data = msgspec.json.encode([plan.started_with(process), files])
+    return hashlib.sha256(data).hexdigest()[:16]
 
 
 def _environment(plan: Plan) -> dict[str, str]:

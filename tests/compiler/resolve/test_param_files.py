@@ -26,12 +26,13 @@ HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: robot1}\nframes: {base_link: {}
 PLANNER = "  planner: {run: {package: p, executable: e}, params: PARAMS}\n"
 FILE = """
 /**: {ros__parameters: {common: 1, deep: {a: 1, b: 2}}}
-planner:
+robot1/planner:
   ros__parameters: {deep: {b: 3}, flag: on, octal: 012, text: "on", names: [base, "7", .5], empty: []}
 /robot1/planner: {ros__parameters: {last: yes}}
-/planner: {ros__parameters: {not_mine: 1}}
+planner: {ros__parameters: {not_mine: 1}}
 robot1:
   planner: {ros__parameters: {nested: 1}}
+  costmap: {ros__parameters: {radius: 0.3}}
 /*/planner: {ros__parameters: {one_part: 1}}
 """  # noqa: E501 (a text as its reader has it)
 
@@ -53,13 +54,33 @@ def source_text(params: str, **files: str) -> str:
 
 def test_parameters_of_the_file_come_in_order_below_inline_ones() -> None:
     params = yaml.safe_load(source_text("{file: p.yaml, deep: {a: 9}, own: x}"))
-    assert list(params) == ["/robot1/planner"]
+    assert list(params)[-1] == "/robot1/planner"
     output = params["/robot1/planner"]["ros__parameters"]
     assert output["deep"] == {"a": 9, "b": 3}
-    assert output["common"] == output["one_part"] == 1
+    assert output["common"] == output["one_part"] == output["nested"] == 1
     assert output["own"] == "x"
     assert "not_mine" not in output
-    assert "nested" not in output  # robot1/planner below robot1 is /robot1/robot1/planner
+
+
+def test_what_a_file_says_to_other_nodes_of_the_process_is_passed_on_in_its_order() -> None:
+    params = yaml.safe_load(source_text("{file: p.yaml, own: x}"))
+    assert list(params) == ["/**", "planner", "robot1/costmap", "/*/planner", "/robot1/planner"]
+    assert params["robot1/costmap"]["ros__parameters"] == {"radius": 0.3}
+
+
+def test_sections_of_several_files_have_the_order_in_which_their_names_come_first() -> None:
+    """As rcl keeps them: /** of the second file counts where the first one has it."""
+    first = "/**: {ros__parameters: {a: 1}}\n/robot1/planner: {ros__parameters: {a: 2}}\n"
+    text = source_text("{file: [p.yaml, q.yaml]}", p=first, q="/**: {ros__parameters: {a: 3}}\n")
+    params = yaml.safe_load(text)
+    assert params["/**"]["ros__parameters"]["a"] == 3
+    assert params["/robot1/planner"]["ros__parameters"]["a"] == 2
+
+
+def test_a_container_needs_no_parameters_of_its_own() -> None:
+    robot = HEAD.partition("processes")[0] + ("containers: {box: {params: {file: p.yaml}}}\n")
+    done = compile_robot(robot, "r.yaml", library(), read=reader({"p.yaml": FILE}))
+    assert "TF334" not in {one.code for one in done.found}
 
 
 def test_a_file_may_be_named_as_everywhere_else() -> None:
@@ -102,10 +123,10 @@ def test_a_parameter_that_contradicts_the_clock_is_found_where_it_is_given(
     assert "TF335" not in {one.code for one in over.found}
 
 
-def test_a_name_in_the_file_is_below_the_namespace_of_the_process() -> None:
-    file = "planner: {ros__parameters: {near: 1}}\n/robot1/planner: {ros__parameters: {far: 1}}\n"
+def test_a_name_in_the_file_is_the_full_one_with_and_without_a_leading_slash() -> None:
+    file = "planner: {ros__parameters: {a: 1}}\nrobot1/front/planner: {ros__parameters: {b: 1}}\n"
     params = yaml.safe_load(source_text("{file: front.yaml}, namespace: front", front=file))
-    assert params == {"/robot1/front/planner": {"ros__parameters": {"near": 1}}}
+    assert params["/robot1/front/planner"] == {"ros__parameters": {"b": 1}}
 
 
 def test_words_stay_as_in_the_source() -> None:
@@ -118,7 +139,9 @@ def test_words_stay_as_in_the_source() -> None:
 
 
 def test_later_files_are_laid_over_earlier_ones() -> None:
-    text = source_text("{file: [p.yaml, q.yaml]}", q="planner: {ros__parameters: {common: 2}}")
+    text = source_text(
+        "{file: [p.yaml, q.yaml]}", q="robot1/planner: {ros__parameters: {common: 2}}"
+    )
     assert yaml.safe_load(text)["/robot1/planner"]["ros__parameters"]["common"] == 2
 
 
@@ -130,7 +153,7 @@ def test_the_digest_of_the_plan_changes_with_the_file() -> None:
             next(file.text for file in emit(robot) if file.path == "plan.json"), "p"
         ).spec_digest
 
-    one, other = "planner: {ros__parameters: {a: 1}}", "planner: {ros__parameters: {a: 2}}"
+    one, other = "/**: {ros__parameters: {a: 1}}", "/**: {ros__parameters: {a: 2}}"
     assert digest(one) == digest(one) != digest(other)
 
 
@@ -158,7 +181,7 @@ def test_what_is_no_parameter_of_the_node_is_a_finding(
 
 def test_of_several_files_one_need_not_name_the_node_but_none_is_a_warning_for_each() -> None:
     files = {
-        "q": "planner: {ros__parameters: {a: 1}}",
+        "q": "/**/planner: {ros__parameters: {a: 1}}",
         "common": "other: {ros__parameters: {a: 1}}",
     }
     assert compiled("{file: [common.yaml, q.yaml]}", **files).found == ()

@@ -28,6 +28,10 @@ FILE = """
     numbers: [1, 2, 3]
     floats: [1.5, 2.0]
     deep: {inner: {value: yes}}
+costmap/costmap:
+  ros__parameters: {radius: 0.3, both: 1}
+/**:
+  ros__parameters: {both: 2}
 """
 READER = """
 import json, rclpy, sys
@@ -35,7 +39,7 @@ import json, rclpy, sys
 from tests.support import processes
 rclpy.init(args=["--ros-args", "--params-file", sys.argv[1]])
 given = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
-node = rclpy.create_node("planner", **given)
+node = rclpy.create_node(sys.argv[2], namespace=sys.argv[3], **given)
 read = {name: repr(p.value) for name, p in node.get_parameters_by_prefix("").items() if name != "use_sim_time"}
 print(json.dumps(read, sort_keys=True))
 node.destroy_node()
@@ -55,12 +59,16 @@ def test_rcl_reads_the_same_values_from_the_built_file(tmp_path: Path, domain: D
     build = [sys.executable, "-m", "tfcompose", "build", "r.yaml", "-o", "out"]
     processes.run(build, cwd=tmp_path, check=True)
 
-    def read(file: Path) -> dict[str, str]:
-        command = [sys.executable, "-W", "ignore", "-c", READER, str(file)]
+    def read(file: Path, name: str = "planner", namespace: str = "/") -> dict[str, str]:
+        command = [sys.executable, "-W", "ignore", "-c", READER, str(file), name, namespace]
         done = processes.run(command, env=dict(domain.environment), check=True)
         values: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
         return values
 
     mine = read(tmp_path / "mine.yaml")
     assert mine["flag"] == "True"
-    assert read(tmp_path / "out" / "params" / "planner.yaml") == mine
+    built = tmp_path / "out" / "params" / "planner.yaml"
+    assert read(built) == mine
+    other = ("costmap", "/costmap")
+    assert read(built, *other) == read(tmp_path / "mine.yaml", *other)
+    assert read(built, *other)["radius"] == "0.3"

@@ -79,10 +79,11 @@ def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[
     ros_args = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
     if process.log_level is not None:
         ros_args += ["--log-level", process.log_level]
-    if robot.ros.clock == "sim":
-        ros_args += ["-p", "use_sim_time:=true"]
+    # A value behind -p counts as one for /**: of two for the same nodes the later one holds.
     if has_params and not any(_PARAMS_FILE in text for text in process.texts):
         ros_args += ["--params-file", _PARAMS_FILE]
+    if robot.ros.clock == "sim":
+        ros_args += ["-p", "use_sim_time:=true"]
     for name, value in _launch_time_params(process.params):
         ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
     return ros_args
@@ -133,12 +134,13 @@ _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 def file_params(process: Process) -> dict[str, dict[str, Any]]:
     """Return what the process's parameter file holds, by node.
 
-    All but the paths that only the launcher knows.
+    First what the files that it names say to others, as every node of a process reads the file;
+    its own come last, which takes precedence. All but the paths that only the launcher knows.
     """
     if process.kind != "run":
         return {}
     nodes = {node.name: _known(node.params) for node in process.ros_nodes}
-    return {node: params for node, params in nodes.items() if params}
+    return process.other_params | {node: params for node, params in nodes.items() if params}
 
 
 def component_params(process: Process, robot: Robot) -> dict[str, Any]:

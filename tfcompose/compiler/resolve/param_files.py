@@ -9,7 +9,7 @@ import hashlib
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.compiler.resolve.processes import FILE_KEY, full_name, names_files
+from tfcompose.compiler.resolve.processes import FILE_KEY, names_files
 from tfcompose.foundation.findings import Finding, Note, RejectedError, finding, nearest
 from tfcompose.model.robot import AsInFile
 from tfcompose.spec.language.variables import OF_FILES
@@ -53,41 +53,54 @@ class _Work:
     _known: dict[str, ParamsFile] = field(default_factory=dict)
 
     def process(self, process: Process) -> Process:
-        return replace(
-            process, ros_nodes=tuple(self._node(node, process) for node in process.ros_nodes)
-        )
+        others: dict[str, Any] = {}
+        nodes = tuple(self._node(node, process, others) for node in process.ros_nodes)
+        own = {node.name.lstrip("/") for node in nodes}
+        others = {name: params for name, params in others.items() if name.lstrip("/") not in own}
+        return replace(process, ros_nodes=nodes, other_params=others)
 
-    def _node(self, node: Node, process: Process) -> Node:
-        params: dict[str, Any] = {}
-        places: dict[str, tuple[Span, ...]] = {}
-        without: list[Finding] = []
+    def _node(self, node: Node, process: Process, others: dict[str, Any]) -> Node:
+        """Return the node with its parameters; ``others`` takes what its files hold besides."""
         files = self._files_of(node)
+        named: dict[str, Span] = {}
+        sections: dict[str, dict[str, Any]] = {}
+        without: list[Finding] = []
         for file, place in files:
-            if isinstance(file, str) and file:
-                given = self._params_in(file, place, node, process, without)
-                places |= {
-                    key: (place, value.at)
-                    for key, value in given.items()
-                    if isinstance(value, Word)
-                }
-                params = _laid_over(params, _words(given))
-            else:
+            if not isinstance(file, str) or not file:
                 self.found.append(finding("TF103", "params: file takes the names of files", place))
-        if len(without) == len(
-            files
-        ):  # a file that all nodes are given need not have something for each
+            elif loaded := self._load(file, place):
+                path, content = loaded
+                named[path] = place
+                # rcl keeps the sections of all files in the order in which each name comes first.
+                for one in content.nodes:
+                    sections[one.name] = _laid_over(sections.get(one.name, {}), one.params)
+                for_node = any(matches(one.name, node.name) for one in content.nodes)
+                if not for_node and not content.found and not process.loads:
+                    without.append(_nothing(path, place, node, process, content.nodes))
+        if len(without) == len(files):
+            # A file that all nodes are given need not have something for each.
             self.found += without
+        given: dict[str, Any] = {}
+        for name, params in sections.items():
+            if matches(name, node.name):
+                given = _laid_over(given, params)
+            others[name] = _laid_over(others.get(name, {}), _words(params))
         has_files = names_files(node.params)
         inline = {
             key: value for key, value in node.params.items() if not (has_files and key == FILE_KEY)
         }
         paths = {key: (*node.path, "params", key) for key in inline}
+        places: dict[str, tuple[Span, ...]] = {
+            key: (named[value.at.file], value.at)
+            for key, value in given.items()
+            if isinstance(value, Word)
+        }
         places |= {
             key: (self.draft.spec.at_key(path),)
             for key, path in paths.items()
             if self.draft.spec.spans.has_key(path)
         }
-        return replace(node, params=_laid_over(params, inline), places=places)
+        return replace(node, params=_laid_over(_words(given), inline), places=places)
 
     def _files_of(self, node: Node) -> list[tuple[Any, Span]]:
         """Return the parameter files that a node names, each with the place of its name."""
@@ -101,36 +114,16 @@ class _Work:
         )
         return [(file, self.draft.spec.at(path)) for file, path in paths]
 
-    def _params_in(
-        self, file: str, at: Span, node: Node, process: Process, without: list[Finding]
-    ) -> dict[str, Any]:
-        """Return what a file says to the node, in words.
-
-        ``without`` gets a finding if it says nothing to it.
-        """
+    def _load(self, file: str, at: Span) -> tuple[str, ParamsFile] | None:
+        """Return the path of a file that is named here, and what it holds."""
         call = OF_FILES.fullmatch(file)
         try:
             path = self.draft.packages.path_of(call[2] if call else file, at)
         except RejectedError as error:
             self.found += error.findings
-            return {}
-        loaded = self._load(path, at)
-        if loaded is None:
-            return {}
-        namespace = (
-            self.draft.robot.ros.namespace if process.namespace is None else process.namespace
-        )
-        meant = [one for one in loaded.nodes if matches(full_name(namespace, one.name), node.name)]
-        if not meant and not loaded.found:
-            without.append(_nothing(path, at, node, process, loaded.nodes))
-        params: dict[str, Any] = {}
-        for one in meant:
-            params = _laid_over(params, one.params)
-        return params
-
-    def _load(self, path: str, at: Span) -> ParamsFile | None:
+            return None
         if path in self._known:
-            return self._known[path]
+            return path, self._known[path]
         note = Note("named here", at)
         if self.draft.read is None:
             self.found.append(finding("TF001", f"{path}: files cannot be read here", at))
@@ -144,7 +137,7 @@ class _Work:
         self.found += [replace(one, notes=(*one.notes, note)) for one in loaded.found]
         self.digests[path] = hashlib.sha256(text.encode()).hexdigest()
         self._known[path] = loaded
-        return loaded
+        return path, loaded
 
 
 def _nothing(
@@ -155,7 +148,7 @@ def _nothing(
     meant = next((one for one in there if near and one.name.endswith(near)), None)
     notes = [Note(f"it has {meant.name}", meant.at)] if meant else []
     advice = (
-        f"call it {node.name} there, or give the process that node: it has"
+        f"call it {node.name} there (/** means any node), or give the process that node: it has"
         f" {', '.join(names) or 'no node'}"
     )
     message = f"{path} has no parameters for {node.name}, the node of {process.name}"

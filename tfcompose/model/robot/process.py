@@ -89,7 +89,8 @@ class Process(PlanProcess):
     command of them. ``part`` is the ``Part`` that it belongs to, if any. ``loads`` says that it is
     a container of components, ``describes`` that its parameter ``robot_description`` is the URDF
     for a stock robot_state_publisher. ``rate`` is that of the joint states that it sends.
-    ``host_at`` is where its host was named, if it was.
+    ``host_at`` is where its host was named, if it was. ``other_params`` are what its parameter
+    files say to nodes that are not listed, by their names and patterns in the order of the files.
     """
 
     nodes: tuple[str, ...] = field(init=False)
@@ -104,6 +105,7 @@ class Process(PlanProcess):
     describes: bool = field(default=False, kw_only=True)
     loads: bool = field(default=False, kw_only=True)
     host_at: Span | None = field(default=None, kw_only=True, compare=False)
+    other_params: dict[str, Any] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", tuple(node.name for node in self.ros_nodes))

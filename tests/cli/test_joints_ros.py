@@ -30,7 +30,7 @@ ARM = """
 tfcompose: 1
 robot: arm
 ros: {frame_prefix: "r1/"}
-links: {base_link: {}, a: {}, b: {}, c: {}, d: {}, e: {}}
+links: {base_link: {}, a: {}, b: {}, c: {}, d: {}, e: {}, mount: {parent: base_link}}
 joints:
   a_last: {type: prismatic, parent: b, child: c, axis: [0, 1, 0], mimic: {joint: m_mid, multiplier: 0.5, offset: 0.1}, limit: {lower: -1, upper: 1, velocity: 1, effort: 1}}
   m_mid:  {type: revolute, parent: a, child: b, xyz: [0, 0, 0.2], axis: [0, 1, 0], mimic: {joint: z_first, multiplier: -2}, limit: {lower: -3, upper: 3, velocity: 1, effort: 1}}
@@ -82,10 +82,32 @@ def test_simulated_joints_move_the_robot_and_a_new_description_comes_while_it_ru
         (tmp_path / "robot.yaml").write_text(
             ARM.replace("xyz: [0, 0.3, 0]", "xyz: [0, 0.3, 0.7]"), encoding="utf-8"
         )
-        assert "restarted: joints" in tfc("up", "--wait")
+        assert "restarted: static, joints" in tfc("up", "--wait")
         assert until(lambda: has_reported(2)), "who listens gets the new one"
         assert until(lambda: _z(buffer) == pytest.approx(0.7))
         agrees(buffer, heard[1], _positions(states))
+
+
+def test_a_fixed_mount_moves_and_no_joint_pauses(tfc: Callable[..., str], tmp_path: Path) -> None:
+    tfc("up", "--wait")
+    with open_node("ears", "") as node, TransformListener(buffer := Buffer()):
+        texts = Subscription(node, String, "/robot_description", LATCHED)
+        heard: list[Any] = []
+
+        def has_come(count: int) -> bool:
+            heard.extend(texts.take())
+            return len(heard) == count
+
+        assert until(lambda: has_come(1))
+        moved = "mount: {parent: base_link, xyz: [0, 0, 0.7]}"
+        text = ARM.replace("mount: {parent: base_link}", moved)
+        (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
+        assert tfc("up", "--wait").splitlines()[0].endswith("restarted: static")
+        assert until(lambda: _z(buffer, "mount") == pytest.approx(0.7))
+        assert until(lambda: has_come(2))
+    (robot,) = json.loads(tfc("ps", "--format", "json"))
+    restarts = {process["name"]: process["restarts"] for process in robot["processes"]}
+    assert restarts == {"static": 1, "joints": 0, "states": 0, "guard": 0}
 
 
 def test_a_second_sender_of_a_joint_is_named_while_it_sends(tfc: Callable[..., str]) -> None:
@@ -132,8 +154,8 @@ def agrees(buffer: Buffer, description: str, positions: dict[str, float]) -> Non
     assert slid.xyz == pytest.approx((0.0, -0.3, 0.0))
 
 
-def _z(buffer: Buffer) -> float:
-    z: float = buffer.lookup("r1/base_link", "r1/e")[0].xyz[2]
+def _z(buffer: Buffer, frame: str = "e") -> float:
+    z: float = buffer.lookup("r1/base_link", f"r1/{frame}")[0].xyz[2]
     return z
 
 

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.answers import PlanDifference, change
 from tfcompose.model.plan import (
@@ -22,7 +24,8 @@ def edge(child: str, owner: str = "static", x: float = 0.0, line: int = 1) -> Pl
     return PlanEdge("base", child, kind, owner, f"/{owner}", pose, None, source)
 
 
-STATIC, GUARD = PlanProcess("static", "static"), PlanProcess("guard", "guard")
+STATIC, JOINTS = PlanProcess("static", "static"), PlanProcess("joints", "joints")
+GUARD = PlanProcess("guard", "guard")
 SLAM = PlanProcess("slam", "run", argv=("slam",), params_file="params/slam.yaml")
 PLAN = Plan(
     "rover",
@@ -51,9 +54,20 @@ def test_a_line_that_moved_in_the_file_changes_nothing(tmp_path: Path) -> None:
     assert changed(tmp_path, moved) == PlanDifference(frozenset(), ())
 
 
-def test_an_edge_concerns_its_owner_and_the_guard(tmp_path: Path) -> None:
-    moved = replace(PLAN, edges=(edge("laser", x=0.1), edge("odom", "slam")))
-    assert changed(tmp_path, moved) == PlanDifference(frozenset({"static", "guard"}), ())
+@pytest.mark.parametrize(
+    ("edges", "concerned"),
+    [
+        ((edge("laser", x=0.1), edge("odom", "slam")), {"static"}),
+        ((edge("laser"), edge("odom", "slam", x=0.1)), {"slam", "guard"}),
+        ((edge("laser"), edge("lidar"), edge("odom", "slam")), {"static", "guard"}),
+    ],
+)
+def test_an_edge_concerns_its_owner_and_another_one_the_guard(
+    edges: tuple[PlanEdge, ...], concerned: set[str], tmp_path: Path
+) -> None:
+    assert changed(tmp_path, replace(PLAN, edges=edges)) == PlanDifference(
+        frozenset(concerned), ()
+    )
 
 
 def test_a_parameter_concerns_its_process_only(tmp_path: Path) -> None:
@@ -64,6 +78,19 @@ def test_the_description_concerns_whoever_sends_it(tmp_path: Path) -> None:
     assert changed(tmp_path, PLAN, description="<robot name='r'/>") == PlanDifference(
         frozenset({"static"}), ()
     )
+    arm = replace(
+        PLAN, processes=(STATIC, JOINTS, GUARD), edges=(edge("laser"), edge("a", "joints"))
+    )
+    (tmp_path / PLAN.description).write_text("<robot/>")
+    (tmp_path / "new").mkdir(exist_ok=True)
+    for plan, concerned in ((arm, "static"), (replace(arm, processes=(JOINTS, GUARD)), "joints")):
+        assert change(plan, tmp_path, plan, tmp_path / "new").changed == {concerned}
+
+
+def test_joints_no_longer_sends_the_description_once_there_is_a_fixed_edge(tmp_path: Path) -> None:
+    arm = replace(PLAN, processes=(JOINTS, GUARD), edges=(edge("a", "joints"),))
+    new = replace(PLAN, processes=(STATIC, JOINTS, GUARD), edges=(edge("a", "joints"), edge("b")))
+    assert change(arm, tmp_path, new, tmp_path).changed == {"joints", "guard"}
 
 
 def test_a_policy_concerns_the_guard_and_a_setting_of_ros_everybody(tmp_path: Path) -> None:

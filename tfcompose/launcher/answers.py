@@ -194,7 +194,7 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDiff
         same = old.started_with(other) == new.started_with(process) and (
             _bytes(old_folder, other.params_file) == _bytes(new_folder, process.params_file)
         )
-        if not same or (described and process.kind in ("static", "joints")):
+        if not same or (described and new.describes(process)):
             changed.add(process.name)
     return PlanDifference(frozenset(changed), _held(old, new))
 

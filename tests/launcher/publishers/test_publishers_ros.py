@@ -211,17 +211,18 @@ def test_the_description_is_latched(
     assert deserialize_message(received.data, String).data == "<robot name='rover'/>"
 
 
-def test_the_description_is_left_to_the_joints_process_where_there_is_one(
+def test_the_description_is_left_to_the_static_process_where_there_is_one(
     start: Callable[..., Any],
     listeners: Listeners,
     edge: Callable[..., Any],
     write: Callable[..., Any],
 ) -> None:
     file = write([edge("a b")], PlanProcess("static", "static"), PlanProcess("joints", "joints"))
-    start("static", file, "static").until_says("1 edge on /tf_static")
+    start("joints", file, "joints").until_says("0 edges on /tf")
     subscription = Subscription(listeners.node, String, "/rover/robot_description", LATCHED)
-    listeners.tf(1, static=True)
     assert take_for(listeners.node, subscription, 0.5) == []
+    start("static", file, "static").until_says("1 edge on /tf_static")
+    assert len(take(listeners.node, subscription, 1)) == 1
 
 
 def test_the_rate_does_not_drift(

@@ -25,7 +25,10 @@ def main(argv: Sequence[str]) -> int:
 
 
 def joints(own: Own, stop: Stop) -> None:
-    """Publish the moving edges of each ``joint_states`` message, and latch the description."""
+    """Publish the moving edges of each ``joint_states`` message.
+
+    Latch the description where no ``static`` does.
+    """
     # ROS, once signals are handled.
     from tfcompose.launcher.publishers.description import CHECK_EVERY_S, DescriptionPublisher  # noqa: PLC0415
 
@@ -52,7 +55,7 @@ def joints(own: Own, stop: Stop) -> None:
         clock = StampClock(node, say, sim=own.plan.ros.clock == "sim")
         mover = JointMover(own.edges, say, clock.now_ns, options)
         publisher = TFPublisher(node, static=False)
-        description = DescriptionPublisher(own, node)
+        description = DescriptionPublisher(own, node) if own.plan.describes(own.process) else None
         states = JointStateSubscription(node)
         at_most = (
             f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""
@@ -60,15 +63,17 @@ def joints(own: Own, stop: Stop) -> None:
         say(f"{counted(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
         ready()
         missing = _Missing(mover, states.topic, lambda: publishing_nodes(node, states.topic))
-        wait_set = WaitSet(node, [states, description.subscription], stop)
+        texts = [description.subscription] if description else []
+        wait_set = WaitSet(node, [states, *texts], stop)
         while not stop.requested:
-            is_waiting = missing.is_waiting or clock.is_waiting or description.is_waiting
+            is_waiting = missing.is_waiting or clock.is_waiting
+            is_waiting = is_waiting or (description is not None and description.is_waiting)
             with_something = wait_set.wait(CHECK_EVERY_S if is_waiting else None)
             for received in states.take() if states in with_something else ():
                 message = mover.tf_message(received.data, received.received_ns)
                 if message is not None:
                     publisher.publish(message)
-            if description.is_waiting or description.subscription in with_something:
+            if description and (description.is_waiting or texts[0] in with_something):
                 description.check()
             missing.check()
             clock.check()

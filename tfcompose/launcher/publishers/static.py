@@ -22,7 +22,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def static(own: Own, stop: Stop) -> None:
-    """Latch all fixed edges in one message, and the description without ``joints``."""
+    """Latch all fixed edges in one message, and the description."""
     # ROS, once signals are handled.
     from tfcompose.launcher.publishers.description import CHECK_EVERY_S, DescriptionPublisher  # noqa: PLC0415
 
@@ -47,13 +47,6 @@ def static(own: Own, stop: Stop) -> None:
             else "the description; no edge is fixed"
         )
         ready()
-        if _joints_of(own) in {
-            process.name
-            for process in own.plan.processes
-            if process.kind in ("joints", "external")
-        }:
-            stop.wait(None)
-            return
         description = DescriptionPublisher(own, node)
         while not stop.requested:
             wait(
@@ -63,8 +56,3 @@ def static(own: Own, stop: Stop) -> None:
                 stop,
             )
             description.check()
-
-
-def _joints_of(own: Own) -> str:
-    """Return the name of the process that sends the description instead, if any."""
-    return f"{own.process.name.removesuffix('static')}joints"

@@ -464,6 +464,7 @@ VERSION: Literal[3] = 3
 DESCRIPTION = "robot.urdf"
 #: The file beside it that holds what a stock robot_state_publisher is given.
 STOCK_DESCRIPTION = "robot.state_publisher.urdf"
+_NOWHERE = SourceLine("", 0)
 #: What no name of a node may hold.
 _NO_NAME = re.compile(r"\W")
 
@@ -570,13 +571,33 @@ class Plan:
     def started_with(self, process: PlanProcess) -> tuple[Any, ...]:
         """Return all of the plan that decides how the process runs.
 
-        An edge's place in the robot file does not.
+        An edge's place in the robot file does not, nor does for the guard the pose of an edge that
+        ``static`` publishes.
         """
         guards = process.kind == "guard"
         edges = self.edges if guards else self.edges_of(process.name)
         fence = (self.robot, self.guard.fence) if self.guard.mode == "strict" else None
-        anywhere = tuple(replace(edge, source=SourceLine("", 0)) for edge in edges)
-        return process, self.ros, fence, anywhere, self.guard if guards else None
+        unplaced = {one.name for one in self.processes if guards and one.kind == "static"}
+        anywhere = [
+            *(replace(edge, source=_NOWHERE) for edge in edges if edge.owner not in unplaced),
+            *(
+                replace(edge, source=_NOWHERE, pose=Pose())
+                for edge in edges
+                if edge.owner in unplaced
+            ),
+        ]
+        describes = self.describes(process)
+        return process, self.ros, fence, anywhere, self.guard if guards else None, describes
+
+    def describes(self, process: PlanProcess) -> bool:
+        """Return whether the process publishes a robot's description.
+
+        ``static`` does, and ``joints`` where there is no ``static`` beside it.
+        """
+        static = f"{process.name.removesuffix('joints')}static"
+        return process.kind == "static" or (
+            process.kind == "joints" and all(one.name != static for one in self.processes)
+        )
 
 
 def _name_end(host: str | None) -> str:

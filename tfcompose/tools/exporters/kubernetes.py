@@ -18,7 +18,6 @@ import msgspec
 
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
-from tfcompose.model.plan.stock import OWN_KINDS
 from tfcompose.model.process_keys import PROCESS_KEYS
 from tfcompose.tools.exporters.supervisors import (
     INSIDE,
@@ -82,7 +81,7 @@ def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
     files = {found for word in process.texts for found in _IN_FOLDER.findall(word)}
     if process.params_file:
         files.add(process.params_file)
-    if process.kind in OWN_KINDS:
+    if plan.describes(process):
         files.add(process.description or plan.description)
     return (_PLAN, *sorted(files))
 

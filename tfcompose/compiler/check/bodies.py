@@ -114,18 +114,22 @@ def _principal(
     return (low * scale, (3 * mean - high - low) * scale, high * scale)
 
 
-_TIMES = 10
+#: Of what its shapes give, and of what boxes around its meshes would.
+_TIMES, _TIMES_OF_BOX = 10, 100
 
 
 @rule("TF711", of_urdf=True)
 def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
     for link in robot.links.values():
         inertial = link.inertial
-        if inertial is None or not inertial.of_shapes or _density(link) > _DENSEST:
+        if inertial is None or _density(link) > _DENSEST:
             continue
+        of_shapes, times = inertial.of_shapes, _TIMES
+        if not of_shapes:
+            of_shapes, times = _of_boxes(inertial.mass, link), _TIMES_OF_BOX
         trace = inertial.tensor[0] + inertial.tensor[3] + inertial.tensor[5]
-        ratios = [trace / of_shape for of_shape in inertial.of_shapes if of_shape > 0]
-        if not ratios or trace <= 0 or any(1 / _TIMES < ratio < _TIMES for ratio in ratios):
+        ratios = [trace / of_shape for of_shape in of_shapes if of_shape > 0]
+        if not ratios or trace <= 0 or any(1 / times < ratio < times for ratio in ratios):
             continue
         ratio = min(ratios, key=lambda one: abs(math.log(one)))
         at = inertial.at or link.at
@@ -134,6 +138,12 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
         if not robot.is_foreign(at):
             advice += ", or remove inertia: it is computed"
         yield finding("TF711", message, at, help=advice)
+
+
+def _of_boxes(mass: float, link: Link) -> tuple[float, ...]:
+    """Return the traces of inertias of the boxes around the link's shapes, each with the mass."""
+    sizes = map(size_of, (*link.visuals, *link.collisions))
+    return tuple(mass / 6 * math.hypot(*size) ** 2 for size in sizes if size)
 
 
 #: Osmium has 22,600 kg/m³.

@@ -264,6 +264,12 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         max(_USUAL_M, _TIMES * body, _TIMES * sorted(mounts)[len(mounts) // 2] if mounts else 0.0),
         max(_LARGEST_M, _TIMES * body),
     )
+    for link in robot.links.values():
+        inertial = link.inertial
+        if inertial and (distance := norm(inertial.pose.xyz)) > limit:
+            message = f"the centre of mass of {link.name} is {distance:g} m away from it"
+            advice = "check its unit: a bare number is in metres"
+            yield finding("TF414", message, inertial.at or link.at, help=advice)
     near = sorted(distance for distance in mounts if distance <= limit)
     usual = near[len(near) // 2] if near else 0.0
     moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
@@ -312,8 +318,9 @@ def _unit_meant(distance: float, usual: float) -> tuple[str, float]:
 
 
 def _sizes(link: Link) -> list[float]:
-    """Return the largest size of each shape of the link, but of meshes."""
-    return [max(shape.size) for shape in (*link.visuals, *link.collisions) if shape.kind != "mesh"]
+    """Return the length of each shape of the link, but of meshes."""
+    shapes = (shape for shape in (*link.visuals, *link.collisions) if shape.kind != "mesh")
+    return [max(size) for shape in shapes if (size := size_of(shape))]
 
 
 #: A mesh so much longer than the robot's longest edge is not in metres; a small robot may still

@@ -138,7 +138,8 @@ def edge_given_twice(robot: Robot) -> Iterator[Finding]:
     first: dict[tuple[str, str], Edge] = {}
     for edge in robot.edges:
         other = first.setdefault((edge.parent, edge.child), edge)
-        if other is not edge and other.owner == edge.owner:
+        has_owners = not robot.is_foreign(edge.at)
+        if other is not edge and not (has_owners and other.owner != edge.owner):
             notes = [Note("first defined here", other.at)]
             yield finding(
                 "TF205",

@@ -7,10 +7,11 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.check.poses import placed, without_side
+from tfcompose.compiler.check.poses import placed, side_of, twins, without_side
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.geometry import Pose, norm, rotate
+from tfcompose.foundation.numbers import numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -151,6 +152,50 @@ def _odd_axes(robot: Robot, wheels: list[Edge]) -> dict[str, tuple[Edge, Vector]
                 back = poses[edge.child].inverse().quat_xyzw
                 odd[edge.child] = (group[index - 1], rotate(back, others[0]))
     return odd
+
+
+#: Wheels of a pair are mirrored to a millimetre.
+_MIRRORED_M = 1e-3
+
+
+@rule("TF738", of_urdf=True, follows="pose")
+def wheels_not_mirrored(robot: Robot) -> Iterator[Finding]:
+    wheels = {edge.child: edge for edge in robot.edges if is_wheel(robot, edge)}
+    done: set[str] = set()
+    for edge in wheels.values():
+        done.add(edge.child)
+        for twin in (wheels[name] for name in twins(edge.child) if name in done):
+            (x, y, z), (twin_x, twin_y, twin_z) = edge.pose.xyz, twin.pose.xyz
+            axis, _ = side_of(edge.child, twin.child)
+            off = [abs(x - twin_x), abs(z - twin_z), abs(y + twin_y) if y * twin_y < 0 else 0.0]
+            if edge.parent != twin.parent or axis != 1 or max(off) <= _MIRRORED_M:
+                continue
+            others = [wheel for wheel in wheels.values() if wheel not in (edge, twin)]
+            odd, pattern = edge, twin
+            if _is_alike(edge, others) and not _is_alike(twin, others):
+                odd, pattern = twin, edge
+            right = (pattern.pose.xyz[0], -pattern.pose.xyz[1], pattern.pose.xyz[2])
+            message = f"{odd.child} is not at the mirrored place of {pattern.child}"
+            message += f": [{numbers(odd.pose.xyz)}], and [{numbers(pattern.pose.xyz)}]"
+            advice = f"if {pattern.child} is right, write {_origin(robot, odd, right)}"
+            notes = [Note(f"{pattern.child} is mounted here", pattern.xyz_at or pattern.at)]
+            yield finding("TF738", message, odd.xyz_at or odd.at, help=advice, notes=notes)
+
+
+def _is_alike(wheel: Edge, others: Sequence[Edge]) -> bool:
+    """Return whether one of the others is as high, and as far from the middle, as the wheel."""
+    _, y, z = wheel.pose.xyz
+    places = (other.pose.xyz for other in others)
+    return any(
+        abs(abs(y) - abs(other[1])) <= _MIRRORED_M and abs(z - other[2]) <= _MIRRORED_M
+        for other in places
+    )
+
+
+def _origin(robot: Robot, edge: Edge, xyz: Vector) -> str:
+    if robot.is_foreign(edge.at):
+        return f'xyz="{numbers(xyz)}"'
+    return f"xyz: [{numbers(xyz).replace(' ', ', ')}]"
 
 
 @rule("TF626", follows="pose")

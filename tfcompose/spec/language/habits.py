@@ -98,6 +98,7 @@ _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
             "box cylinder sphere mesh shape",
             (("visual", "a shape belongs under visual: {box: [0.5, 0.4, 0.15]}"),),
         ),
+        ("scale", (("mesh", "it belongs to the file: mesh: {uri: base.stl, scale: 0.001}"),)),
         ("mass inertia density", (("inertial", _MASS),)),
         (
             "ixx iyy izz ixy ixz iyz",

@@ -248,7 +248,6 @@ REFUSED = {
     "run: [x], stop: {timeout: 0}": ("TF106", "0"),
     "run: [x], nodes: {a b: {}}": ("TF106", "a b"),
     "run: [x], nodes: {a: {}}, node: b": ("TF107", "node"),
-    "run: [x], nodes: {b: {}, c: {}}, params: {y: 1}": ("TF107", "y"),
     "run: [x], max_restarts: -1": ("TF106", "-1"),
     "run: [x], required: 1": ("TF103", "1"),
 }
@@ -398,6 +397,14 @@ def test_a_node_that_is_listed_alone_does_not_rename_the_others() -> None:
     assert "__ns:=/r1" in listed.argv
     assert listed.nodes == ("/r1/drive",)
     assert "__node:=drive" in process_of(f"{EXE}, node: drive").argv
+
+
+def test_parameters_of_a_process_with_nodes_are_for_each_of_its_nodes() -> None:
+    nodes = "nodes: {b: {params: {x: 3}}, c: {}}, params: {x: 1, y: 2}"
+    files = files_of(f"a: {{{EXE}, {nodes}}}")
+    params = yaml.safe_load(files["params/a.yaml"])
+    given = {node: one["ros__parameters"] for node, one in params.items()}
+    assert given == {"/**": {"x": 1, "y": 2}, "/r1/b": {"x": 3, "y": 2}, "/r1/c": {"x": 1, "y": 2}}
 
 
 ROS2 = {

@@ -23,7 +23,9 @@ from tests.support.bringups import (
 )
 from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
+from tfcompose.compiler.emit import emit
 from tfcompose.foundation import confined
+from tfcompose.model.plan.file import read_plan
 from tfcompose.spec.load import load
 
 PYTHON = """
@@ -827,6 +829,28 @@ def generate_launch_description():
 def test_an_event_that_activates_a_lifecycle_node_is_its_state(tmp_path: Path) -> None:
     _, data = import_of(source(tmp_path, "a.launch.py", LIFECYCLE))
     assert data["processes"]["map_server"]["lifecycle"] == "active"
+
+
+def test_a_node_that_the_source_does_not_name_keeps_its_name_and_has_the_parameters_of_all(
+    tmp_path: Path,
+) -> None:
+    """__node would rename each controller that ros2_control_node loads."""
+    text = """<launch>
+      <node pkg="controller_manager" exec="ros2_control_node">
+        <param name="rate" value="100"/>
+      </node>
+    </launch>"""
+    imported, data = import_of(source(tmp_path, "a.launch.xml", text))
+    (process,) = data["processes"].values()
+    assert (process["params"], list(process["nodes"].values())) == ({"rate": 100}, [{}])
+    robot = compiled(imported, tmp_path).robot
+    assert robot
+    files = {file.path: file.text for file in emit(robot)}
+    plan = read_plan(files["plan.json"], "plan.json")
+    (started,) = (one for one in plan.started if one.params_file)
+    assert not [word for word in started.argv if word.startswith("__node:=")]
+    assert started.params_file
+    assert yaml.safe_load(files[started.params_file])["/**"]["ros__parameters"] == {"rate": 100}
 
 
 def test_a_parameter_file_lies_over_the_parameters_before_it(

@@ -181,7 +181,11 @@ nice -n 5 ros2 run drive node
     assert set(data["frames"]) == {"base_link", "a"}
     assert data["ros"] == {"domain_id": 7}
     assert list(data["processes"].values()) == [
-        {"run": {"package": "drive", "executable": "node"}, "prefix": ["nice", "-n", "5"]}
+        {
+            "run": {"package": "drive", "executable": "node"},
+            "nodes": {"node": {}},
+            "prefix": ["nice", "-n", "5"],
+        }
     ]
     assert places(printed_errors(capsys), "TF020") == [f"start.sh:{line}" for line in (3, 4, 6)]
 

@@ -139,8 +139,9 @@ def file_params(process: Process) -> dict[str, dict[str, Any]]:
     """
     if process.kind != "run":
         return {}
-    nodes = {node.name: _known(node.params) for node in process.ros_nodes}
-    return process.other_params | {node: params for node, params in nodes.items() if params}
+    nodes = process.other_params | {node.name: node.params for node in process.ros_nodes}
+    known = {node: _known(params) for node, params in nodes.items()}
+    return {node: params for node, params in known.items() if params}
 
 
 def component_params(process: Process, robot: Robot) -> dict[str, Any]:

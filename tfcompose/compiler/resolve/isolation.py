@@ -94,6 +94,11 @@ class _Filler:
                 replace(n, params=self._fill(n.params, (*n.path, "params")))
                 for n in process.ros_nodes
             ),
+            all_nodes=process.all_nodes
+            and replace(
+                process.all_nodes,
+                params=self._fill(process.all_nodes.params, (*section, "params")),
+            ),
             argv=self._fill(process.argv, (*section, "run")),
             remap=self._fill(process.remap, (*section, "remap")),
             env=self._fill(process.env, (*section, "env")),

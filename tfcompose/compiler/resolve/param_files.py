@@ -32,7 +32,7 @@ def read_param_files(draft: Draft) -> Iterator[Finding]:
     names = {
         process.name
         for process in draft.processes
-        if any(node.params for node in process.ros_nodes)
+        if process.all_nodes or any(node.params for node in process.ros_nodes)
     }
     processes = list(robot.processes)
     for index, process in enumerate(processes):
@@ -61,22 +61,21 @@ class _Work:
 
     def _node(self, node: Node, process: Process, others: dict[str, Any]) -> Node:
         """Return the node with its parameters; ``others`` takes what its files hold besides."""
-        files = self._files_of(node)
         named: dict[str, Span] = {}
         sections: dict[str, dict[str, Any]] = {}
-        without: list[Finding] = []
-        for file, place in files:
-            if not isinstance(file, str) or not file:
-                self.found.append(finding("TF103", "params: file takes the names of files", place))
-            elif loaded := self._load(file, place):
-                path, content = loaded
-                named[path] = place
-                # rcl keeps the sections of all files in the order in which each name comes first.
-                for one in content.nodes:
-                    sections[one.name] = _laid_over(sections.get(one.name, {}), one.params)
-                for_node = any(matches(one.name, node.name) for one in content.nodes)
-                if not for_node and not content.found and not process.loads:
-                    without.append(_nothing(path, place, node, process, content.nodes))
+        places: dict[str, tuple[Span, ...]] = {}
+        if process.all_nodes:
+            for _, _, content in self._loaded(process.all_nodes, named):
+                _add_sections(sections, content)
+            common = self._inline(process.all_nodes, places)
+            sections[_ANY] = _laid_over(sections.get(_ANY, {}), common)
+        files = list(self._loaded(node, named))
+        without = []
+        for path, place, content in files:
+            _add_sections(sections, content)
+            for_node = any(matches(one.name, node.name) for one in content.nodes)
+            if not for_node and not content.found and not process.loads:
+                without.append(_nothing(path, place, node, process, content.nodes))
         if len(without) == len(files):
             # A file that all nodes are given need not have something for each.
             self.found += without
@@ -85,22 +84,36 @@ class _Work:
             if matches(name, node.name):
                 given = _laid_over(given, params)
             others[name] = _laid_over(others.get(name, {}), _words(params))
-        has_files = names_files(node.params)
-        inline = {
-            key: value for key, value in node.params.items() if not (has_files and key == FILE_KEY)
-        }
-        paths = {key: (*node.path, "params", key) for key in inline}
-        places: dict[str, tuple[Span, ...]] = {
+        places |= {
             key: (named[value.at.file], value.at)
             for key, value in given.items()
             if isinstance(value, Word)
         }
-        places |= {
-            key: (self.draft.spec.at_key(path),)
-            for key, path in paths.items()
-            if self.draft.spec.spans.has_key(path)
-        }
+        inline = self._inline(node, places)
         return replace(node, params=_laid_over(_words(given), inline), places=places)
+
+    def _inline(self, node: Node, places: dict[str, tuple[Span, ...]]) -> dict[str, Any]:
+        """Return the parameters of the robot file itself; ``places`` takes where they are."""
+        has_files = names_files(node.params)
+        for key in node.params:
+            path = (*node.path, "params", key)
+            if self.draft.spec.spans.has_key(path):
+                places[key] = (self.draft.spec.at_key(path),)
+        return {
+            key: value for key, value in node.params.items() if not (has_files and key == FILE_KEY)
+        }
+
+    def _loaded(
+        self, node: Node, named: dict[str, Span]
+    ) -> Iterator[tuple[str, Span, ParamsFile]]:
+        """Yield the files that a node names; ``named`` takes where each is named."""
+        for file, place in self._files_of(node):
+            if not isinstance(file, str) or not file:
+                self.found.append(finding("TF103", "params: file takes the names of files", place))
+            elif loaded := self._load(file, place):
+                path, content = loaded
+                named[path] = place
+                yield path, place, content
 
     def _files_of(self, node: Node) -> list[tuple[Any, Span]]:
         """Return the parameter files that a node names, each with the place of its name."""
@@ -138,6 +151,16 @@ class _Work:
         self.digests[path] = hashlib.sha256(text.encode()).hexdigest()
         self._known[path] = loaded
         return path, loaded
+
+
+#: The section of a parameter file that means every node.
+_ANY = "/**"
+
+
+def _add_sections(sections: dict[str, dict[str, Any]], content: ParamsFile) -> None:
+    """Add a file's sections as rcl does: each name keeps the place where it came first."""
+    for one in content.nodes:
+        sections[one.name] = _laid_over(sections.get(one.name, {}), one.params)
 
 
 def _nothing(
@@ -187,4 +210,4 @@ def _words(value: Any) -> Any:
         return AsInFile(value.text) if value.plain else value.text
     if isinstance(value, dict):
         return {key: _words(item) for key, item in value.items()}
-    return [_words(item) for item in value]
+    return [_words(item) for item in value] if isinstance(value, list) else value

@@ -69,8 +69,10 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
     place = spec.at_key(at)
     namespace = namespace_of(declared, spec.ros.namespace)
     nodes = yield from nodes_of(name, declared, namespace, spec)
+    has_common = declared.nodes and declared.params
+    common = Node("/**", place, at, declared.params) if has_common else None
     if declared.external:
-        process = Process(name, "external", at=place, ros_nodes=nodes)
+        process = Process(name, "external", at=place, ros_nodes=nodes, all_nodes=common)
         return replace(process, **how(declared, namespace, "external"))
     if declared.simulate:
         simulation = yield from _simulation(name, declared.simulate, validated)
@@ -86,7 +88,7 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
         return replace(process, **how(declared, namespace, "component"))
     run = _run_of(declared)
     if run and run.is_startable:
-        process = Process(name, "run", at=place, ros_nodes=nodes)
+        process = Process(name, "run", at=place, ros_nodes=nodes, all_nodes=common)
         started = program(run, shell=bool(declared.shell))
         return replace(process, **how(declared, namespace), **started)
     if _is_way_refused(name, validated):
@@ -469,6 +471,7 @@ def check_arguments(draft: Draft) -> Iterator[Finding]:
                     yield _not_reached(key, process, spec.at_key((*at, key)))
         elif (
             names_params_file
+            and not process.all_nodes
             and not any(node.params for node in process.ros_nodes)
             and spec.spans.has((*at, "run"))
         ):
@@ -561,12 +564,6 @@ def nodes_of(
         message = f"{name} has nodes, and publishes names none of them"
         advice = "write it under one of its nodes"
         yield finding("TF107", message, spec.at_key((*at, "publishes")), help=advice)
-    for key in declared.params:
-        advice = (
-            f"write it under nodes: {{{next(iter(declared.nodes))}: {{params: {{{key}: …}}}}}}"
-        )
-        message = f"{name} has nodes, and the parameter {key} names none of them"
-        yield finding("TF107", message, spec.at_key((*at, "params", key)), help=advice)
     nodes = []
     for node, own in declared.nodes.items():
         path = (*at, "nodes", node)

@@ -89,8 +89,9 @@ class Process(PlanProcess):
     command of them. ``part`` is the ``Part`` that it belongs to, if any. ``loads`` says that it is
     a container of components, ``describes`` that its parameter ``robot_description`` is the URDF
     for a stock robot_state_publisher. ``rate`` is that of the joint states that it sends.
-    ``host_at`` is where its host was named, if it was. ``other_params`` are what its parameter
-    files say to nodes that are not listed, by their names and patterns in the order of the files.
+    ``host_at`` is where its host was named, if it was. ``all_nodes`` holds the parameters that
+    each of its nodes is given, also one that is not listed. ``other_params`` are those, and what
+    its parameter files say to nodes that are not listed, by names and patterns in their order.
     """
 
     nodes: tuple[str, ...] = field(init=False)
@@ -105,6 +106,7 @@ class Process(PlanProcess):
     describes: bool = field(default=False, kw_only=True)
     loads: bool = field(default=False, kw_only=True)
     host_at: Span | None = field(default=None, kw_only=True, compare=False)
+    all_nodes: Node | None = field(default=None, kw_only=True)
     other_params: dict[str, Any] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:

@@ -586,8 +586,9 @@ class ProcessSpec(Started, Entry):
 
     nodes: dict[NodeName, NodeSpec] = key(
         {},
-        "the nodes of a process that holds several, by name; node, params and lifecycle are the"
-        " short form for one",
+        "the nodes of a process that holds several, or one that keeps the name its program gives"
+        " it, by name; params beside them are for each node of the process, also one that is not"
+        " listed; node, params and lifecycle are the short form for one, which is named so",
         {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
         to=NOT_OWN,
     )

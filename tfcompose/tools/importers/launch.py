@@ -732,8 +732,9 @@ class _Work:
             self.draft.todo("a change of a lifecycle node's state", span)
         else:
             process = self.draft.started()[name]
-            if process.get("lifecycle") != "active":
-                process["lifecycle"] = record["state"]
+            (node,) = process.get("nodes", {"": process}).values()
+            if node.get("lifecycle") != "active":
+                node["lifecycle"] = record["state"]
 
     def _required(self, record: dict[str, Any], span: Span) -> None:
         name = self._names.get(str(record["node"]))

@@ -352,6 +352,7 @@ def _hertz(value: float) -> Any:
 
 def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
+    source_name = program.name
     if (
         not program.name
         and program.package
@@ -374,11 +375,12 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
     name = draft.free_name(wanted)
     keys = _way(program)
     notes = [where(at)]
-    is_node = program.package is not None and "launch" not in keys.get("run", ())
-    if program.name and program.name != name:
+    if not source_name and _keeps_its_name(program, keys):
+        keys["nodes"] = {program.name or usual or name: {}}
+        if not program.name and not usual:
+            notes.append(f"the source does not name the node: {name} is a guess")
+    elif program.name and program.name != name:
         keys["node"] = program.name
-    elif is_node and not program.name and not usual:
-        notes.append(f"the source does not name the node: it is called {name} here")
     if program.namespace and program.namespace.strip("/"):
         keys["namespace"] = program.namespace.strip("/")
     params, left = _params(program.params, target, program.name or name, draft.reach)
@@ -397,6 +399,15 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
     if program.description is not None:
         draft.todo("the parameter robot_description", at, (section, name), _FROM_TOPIC)
     return name
+
+
+def _keeps_its_name(program: Program, keys: Mapping[str, Any]) -> bool:
+    """Whether a program without a name is nodes of their own names.
+
+    A name on its command line would rename them all.
+    """
+    is_node = program.package is not None and "launch" not in keys.get("run", ())
+    return is_node and not program.plugin and not program.loads
 
 
 def remappings(rules: Sequence[tuple[str, str]]) -> dict[str, str]:

@@ -177,7 +177,7 @@ def edited(text: str, edits: Sequence[Edit]) -> str | None:
     return text
 
 
-def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
+def nearest(word: str, known: Iterable[str], cutoff: float = 0.61) -> str | None:
     """Return the known word that a person most likely meant by ``word``, or None.
 
     1 is as near as the word itself.

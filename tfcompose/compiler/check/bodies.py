@@ -9,6 +9,7 @@ from tfcompose.compiler.check.rule import rule
 from tfcompose.compiler.mesh_box import size_of
 from tfcompose.compiler.urdf.inertia import of_primitive
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
+from tfcompose.foundation.text import with_more
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -226,19 +227,24 @@ def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
 @rule("TF713", of_urdf=True)
 def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
     first: dict[str, Material] = {}
+    others: dict[tuple[str, object], dict[str, Material]] = {}
     for link in robot.links.values():
         for shape in link.visuals:
             material = shape.material
             if material is None or not (material.rgba or material.texture):
                 continue
-            other = first.setdefault(material.name, material)
-            if _appearance(other) != _appearance(material):
-                message = f"material {material.name} of {link.name} has another colour than before"
-                notes = [Note(f"{material.name} is first defined here", other.at)]
-                advice = "rename one of them"
-                if not robot.is_foreign(material.at):
-                    advice += ", or give the name only: it then has the colour of the first"
-                yield finding("TF713", message, material.at, help=advice, notes=notes)
+            appearance = _appearance(material)
+            if _appearance(first.setdefault(material.name, material)) != appearance:
+                others.setdefault((material.name, appearance), {}).setdefault(link.name, material)
+    for (name, _), links in others.items():
+        link_name, material = next(iter(links.items()))
+        them = with_more(link_name, len(links) - 1, "link")
+        message = f"material {name} of {them} has another colour than before"
+        notes = [Note(f"{name} is first defined here", first[name].at)]
+        advice = "rename one of them"
+        if not robot.is_foreign(material.at):
+            advice += ", or give the name only: it then has the colour of the first"
+        yield finding("TF713", message, material.at, help=advice, notes=notes)
 
 
 def _appearance(material: Material) -> tuple[object, ...]:

@@ -332,6 +332,7 @@ class _Bodies:
     found: list[Finding] = field(default_factory=list)
     _materials: dict[str, Material | None] = field(default_factory=dict)
     _elements: dict[str, list[Element]] = field(default_factory=dict)
+    _undescribed: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         visuals = [one for link in self.root.all("link") for one in link.all("visual")]
@@ -418,17 +419,19 @@ class _Bodies:
         if material is None:
             return None
         name = material.attributes.get("name", "")
-        return self._described(name, material) or (self._named(name, material) if name else None)
+        found = self._described(name, material) or (self._named(name) if name else None)
+        if found is None and name and element.tag == "visual" and name not in self._undescribed:
+            self._undescribed.add(name)
+            known = [other for other, (one, *_) in self._elements.items() if one.children]
+            advice = did_you_mean(name, known, 'describe it: <color rgba="…"/>')
+            message = f"no material {name} with a color or texture"
+            self.values.refuse(message, material.at_value("name"), advice, "warning")
+        return found
 
-    def _named(self, name: str, material: Element) -> Material | None:
+    def _named(self, name: str) -> Material | None:
         if name not in self._materials:
             described = (self._described(name, one) for one in self._elements.get(name, ()))
             self._materials[name] = next((one for one in described if one), None)
-            if self._materials[name] is None:
-                known = [other for other, (one, *_) in self._elements.items() if one.children]
-                advice = did_you_mean(name, known, 'describe it: <color rgba="…"/>')
-                message = f"no material {name} with a color or texture"
-                self.values.refuse(message, material.at_value("name"), advice, "warning")
         return self._materials[name]
 
     def _described(self, name: str, material: Element) -> Material | None:

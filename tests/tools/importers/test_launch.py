@@ -853,6 +853,44 @@ def test_a_node_that_the_source_does_not_name_keeps_its_name_and_has_the_paramet
     assert yaml.safe_load(files[started.params_file])["/**"]["ros__parameters"] == {"rate": 100}
 
 
+NAMESPACED = """<launch>
+  <group><push_ros_namespace namespace="leader"/>
+    <node pkg="robot_state_publisher" exec="robot_state_publisher">
+      <param name="robot_description" value="&lt;robot name='r'>&lt;link name='a'/>&lt;/robot>"/>
+      REMAPPED
+    </node>
+    <node pkg="p" exec="e" name="same"/><node pkg="p" exec="e" name="below" namespace="deep"/>
+  </group>
+  OUTSIDE
+</launch>"""
+
+
+@pytest.mark.parametrize("remapped", ["", '<remap from="/tf" to="tf"/>'])
+@pytest.mark.parametrize("outside", ["", '<node pkg="p" exec="e" name="outside"/>'])
+def test_nodes_have_the_namespaces_that_launch_gives_them(
+    remapped: str, outside: str, tmp_path: Path
+) -> None:
+    text = NAMESPACED.replace("REMAPPED", remapped).replace("OUTSIDE", outside)
+    imported, data = import_of(source(tmp_path, "a.launch.xml", text), code=None)
+    assert data["ros"]["namespace"] == "leader"
+    robot = compiled(imported, tmp_path).robot
+    assert robot
+    nodes = {one.node for one in robot.processes if one.package}
+    assert nodes == {"/leader/same", "/leader/deep/below", *(["/outside"] if outside else [])}
+
+
+def test_a_second_robot_in_another_namespace_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = NAMESPACED.replace("REMAPPED", "").replace("OUTSIDE", "").replace("</launch>", "")
+    second = (
+        NAMESPACED.replace("<launch>", "").replace("leader", "follower").replace("same", "own")
+    )
+    second = second.replace("REMAPPED", "").replace("OUTSIDE", "").replace("below", "inner")
+    import_of(source(tmp_path, "a.launch.xml", text + second), code=None)
+    assert "follower" in printed_errors(capsys)
+
+
 def test_a_parameter_file_lies_over_the_parameters_before_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -521,7 +521,7 @@ class Started(Supervised):
     )
     namespace: Namespace | None = key(
         None,
-        "the namespace of its nodes; below ros.namespace unless it begins with /",
+        "the namespace of its nodes; below ros.namespace unless it begins with /; / alone is none",
         "front",
         to=NOT_OWN,
     )

@@ -278,7 +278,7 @@ Name = Annotated[
 Namespace = Annotated[
     Text,
     Matches(
-        r"(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?",
+        r"(/|/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?",
         "a namespace such as robot1 or fleet/robot1",
     ),
 ]

@@ -37,6 +37,7 @@ from tfcompose.tools.importers.programs import (
     CONTAINERS,
     JOINT_PUBLISHERS,
     PACKAGE,
+    SEVERAL,
     STATE_PUBLISHER,
     Description,
     Program,
@@ -44,6 +45,7 @@ from tfcompose.tools.importers.programs import (
     is_setting,
     isolated,
     one_clock,
+    one_namespace,
     path_from,
     where,
 )
@@ -417,6 +419,7 @@ class _Work:
                 started[name].setdefault("after", {}).update(known)
         self._delay()
         one_clock(self.draft)
+        one_namespace(self.draft)
         for package, span in self._missing.items():
             self.draft.todo(f"package {package} not found", span, advice=_ADVICE)
 
@@ -693,8 +696,10 @@ class _Work:
         }
         for key in params.keys() - known:
             self.draft.todo(f"robot_state_publisher: the parameter {key}", span)
-        if program.namespace and program.namespace.strip("/"):
-            ros.setdefault("namespace", program.namespace.strip("/"))
+        space = (program.namespace or "").strip("/")
+        if space and ros.setdefault("namespace", space) != space:
+            message = f"a robot in {space}, where another one is in {ros['namespace']}"
+            self.draft.todo(message, span, advice=SEVERAL)
         moved = dict(program.remap)
         if not isolated(self.draft, moved, program.namespace):
             self.draft.todo(f"robot_state_publisher is remapped: {moved}", span)

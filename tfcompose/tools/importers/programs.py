@@ -17,6 +17,7 @@ from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import OutsideError, Reach
 from tfcompose.foundation.yaml_text import Bare, parameter
+from tfcompose.model.robot import BUILT_IN
 from tfcompose.tools.importers.static_transforms import (
     PROGRAM,
     ArgumentsRefusedError,
@@ -299,9 +300,36 @@ def isolated(draft: Draft, moved: Mapping[str, str], namespace: str | None) -> b
     new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
     if any(name != topic.strip("/") for topic, name in new.items()):
         return False
-    if new and namespace and namespace.strip("/"):
-        draft.sections["ros"] |= {"namespace": namespace.strip("/"), "isolate": "topics"}
+    space = (namespace or "").strip("/")
+    if not new or not space:
+        return True
+    if draft.sections["ros"].setdefault("namespace", space) != space:
+        return False
+    draft.sections["ros"]["isolate"] = "topics"
     return True
+
+
+def one_namespace(draft: Draft) -> None:
+    """Give namespaces as the robot's has them below it, and absolute where they are elsewhere."""
+    ros = draft.sections["ros"]
+    space = ros.get("namespace")
+    if not space:
+        return
+    for name, keys in draft.started().items():
+        if name in BUILT_IN:
+            continue
+        own = keys.pop("namespace", "")
+        if own.startswith(f"{space}/"):
+            keys["namespace"] = own[len(space) + 1 :]
+        elif own != space:
+            keys["namespace"] = concatenated(["/", own])
+            if ros.get("isolate"):
+                message = f"{name} is not in {space}: its /tf is the robot's, {space}/tf"
+                draft.todo(message, None, draft.entry_of(name), SEVERAL)
+
+
+#: What several robots are in a robot file.
+SEVERAL = "several robots are parts, each with its namespace, or a fleet: import each on its own"
 
 
 def _add_joint_publisher(draft: Draft, program: Program) -> str:

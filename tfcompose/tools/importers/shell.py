@@ -14,7 +14,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
-from tfcompose.tools.importers.programs import BEFORE, Program, add_program, is_setting, one_clock
+from tfcompose.tools.importers.programs import (
+    BEFORE,
+    Program,
+    add_program,
+    is_setting,
+    one_clock,
+    one_namespace,
+)
 from tfcompose.tools.importers.static_transforms import PROGRAM
 
 if TYPE_CHECKING:
@@ -475,3 +482,4 @@ def add_script(draft: Draft, text: str, file: str, target: Target) -> None:
         )
     _Script(draft, target, file).add(text)
     one_clock(draft)
+    one_namespace(draft)

@@ -32,11 +32,14 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
         names.setdefault(edge.child, edge.child_at or edge.at)
         if edge.joint_name:
             names.setdefault(edge.joint_name, edge.joint_at or edge.at)
+    moving = {edge.joint_name for edge in robot.edges if edge.joint}
     for name, at in names.items():
         if not _GOOD.fullmatch(name):
-            taken = re.fullmatch(_TAKEN, name) or (
-                robot.is_foreign(at) and not re.fullmatch(_LOST, name)
-            )
+            is_foreign = robot.is_foreign(at)
+            taken = bool(re.fullmatch(_TAKEN, name))
+            if taken and is_foreign and name not in moving and name not in robot.frames:
+                continue  # nothing is named after a fixed joint
+            taken = taken or (is_foreign and not re.fullmatch(_LOST, name))
             yield _invalid(name, at, "name", "warning" if taken else "error")
     for process in robot.processes:
         if not _PROCESS.fullmatch(process.name):
@@ -84,7 +87,9 @@ def upper_case_name(robot: Robot) -> Iterator[Finding]:
     bad = {
         name: at
         for name, at in robot.frames.items()
-        if name != name.lower() and name not in inside
+        if name != name.lower()
+        and name not in inside
+        and (name.lower() in robot.frames or not robot.is_foreign(at))
     }
     if bad:
         first, *others = bad

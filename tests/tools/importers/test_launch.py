@@ -129,10 +129,10 @@ def test_each_action_of_a_python_launch_file_has_its_entry(
         "drive",
         "map_server",
         "calibrate",
-        "mapper",
-        "late",
         "stop",
         "rectify",
+        "mapper",
+        "late",
     ]
     assert list(processes) == order
     assert data["containers"] == {"perception": {"env": {"LEVEL": "3"}}}
@@ -501,7 +501,7 @@ def test_xml_and_yaml_say_the_same(
         "rpy": [0, 0, 0.5],
     }
     processes = data["processes"]
-    assert list(processes) == ["drive", "words", "late", "rear_scan"]
+    assert list(processes) == ["drive", "words", "rear_scan", "late"]
     assert processes["drive"]["params"] == {
         "rate": 20,
         "text": "20",
@@ -851,6 +851,52 @@ def test_a_node_that_the_source_does_not_name_keeps_its_name_and_has_the_paramet
     assert not [word for word in started.argv if word.startswith("__node:=")]
     assert started.params_file
     assert yaml.safe_load(files[started.params_file])["/**"]["ros__parameters"] == {"rate": 100}
+
+
+LESS = """
+from launch import LaunchDescription
+from launch.actions import ExecuteProcess, RegisterEventHandler, SetEnvironmentVariable, SetLaunchConfiguration
+from launch.event_handlers import OnProcessStart
+from launch_ros.actions import Node, SetParameter
+
+def generate_launch_description():
+    first = Node(package="p", executable="e", name="first")
+    late = Node(package="p", executable="e", name="late")
+    static = "ros2 run tf2_ros static_transform_publisher --frame-id base_link --child-frame-id "
+    return LaunchDescription([
+        first,
+        RegisterEventHandler(OnProcessStart(target_action=first, on_start=[late])),
+        SetEnvironmentVariable("MODELS", "here"),
+        Node(package="p", executable="e", name="shell", shell=True, arguments=["--a b", "--c"]),
+        Node(package="p", executable="e", name="more", shell=True, arguments=["$HOME"]),
+        ExecuteProcess(cmd=[static + "laser"], shell=True),
+        ExecuteProcess(cmd=["sleep 1; " + static + "lost"], shell=True),
+        SetLaunchConfiguration("launch-prefix", "nice -n 5"),
+        SetLaunchConfiguration("launch-prefix-filter", "pre"),
+        Node(package="p", executable="prefixed", name="prefixed"),
+        SetParameter("text", "1"),
+        Node(package="p", executable="e", name="last"),
+    ])
+"""  # noqa: E501 (a text as its reader has it)
+
+
+def test_shells_prefixes_and_what_comes_later_are_as_launch_has_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data = import_of(source(tmp_path, "a.launch.py", LESS), code=None)
+    processes = data["processes"]
+    assert processes["late"] == {
+        "run": {"package": "p", "executable": "e"},
+        "env": {"MODELS": "here"},
+        "after": {"first": "started"},
+    }
+    assert processes["shell"]["run"]["args"] == ["--a", "b", "--c"]
+    assert [name for name, one in processes.items() if "prefix" in one] == ["prefixed"]
+    assert processes["prefixed"]["prefix"] == ["nice", "-n", "5"]
+    assert processes["last"]["params"] == {"text": 1}
+    assert "laser" in data["frames"]
+    assert "lost" not in data["frames"]
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:16", "a.launch.py:18"]
 
 
 NAMESPACED = """<launch>

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections import deque
+from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +20,8 @@ from tfcompose.tools.importers.launch_records import FailedError, Recording, wit
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+#: What is kept of the context with what is visited later.
+_SCOPE = ("params", "conditions", "whens", "period_s", "after", "depth")
 #: How deep launch files include each other.
 _DEEPEST = 30
 
@@ -33,6 +37,8 @@ class RecordingContext(launch.LaunchContext, Recording):  # type: ignore[misc]
         #: What loads the components that are visited: the id of its action, or the full name of
         #: its node.
         self.container: str | None = None
+        #: What is visited when all else was: what events and timers start.
+        self.later: deque[Callable[[], None]] = deque()
         self._environment = dict(os.environ)
         self._scopes: list[tuple[list[Any], dict[str, str]]] = []
 
@@ -79,6 +85,31 @@ class RecordingContext(launch.LaunchContext, Recording):  # type: ignore[misc]
         finally:
             self.depth -= 1
             self._pop_locals()
+
+    def visit_later(self, visit: Callable[[], None]) -> None:
+        """Let a function visit what launch visits after the launch file.
+
+        The scope and the conditions are those of now, the environment is that of then.
+        """
+        configurations, names = dict(self.launch_configurations), dict(self.get_locals_as_dict())
+        now = {name: copy(getattr(self, name)) for name in _SCOPE}
+
+        def visit_in_scope() -> None:
+            then = {name: getattr(self, name) for name in _SCOPE}
+            self._push_launch_configurations()
+            self._push_locals()
+            self.launch_configurations.clear()
+            self.launch_configurations.update(configurations)
+            self.extend_locals(names)
+            self.__dict__.update(now)
+            try:
+                visit()
+            finally:
+                self._pop_locals()
+                self._pop_launch_configurations()
+                self.__dict__.update(then)
+
+        self.later.append(visit_in_scope)
 
     def _push_launch_configurations(self) -> None:
         super()._push_launch_configurations()

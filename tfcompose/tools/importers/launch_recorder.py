@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import shlex
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ import launch.frontend
 import launch.logging
 import launch_ros.actions
 import launch_ros.descriptions
+import yaml
 from launch import event_handlers, substitutions
 from launch.events import Shutdown, matches_action
 from launch.launch_description_source import LaunchDescriptionSource
@@ -56,7 +59,7 @@ from tfcompose.tools.importers.launch_records import (
     relative,
     with_package,
 )
-from tfcompose.tools.importers.texts import argument_of
+from tfcompose.tools.importers.texts import Text, argument_of
 
 
 def attach() -> None:
@@ -342,8 +345,10 @@ def _append_variable(action: Any, context: RecordingContext) -> None:
 def _set_parameter(action: Any, context: RecordingContext) -> None:
     given = arguments_of(action)
     evaluated(action.execute, context)
-    name = text_of(given["name"], context)
-    context.params.append({name: parameter_value(given["value"], context)})
+    name, value = text_of(given["name"], context), parameter_value(given["value"], context)
+    if isinstance(value, str) and not isinstance(value, Text):
+        value = yaml.safe_load(value)  # it goes onto the command line
+    context.params.append({name: value})
 
 
 def _set_sim_time(action: Any, context: RecordingContext) -> None:
@@ -410,10 +415,8 @@ def _register(action: Any, context: RecordingContext) -> None:
             continue
         before = dict(context.after)
         context.after[str(id_of(target))] = word
-        try:
-            visit_all([entity], context)
-        finally:
-            context.after = before
+        context.visit_later(partial(visit_all, [entity], context))
+        context.after = before
 
 
 def _ends_all(action: Any) -> bool:
@@ -427,12 +430,9 @@ def _wait(action: Any, context: RecordingContext) -> None:
         period_s = float(text)
     except ValueError:
         raise FailedError(f"{text!r} is no time") from None
-    before = context.period_s
     context.period_s += period_s
-    try:
-        visit_all(list(given["actions"]), context)
-    finally:
-        context.period_s = before
+    context.visit_later(partial(visit_all, list(given["actions"]), context))
+    context.period_s -= period_s
 
 
 # Included files
@@ -500,13 +500,15 @@ def _given_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
 
 
 def include(path: str, context: RecordingContext) -> None:
-    """Visit what a launch file describes.
+    """Visit what a launch file describes; behind the outermost one what comes later.
 
     Raises:
         FailedError: if launch refuses it.
     """
     with context.within(path):
         visit_all([description_of(path)], context)
+    while context.later and not context.depth:
+        context.later.popleft()()
 
 
 # Processes
@@ -598,6 +600,11 @@ def _common(action: Any, given: Mapping[str, Any], context: RecordingContext) ->
     for keyword in (*launch_keywords(*_READERS), Keyword("shell", "switch")):
         if given.get(keyword.name) is not None:
             what[keyword.name] = _READERS[keyword.kind](given[keyword.name], context)
+    configured = context.launch_configurations
+    if "prefix" not in what and "launch-prefix" in configured:
+        program = os.path.basename(text_of(given.get("executable") or given["cmd"][0], context))  # noqa: PTH119 (a word)
+        if re.match(configured.get("launch-prefix-filter", ""), program):
+            what["prefix"] = configured["launch-prefix"]
     for keyword in launch_keywords("shutdown"):
         follows = given.get(keyword.name)
         follows = follows if isinstance(follows, (list, tuple)) else [follows]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+import shlex
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ from tfcompose.tools.importers.static_transforms import (
     reader_of,
     static_transform,
 )
-from tfcompose.tools.importers.texts import Text, argument_of, concatenated, partition
+from tfcompose.tools.importers.texts import Text, argument_of, concatenated, partition, parts_of
 from tfcompose.tools.importers.yaml_text import Expression
 
 if TYPE_CHECKING:
@@ -175,9 +176,40 @@ def where(at: Span | None, what: str = "") -> str:
 
 def _split(program: Program) -> Program:
     """Return the program with what it is a command line of, and with its ROS arguments as keys."""
+    if program.shell:
+        program = _without_shell(program)
     if program.package is None and not program.shell:
         program = _of_command(program)
     return _without_ros_arguments(program) if program.package is not None else program
+
+
+#: What a shell does more with than take it as a part of a word.
+_OF_SHELLS = re.compile(r"[$`|&;<>(){}*?~#\[\]!\n]|^\s*\w+=")
+
+
+def _without_shell(program: Program) -> Program:
+    """Return what a shell would start, where it does nothing but split the text into words.
+
+    The arguments of a package's program are split so too, and what more a shell does with them is
+    left out with a word.
+    """
+    text = concatenated(program.argv, " ")
+    is_known = all(isinstance(part, str) for part in parts_of(text))
+    does_more = not is_known or bool(_OF_SHELLS.search(text))
+    words = program.argv
+    try:
+        words = tuple(shlex.split(text)) if is_known else words
+    except ValueError:
+        does_more = True
+    if program.package is not None:
+        todo = (f"what a shell makes of {text}",) if does_more else ()
+        return replace(program, argv=words, shell=False, todo=(*program.todo, *todo))
+    if not does_more:
+        plain = replace(program, argv=words, shell=False)
+        return plain if _of_command(plain).package else program
+    if PROGRAM in text:
+        return replace(program, todo=(*program.todo, f"the edge of the {PROGRAM} in it"))
+    return program
 
 
 def _of_command(program: Program) -> Program:

@@ -951,6 +951,51 @@ def test_a_parameter_file_lies_over_the_parameters_before_it(
     assert places(printed_errors(capsys), "TF020") == ["a.launch.xml:4"]
 
 
+SUBSTITUTED = """
+/**: {ros__parameters: {map: $(dirname)/map.yaml}}
+n: {ros__parameters: {limit: $(var limit), word: "$(var limit)", home: $(env PLACE), share: $(find-pkg-share nav)}}
+costmap/costmap: {ros__parameters: {radius: $(var limit)}}
+"""  # noqa: E501 (a text as its reader has it)
+SUBSTITUTING = """<launch><arg name="limit" default="2.5"/>
+  <node pkg="p" exec="e" name="n" namespace=""><param from="$(dirname)/p.yaml" allow_substs="true"/></node>
+  <node pkg="p" exec="e" name="n" namespace="b"><param from="$(dirname)/p.yaml"/></node></launch>"""  # noqa: E501 (a text as its reader has it)
+
+
+def test_substitutions_in_a_parameter_file_are_made_for_the_robot_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PLACE", "barn")
+    (tmp_path / "p.yaml").write_text(SUBSTITUTED, encoding="utf-8")
+    file = source(tmp_path, "a.launch.xml", SUBSTITUTING)
+    _, data = import_of(file, "limit:=3")
+    named = [process["params"]["file"] for process in data["processes"].values()]
+    assert named == ["a_params/p.yaml", "p.yaml"]
+    made = yaml.safe_load((tmp_path / named[0]).read_text("utf-8"))
+    assert made["n"]["ros__parameters"] == {
+        "limit": 3,
+        "word": "3",
+        "home": "barn",
+        "share": "package://nav",
+    }
+    assert made["/**"]["ros__parameters"] == {"map": f"{tmp_path}/map.yaml"}
+    assert made["costmap/costmap"]["ros__parameters"] == {"radius": 3}
+    printed = printed_errors(capsys)
+    assert "limit:=3" in printed
+    assert "a.launch.xml:2" in places(printed, "TF020")
+    assert main(["import", str(file), "-o", str(tmp_path / "imported_again.yaml")]) == 2
+    assert not (tmp_path / "imported_again.yaml").exists()
+
+
+@pytest.mark.parametrize("text", ["a: $(var none)", "a: $(", "$(env PLACE):", "a: $(command x)"])
+def test_substitutions_that_cannot_be_made_are_named(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "p.yaml").write_text(text, encoding="utf-8")
+    _, data = import_of(source(tmp_path, "a.launch.xml", SUBSTITUTING), code=None)
+    assert "params" not in data["processes"]["n"]
+    assert "a.launch.xml:2" in places(printed_errors(capsys), "TF020")
+
+
 #: As in bringups of MoveIt, TurtleBot 4 and Nav2.
 BRINGUP = """
 import launch

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
+from tests.support import processes
 from tests.support.bringups import (
     compiled,
     exported,
@@ -22,6 +23,7 @@ from tests.support.bringups import (
     started_with,
 )
 from tests.support.composition import can_build, composition_interfaces
+from tests.support.domains import Domain
 from tests.tools.importers.test_exported import ARGUED, COMBINATIONS
 from tests.tools.importers.test_launch import (
     BOXES_IN,
@@ -32,6 +34,8 @@ from tests.tools.importers.test_launch import (
     XML,
     YAML,
 )
+from tfcompose.compiler.emit import emit
+from tfcompose.model.plan.file import read_plan
 from tfcompose.model.robot import Robot
 
 pytestmark = needs_launch
@@ -45,6 +49,14 @@ def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
 
     Words, names, remappings, parameters.
     """
+    records = recorded(file, *words)
+    return {one["node"]: _loaded(one) for one in records if "component" in one} | dict(
+        one_of(one["words"], one["params"]) for one in records if "component" not in one
+    )
+
+
+def recorded(file: Path, *words: str) -> list[dict[str, Any]]:
+    """Return what launch starts, in order, as it is recorded."""
     out = file.with_name("started.json")
     environment = {**os.environ, "ROS_LOG_DIR": str(file.parent)}
     if can_build():
@@ -58,10 +70,8 @@ def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
         env=environment,
         capture_output=True,
     )
-    records = json.loads(out.read_text("utf-8"))
-    return {one["node"]: _loaded(one) for one in records if "component" in one} | dict(
-        one_of(one["words"], one["params"]) for one in records if "component" not in one
-    )
+    records: list[dict[str, Any]] = json.loads(out.read_text("utf-8"))
+    return records
 
 
 def _loaded(one: dict[str, Any]) -> dict[str, Any]:
@@ -284,3 +294,75 @@ def generate_launch_description():
     return LaunchDescription([
         ExecuteProcess(cmd=["included", LaunchConfiguration("mode"), LaunchConfiguration("n")])])
 """
+
+
+N, ALL = "n: {ros__parameters: {x: 1}}\n", "/**: {ros__parameters: {x: 2}}\n"
+#: How launch names the node, and mappings and texts of files in launch's order.
+ORDERS: dict[str, tuple[str, list[Any]]] = {
+    "a_file_after_what_all_nodes_have": ("name='n',", [N]),
+    "a_mapping_after_a_file": ("name='n',", [N, {"x": 3}]),
+    "a_mapping_whose_section_is_before": ("name='n',", [ALL + N, {"x": 3}]),
+    "a_mapping_of_a_full_name": ("name='n', namespace='',", [ALL + N, {"x": 3}]),
+    "a_full_name_that_comes_first": ("name='n', namespace='',", [f"/{N}{ALL}", {"x": 3}]),
+    "a_file_after_a_mapping": ("name='n', namespace='',", [{"x": 3, "y": 3}, N]),
+    "another_namespace": (
+        "name='n', namespace='a',",
+        [{"x": 3}, N, "a: {n: {ros__parameters: {y: 1}}}"],
+    ),
+    "patterns": (
+        "name='n', namespace='a',",
+        [{"x": 3}, "/*/n: {ros__parameters: {x: 1}}", ALL],
+    ),
+    "no_name": ("", [N, {"x": 3}]),
+    "no_name_and_a_mapping_whose_section_is_before": ("", [ALL + N, {"x": 3}]),
+    "no_name_and_a_file_for_all": ("", [{"x": 3, "y": 3}, N + ALL]),
+}
+ORDER = """
+from launch import LaunchDescription
+from launch_ros.actions import Node, SetParameter
+def generate_launch_description():
+    node = Node(package="p", executable="e", NAMED parameters=GIVEN)
+    return LaunchDescription([SetParameter("x", 9), node])
+"""
+READER = """
+import json, rclpy, sys
+rclpy.init(args=sys.argv[1:])
+given = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
+for name in "nm":
+    node = rclpy.create_node(name, **given)
+    print(json.dumps([node.get_parameter_or(one).value for one in "xy"]))
+"""  # noqa: E501 (a text as its reader has it)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("named", "given"), ORDERS.values(), ids=ORDERS)
+def test_a_real_node_has_the_parameters_that_it_has_with_launch(
+    named: str, given: list[Any], tmp_path: Path, domain: Domain
+) -> None:
+    def file_of(name: str, text: str) -> str:
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return str(tmp_path / name)
+
+    def read(words: list[str]) -> str:
+        ros = words[words.index("--ros-args") :]
+        command = [sys.executable, "-W", "ignore", "-c", READER, *ros]
+        return processes.run(command, env=dict(domain.environment), check=True).stdout
+
+    params = [
+        file_of(f"{number}.yaml", one) if isinstance(one, str) else one
+        for number, one in enumerate(given)
+    ]
+    text = ORDER.replace("NAMED", named).replace("GIVEN", repr(params))
+    file = Path(file_of("a.launch.py", text))
+    (launched,) = recorded(file)
+    contents, words = iter(launched["params"]), launched["words"]
+    for at, word in enumerate(words):
+        if word == "--params-file":
+            words[at + 1] = file_of(f"launched_{at}.yaml", json.dumps(next(contents)))
+    robot = compiled(import_of(file)[0], tmp_path).robot
+    assert robot
+    built = {one.path: one.text for one in emit(robot)}
+    several = read_plan(built["plan.json"], "p").processes
+    (process,) = (one for one in several if "p/e" in one.argv[0])
+    path = file_of("built.yaml", built.get(f"params/{process.name}.yaml", ""))
+    assert read([one.replace("${params_file}", path) for one in process.argv]) == read(words)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import posixpath
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -328,7 +329,10 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
     if draft.is_empty():
         print_findings(draft.found, sys.stderr)
         fail("nothing was written: the source starts nothing that a robot file has")
-    text, compiled = text_with_findings(draft, lambda text: _lint(text, arguments))
+    folder = posixpath.dirname(arguments.output or "")
+    neighbours = {posixpath.join(folder, path): text for path, text in draft.neighbours.items()}
+    text, compiled = text_with_findings(draft, lambda text: _lint(text, arguments, neighbours))
+    _write_neighbours(neighbours, arguments)
     _write(text, arguments.output)
     print_findings(draft.found, sys.stderr)
     found = (
@@ -338,6 +342,26 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
     )
     print_findings(list(dict.fromkeys(found)), sys.stderr)
     return FAILED if compiled.errors else 0
+
+
+def _write_neighbours(files: dict[str, str], arguments: Namespace) -> None:
+    """Write the files that the robot file names and the source makes, where it is written too."""
+    from tfcompose.foundation.findings import finding
+    from tfcompose.foundation.reading import exists
+
+    if not arguments.output:
+        message = "{}, which the robot file names, is written only beside a robot file"
+        advice = "import … -o FILE writes both"
+        found = [finding("TF020", message.format(path), None, help=advice) for path in files]
+        print_findings(found, sys.stderr)
+        return
+    for path in files:
+        if exists(path) and not arguments.force:
+            fail(f"{path} exists already; --force overwrites it", UNREADABLE)
+    for path, text in files.items():
+        with suppress(OSError):  # writing below says so
+            Path(path).parent.mkdir(exist_ok=True)
+        _write(text, path)
 
 
 def _disk(packages: Iterable[str], arguments: Namespace) -> Disk:
@@ -396,14 +420,18 @@ def _target(arguments: Namespace) -> Target:
     )
 
 
-def _lint(text: str, arguments: Namespace) -> Compiled:
+def _lint(text: str, arguments: Namespace, neighbours: dict[str, str] | None = None) -> Compiled:
     from tfcompose.cli.compiling import library
     from tfcompose.cli.reading import read_text
     from tfcompose.compiler.compile import compile_robot
 
     files = _disk(pairs(arguments.packages, "=").values(), arguments)
     return compile_robot(
-        text, arguments.output or "robot.yaml", library(), read=read_text, disk=files
+        text,
+        arguments.output or "robot.yaml",
+        library(),
+        read=lambda path: (neighbours or {}).get(path) or read_text(path),
+        disk=files,
     )
 
 

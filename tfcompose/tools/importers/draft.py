@@ -8,6 +8,7 @@ the text.
 
 from __future__ import annotations
 
+import itertools
 import posixpath
 import re
 from dataclasses import dataclass, field
@@ -74,6 +75,10 @@ class Draft:
     has_unknown_frames: bool = False
     #: The files that the source may have read: all those that a user names.
     reach: Reach = field(default_factory=lambda: Reach(everything=True))
+    #: Texts of files that the source makes when it is started, by the paths that stand for them.
+    made: dict[str, str] = field(default_factory=dict)
+    #: Those of them that the robot file names, by their paths from its folder.
+    neighbours: dict[str, str] = field(default_factory=dict)
 
     def note(self, at: Entry, *texts: str) -> None:
         """Put comments above an entry, each once."""
@@ -104,6 +109,15 @@ class Draft:
         frames[child] = {**({"parent": parent} if parent else {}), **keys}
         self.note(("frames", child), *notes)
         return True
+
+    def bring(self, path: str) -> str:
+        """Put a file that the source makes beside the robot file; return its path from there."""
+        base, ending = posixpath.splitext(posixpath.basename(path.rpartition("#")[0]))
+        for number in itertools.count(1):
+            name = f"{self.robot}_params/{base}{f'_{number}' if number > 1 else ''}{ending}"
+            if self.neighbours.setdefault(name, self.made[path]) == self.made[path]:
+                return name
+        raise AssertionError
 
     def process(
         self, wanted: str, keys: Mapping[str, Any], *notes: str, section: str = "processes"

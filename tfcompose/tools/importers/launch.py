@@ -132,6 +132,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     draft.head[-1] += ", a launch file of ROS 1" if of_ros1 else ""
     draft.head[-1] += ", read by ROS's launch" if of_launch else ""
     answer = _answered(launch, draft.reach, "launch" if of_launch else "xml")
+    draft.made |= answer["files"]
     records = [_with_texts(record) for record in answer["records"]]
     work = _Work(draft, launch, target, records)
     for record in records:
@@ -231,6 +232,7 @@ _OF_NODE = {
     "name": _OPTIONAL,
     "namespace": _OPTIONAL,
     "params": _PARAMETERS,
+    "common?": int,
     "remap": [[TEXT]],
 }
 _NODE = (
@@ -283,7 +285,13 @@ _RECORDS: dict[str, Any] = {
     "skipped": _AT | {"text": str},
     "todo": _AT | {"text": str},
 }
-_ANSWER = {"records": [{"kind": str}], "stopped": str, "line": int, "decided": [str]}
+_ANSWER = {
+    "records": [{"kind": str}],
+    "stopped": str,
+    "line": int,
+    "decided": [str],
+    "files": {"*": str},
+}
 _PAIR = 2
 
 
@@ -599,6 +607,7 @@ class _Work:
             label=record.get("label"),
             namespace=record.get("namespace"),
             params=tuple(params),
+            exact=_exact(record),
             remap=tuple((old, new) for old, new in record.get("remap", ())),
             env=self._env(record),
             keys=keys,
@@ -796,6 +805,13 @@ def _without_texts(word: str, todo: list[str]) -> str:
     return fill(word, FileText)
 
 
+def _exact(record: dict[str, Any]) -> range:
+    """Return which parameters launch gives under the node's full name: where it knows that."""
+    if record.get("name") is None or record.get("namespace") is None:
+        return range(0)
+    return range(record.get("common", 0), len(record["params"]))
+
+
 def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], Description | None]:
     """Return parameters without descriptions, and the robot's description."""
     description: Description | None = None
@@ -814,8 +830,7 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
                 todo.append(f"the parameter {key}: {value!r}")
             else:
                 own[key] = value
-        if own:
-            kept.append(own)
+        kept.append(own)
     return kept, description
 
 

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import launch
 import yaml
 from launch.conditions import IfCondition, LaunchConfigurationEquals, UnlessCondition
+from launch.frontend.parse_substitution import parse_substitution
 from launch.substitutions import (
     LaunchConfiguration,
     PathJoinSubstitution,
@@ -24,8 +26,11 @@ from launch_ros.parameter_descriptions import Parameter, ParameterFile, Paramete
 
 from tfcompose.tools.importers.launch_objects import arguments_of, class_name, reason
 from tfcompose.tools.importers.launch_records import (
+    PACKAGE,
     FailedError,
     conjunction,
+    file_text,
+    relative,
     scalar_of,
     shown,
     with_files,
@@ -195,12 +200,34 @@ def parameters_of(given: Any, context: RecordingContext, at: Any) -> list[Any]:
                 made_of = arguments_of(params)
                 several.append({text_of(made_of["name"], context): _described(made_of, context)})
             else:
-                is_file = isinstance(params, ParameterFile)
-                file = arguments_of(params)["param_file"] if is_file else params
-                several.append(shown(with_package(text_of(file, context))))
+                several.append(_parameter_file(params, context, at))
         except FailedError as error:
             context.todo(at, f"parameters: {error}")
     return several
+
+
+def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
+    """Return the name of a parameter file, or of what launch makes of it by its substitutions.
+
+    Raises:
+        FailedError: if it has some that cannot be resolved, or cannot be read.
+    """
+    is_described = isinstance(params, ParameterFile)
+    given = arguments_of(params) if is_described else {"param_file": params}
+    file = shown(with_package(text_of(given["param_file"], context)))
+    if file.startswith(PACKAGE) or not is_true(given.get("allow_substs") or False, context):
+        return file
+    source = file_text(file)
+    if "$(" not in source:
+        return file
+    parts = evaluated(lambda _: parse_substitution(source), context)
+    text = text_of(parts, context)
+    if files_in(with_files(text)):
+        raise FailedError(f"{relative(file)} takes what a command makes of a file")
+    unknown = set(re.findall(rf"{PACKAGE}\w+", text)) - set(re.findall(rf"{PACKAGE}\w+", source))
+    for name in sorted(unknown):
+        context.todo(at, f"{relative(file)} names {name}, a package that is not found here")
+    return context.made_file(file, text)
 
 
 def _flat(

@@ -271,6 +271,7 @@ def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dic
         "stopped": stopped,
         "line": line,
         "decided": sorted(recording.decided) if recording else [],
+        "files": recording.files if recording else {},
     }
 
 

@@ -570,6 +570,7 @@ def _of_node(action: Any, given: Mapping[str, Any], context: RecordingContext) -
         "name": optional_text(given.get("name"), context),
         "namespace": _namespace(given.get("namespace"), context),
         "params": [*context.params, *params],
+        "common": len(context.params),
         "remap": [*global_rules, *rules],
     }
 

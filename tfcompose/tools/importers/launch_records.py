@@ -56,6 +56,8 @@ class Recording:
         #: Those whose value decided something that stands in the robot file as it is now.
         self.decided: set[str] = set()
         self.depth = 0
+        #: The texts of files that launch makes, by the paths that stand for them.
+        self.files: dict[str, str] = {}
 
     def here(self) -> tuple[str, int]:
         """Return the file and line that is read now."""
@@ -66,6 +68,14 @@ class Recording:
         more: dict[str, Any] = {"when": list(self.conditions)} if self.conditions else {}
         more |= {"only_when": " and ".join(dict.fromkeys(self.whens))} if self.whens else {}
         self.records.append({"kind": kind, "at": at, **more, **what})
+
+    def made_file(self, source: str, text: str) -> str:
+        """Keep the text that launch makes of a file; return the path that stands for it."""
+        for number in itertools.count(1):
+            path = f"{source}#{number}"
+            if self.files.setdefault(path, text) == text:
+                return path
+        raise AssertionError
 
     def todo(self, at: Any, text: str) -> None:
         """Say what of a launch file is not resolved."""

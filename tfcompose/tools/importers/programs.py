@@ -12,13 +12,14 @@ import shlex
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
+from tfcompose.compiler.resolve.param_files import matches
 from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
+from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.numbers import number
-from tfcompose.foundation.reach import OutsideError, Reach
+from tfcompose.foundation.reach import OutsideError
 from tfcompose.foundation.yaml_text import Bare, parameter
 from tfcompose.model.robot import BUILT_IN
+from tfcompose.spec.load.params import Word, load_params
 from tfcompose.tools.importers.static_transforms import (
     PROGRAM,
     ArgumentsRefusedError,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Span
     from tfcompose.model.files import Target
+    from tfcompose.spec.load.params import NodeParams
     from tfcompose.tools.importers.draft import Draft
     from tfcompose.tools.importers.static_transforms import Reader
 
@@ -87,7 +89,8 @@ class Program:
     counts. ``namespace`` is absolute, or None where nothing is said. ``keys`` are further keys of
     the process, as in a robot file; ``period_s`` is how long after the launch it is started.
     ``todo`` is what of it could not be taken. It is a container of components if it ``loads``
-    them, and a component where it has a ``plugin``, its class.
+    them, and a component where it has a ``plugin``, its class. ``exact`` are the indices of
+    parameters that are given under the node's full name, others are given to every node.
     """
 
     at: Span | None
@@ -108,6 +111,7 @@ class Program:
     todo: tuple[str, ...] = ()
     loads: bool = False
     plugin: str = ""
+    exact: range = range(0)
 
 
 def add_program(draft: Draft, program: Program, target: Target) -> str | None:
@@ -413,11 +417,7 @@ def _hertz(value: float) -> Any:
 def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
     source_name = program.name
-    if (
-        not program.name
-        and program.package
-        and (name := _named_in_files(program.params, draft.reach))
-    ):
+    if not program.name and program.package and (name := _named_in_files(program.params, draft)):
         program = replace(program, name=name)
     usual = (
         _usual_name(program.package)
@@ -443,7 +443,11 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
         keys["node"] = program.name
     if program.namespace and program.namespace.strip("/"):
         keys["namespace"] = program.namespace.strip("/")
-    params, left = _params(program.params, target, program.name or name, draft.reach)
+    keeps_name = "nodes" in keys
+    params, own, left = _params(
+        program, target, program.name or name, draft, keeps_name=keeps_name
+    )
+    keys |= {"nodes": {node: {"params": own} for node in keys["nodes"]}} if own else {}
     keys |= {"params": params} if params else {}
     keys |= {"remap": remappings(program.remap)} if program.remap else {}
     keys |= {"env": dict(program.env)} if program.env else {}
@@ -516,14 +520,14 @@ def _container_keys(program: Program) -> dict[str, Any]:
     return keys | ({"args": words} if words else {})
 
 
-def _named_in_files(params: Sequence[Mapping[str, Any] | str], reach: Reach) -> str | None:
+def _named_in_files(params: Sequence[Mapping[str, Any] | str], draft: Draft) -> str | None:
     """Return the node that parameter files are written for, where that is one alone.
 
     None where none is named.
     """
     files = [file for file in params if isinstance(file, str)]
-    keys = [key for file in files for key in _nodes_in(file, reach) or ()]
-    names = {key.rpartition("/")[2] for key in keys if "*" not in key}
+    nodes = [node.name for file in files for node in _nodes_in(file, draft) or ()]
+    names = {node.rpartition("/")[2] for node in nodes if "*" not in node}
     name = names.pop() if len(names) == 1 else ""
     return name if _NODE.fullmatch(name) else None
 
@@ -584,70 +588,93 @@ def _plain(program: Program) -> str:
 
 
 def _params(
-    given: Sequence[Mapping[str, Any] | str], target: Target, node: str, reach: Reach
-) -> tuple[dict[str, Any], list[str]]:
-    """Return the parameters as a robot file has them, files first, and the rest.
+    program: Program, target: Target, node: str, draft: Draft, *, keeps_name: bool
+) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
+    """Return the parameters as a robot file has them, files first, its node's own, and the rest.
 
-    What a file lays over the parameters before it is left to the file.
+    rcl keeps sections in the order in which their names come first, and of several for a node the
+    last one counts; launch itself gives a component one after the other. A robot file's own
+    parameters count before those of its files: it has those that its files alone do not give.
+    Where a node ``keeps_name``, they are for every node of the process, and its own beside them.
     """
     files: list[str] = []
-    own: dict[str, Any] = {}
     left = []
-    for one in given:
+    full = f"{(program.namespace or '').rstrip('/')}/{node}"
+    sections: dict[tuple[str, int], dict[str, Any]] = {}
+    of_files: dict[tuple[str, int], dict[str, Any]] = {}
+    for index, one in enumerate(program.params):
         if not isinstance(one, str):
-            own |= one
+            given = [(full if index in program.exact else _ANY, dict(one))]
         elif one.startswith(PACKAGE):
             left.append(f"the parameters of {one}: the package is not found here")
+            continue
         else:
-            files.append(path_from(target, one))
-            known = _parameters_in(one, node, reach) if own else set()
-            if known is None:
+            files.append(draft.bring(one) if one in draft.made else path_from(target, one))
+            nodes = _nodes_in(one, draft)
+            if nodes is None and any(sections.values()):
                 left.append(
                     f"{one} is laid over the parameters before it: here they are laid over the"
                     " file"
                 )
-            own = {key: value for key, value in own.items() if key not in (known or ())}
+            given = [(each.name, dict(_by_full_name(each.params, ""))) for each in nodes or ()]
+            for name, params in given:
+                of_files.setdefault((name, 0), {}).update(params)
+        for name, params in given:
+            sections.setdefault((name, index if program.plugin else 0), {}).update(params)
+    common: dict[str, Any] = {}
+    if keeps_name:
+        in_file = of_files.setdefault((_ANY, 0), {})
+        several = sections.get((_ANY, 0), {})
+        common = {key: one for key, one in several.items() if one is not in_file.get(key)}
+        in_file |= common
+    found = _that_count(of_files, full)
+    own = {
+        key: one for key, one in _that_count(sections, full).items() if one is not found.get(key)
+    }
     named: dict[str, Any] = {"file": files[0] if len(files) == 1 else files} if files else {}
-    return named | {key: parameter(value) for key, value in own.items()}, left
+    if keeps_name:
+        return named | _values(common), _values(own), left
+    return named | _values(own), {}, left
 
 
-def _parameters_in(file: str, node: str, reach: Reach) -> set[str] | None:
-    """Return the full names of a node's parameters in a file, or None where it cannot be read."""
-    data = _nodes_in(file, reach)
-    if data is None:
-        return None
-    several = (
-        one["ros__parameters"]
-        for key, one in data.items()
-        if key.rpartition("/")[2] in {"*", "**", node}
-    )
-    return {name for params in several for name in _full_names(params, "")}
+def _values(params: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: parameter(_value_in(value)) for key, value in params.items()}
 
 
-def _full_names(params: Any, above: str) -> Iterator[str]:
-    for key, value in params.items() if isinstance(params, dict) else ():
+#: The section of a parameter file that means every node.
+_ANY = "/**"
+
+
+def _that_count(sections: Mapping[tuple[str, int], dict[str, Any]], node: str) -> dict[str, Any]:
+    """Return the parameters that a node has of sections, which are by their names in order."""
+    several = (params for (name, _), params in sections.items() if matches(name, node))
+    return {key: value for params in several for key, value in params.items()}
+
+
+def _value_in(value: Any) -> Any:
+    """Return a parameter's value, also where it is words of a file."""
+    if isinstance(value, list):
+        return list(map(_value_in, value))
+    if isinstance(value, Word):
+        return _yaml_value(value.text) if value.plain else value.text
+    return value
+
+
+def _by_full_name(params: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
+    for key, value in params.items():
         if isinstance(value, dict):
-            yield from _full_names(value, f"{above}{key}.")
+            yield from _by_full_name(value, f"{above}{key}.")
         else:
-            yield f"{above}{key}"
+            yield f"{above}{key}", value
 
 
-def _nodes_in(file: str, reach: Reach) -> dict[str, Any] | None:
-    """Return what a parameter file has by its nodes' full names, or None where it has none.
+def _nodes_in(file: str, draft: Draft) -> list[NodeParams] | None:
+    """Return what a parameter file has for nodes, or None where it has nothing.
 
     None, too, if it is not there, or may not be read.
     """
     try:
-        data = yaml.load(reach.read(file, _MOST_BYTES).decode(), Loader=yaml.CSafeLoader)
-        return dict(_nodes_below(data, "")) or None
-    except (OSError, OutsideError, UnicodeDecodeError, yaml.YAMLError, RecursionError):
+        text = draft.made.get(file) or draft.reach.read(file, _MOST_BYTES).decode()
+        return load_params(text, file).nodes or None
+    except (OSError, OutsideError, UnicodeDecodeError, RejectedError):
         return None
-
-
-def _nodes_below(data: Any, above: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    for key, one in data.items() if isinstance(data, dict) else ():
-        name = f"{above}/{str(key).strip('/')}"
-        if isinstance(one, dict) and "ros__parameters" in one:
-            yield name, one
-        else:
-            yield from _nodes_below(one, name)

@@ -1,14 +1,18 @@
 """Shell scripts and lines of a terminal, imported."""
 
 import io
+import json
+import shlex
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.support import processes
 from tests.support.bringups import compiled, import_of, places, printed_errors
 from tests.support.cli import tfcompose_in
+from tests.support.domains import Domain
 from tfcompose.cli import main, reading
 
 
@@ -218,3 +222,40 @@ def test_a_command_without_a_name_is_no_fault_of_the_program(line: str, tmp_path
     done = tfcompose_in(tmp_path, "import", "up.sh")
     assert done.returncode == 0, done.stderr
     assert "executable: b" in done.stdout
+
+
+WORDS = (
+    "[1,2]",
+    "on",
+    "012",
+    "1e3",
+    "0x1F",
+    "1_000",
+    '"7"',
+    "['x', 'y']",
+    "No",
+    "+5",
+    "[.5, 2.0]",
+)
+READER = """
+import json, rclpy, sys
+rclpy.init(args=sys.argv[1:])
+given = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
+params = rclpy.create_node("n", **given).get_parameters_by_prefix("p").values()
+values = {one.name: one.value for one in params}
+print(json.dumps({name: list(value) if hasattr(value, "tolist") else value for name, value in values.items()}))
+"""  # noqa: E501 (a text as its reader has it)
+
+
+@pytest.mark.ros
+def test_a_parameter_of_a_command_line_is_what_a_real_node_takes_it_for(
+    tmp_path: Path, domain: Domain
+) -> None:
+    words = [part for at, word in enumerate(WORDS) for part in ("-p", f"p.w{at}:={word}")]
+    command = [sys.executable, "-W", "ignore", "-c", READER, "--ros-args", *words]
+    real = processes.run(command, env=dict(domain.environment), check=True).stdout
+    line = shlex.join(["ros2", "run", "p", "e", "--ros-args", *words, "-p", "far:=.inf"])
+    _, data = import_of(script(tmp_path, line))
+    (process,) = data["processes"].values()
+    assert repr(process["params"]) == repr(json.loads(real))
+    assert process["run"]["args"] == ["--ros-args", "-p", "far:=.inf"]

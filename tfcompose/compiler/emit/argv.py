@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.model.plan import PROGRAM, known_at_launch
-from tfcompose.model.robot import AsInFile
+from tfcompose.model.robot import AsInFile, value_of_word
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -159,20 +158,7 @@ def _typed(value: Any) -> Any:
             if {type(item) for item in items} == {int, float}
             else items
         )
-    if not isinstance(value, AsInFile):
-        return value
-    if value.lower() in _TRUTH:
-        return _TRUTH[value.lower()]
-    for kind in (lambda text: int(text, 0), float):
-        with suppress(ValueError):
-            return kind(str(value))
-    return str(value)
-
-
-#: The words that ROS reads as true and false in a parameter file.
-_TRUTH = dict.fromkeys(("true", "yes", "on", "y"), True) | dict.fromkeys(
-    ("false", "no", "off", "n"), False
-)
+    return value_of_word(value) if isinstance(value, AsInFile) else value
 
 
 def _known(params: dict[str, Any]) -> dict[str, Any]:

@@ -39,6 +39,7 @@ from tfcompose.model.robot.process import (
     Host,
     Node,
     Process,
+    value_of_word,
 )
 from tfcompose.model.robot.robot import (
     OPTICAL_ENDINGS,
@@ -97,4 +98,5 @@ __all__ = [
     "left_out_by",
     "materials",
     "may_be_refused",
+    "value_of_word",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -68,16 +69,41 @@ def _flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
     return found
 
 
-def _meant(value: Any) -> Any:
-    """Return a word of a parameter file as ROS reads it, as far as switches and names need it.
+_TRUTHS = {
+    form: truth
+    for word, truth in {
+        **dict.fromkeys(("y", "yes", "true", "on"), True),
+        **dict.fromkeys(("n", "no", "false", "off"), False),
+    }.items()
+    for form in (word, word.capitalize(), word.upper())
+}
+_HEX = re.compile(r"[+-]?0[xX][0-9A-Fa-f]+")
+_OCTAL = re.compile(r"[+-]?0[0-7]*")
+_DECIMAL = re.compile(r"[+-]?[1-9][0-9]*")
+_DOUBLE = re.compile(
+    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|\.?(?:inf|nan))", re.IGNORECASE
+)
 
-    True, false, or text.
-    """
+
+def value_of_word(word: str) -> bool | float | str:
+    """Return what rcl takes an unquoted word of a parameter file for: on is true, 012 ten."""
+    if word in _TRUTHS:
+        return _TRUTHS[word]
+    for form, base in ((_HEX, 16), (_OCTAL, 8), (_DECIMAL, 10)):
+        if form.fullmatch(word):
+            return int(word, base)
+    if _DOUBLE.fullmatch(word):
+        special = word.lower().endswith(("inf", "nan"))
+        return float(word.replace(".", "") if special else word)
+    return str(word)
+
+
+def _meant(value: Any) -> Any:
+    """Return a word of a parameter file as ROS reads it if it is a switch, or as text."""
     if not isinstance(value, AsInFile):
         return value
-    return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
-        value.lower(), str(value)
-    )
+    meant = value_of_word(value)
+    return meant if isinstance(meant, bool) else str(value)
 
 
 @dataclass(frozen=True, slots=True)

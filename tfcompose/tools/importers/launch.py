@@ -5,7 +5,6 @@ Read in a process of their own, and put into the language's words.
 
 from __future__ import annotations
 
-import math
 import os
 import posixpath
 import re
@@ -42,6 +41,7 @@ from tfcompose.tools.importers.programs import (
     Description,
     Program,
     add_program,
+    is_finite,
     is_setting,
     isolated,
     one_clock,
@@ -826,7 +826,7 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
                 description = _description(value)
             elif files := files_in(value):
                 todo.append(f"the parameter {key}, which is the text of {files[0].file}")
-            elif value is None or value == [] or not _is_finite(value) or not _is_uniform(value):
+            elif value is None or value == [] or not is_finite(value) or not _is_uniform(value):
                 todo.append(f"the parameter {key}: {value!r}")
             else:
                 own[key] = value
@@ -840,11 +840,6 @@ def _is_uniform(value: Any) -> bool:
     if all(isinstance(item, str) for item in value):
         return True
     return len({type(item) for item in value}) == 1 and isinstance(value[0], (bool, int, float))
-
-
-def _is_finite(value: Any) -> bool:
-    several = value if isinstance(value, list) else [value]
-    return all(math.isfinite(one) for one in several if isinstance(one, float))
 
 
 def _description(value: str) -> Description:

@@ -6,6 +6,7 @@ its description, a ``joint_state_publisher`` a stand-in for joint states; all ot
 
 from __future__ import annotations
 
+import math
 import posixpath
 import re
 import shlex
@@ -18,7 +19,7 @@ from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import OutsideError
 from tfcompose.foundation.yaml_text import Bare, parameter
-from tfcompose.model.robot import BUILT_IN
+from tfcompose.model.robot import BUILT_IN, value_of_word
 from tfcompose.spec.load.params import Word, load_params
 from tfcompose.tools.importers.static_transforms import (
     PROGRAM,
@@ -263,8 +264,8 @@ def _without_ros_arguments(program: Program) -> Program:
             rule = {"__node": "name", "__name": "name", "__ns": "namespace"}.get(left)
             found |= {rule: right} if rule else {}
             remap += [] if rule else [(left, right)]
-        elif word in {"-p", "--param"} and right:
-            params.append({left: _yaml_value(right)})
+        elif word in {"-p", "--param"} and right and is_finite(typed := _yaml_value(right)):
+            params.append({left: typed})
         elif word == "--params-file":
             params.append(value)
         elif word == "--log-level" and value in _LEVELS:
@@ -290,19 +291,22 @@ _WITH_VALUE = frozenset(
 _LEVELS = frozenset({"debug", "info", "warn", "error", "fatal"})
 
 
+def is_finite(value: Any) -> bool:
+    """Return whether no number of a parameter is infinite or none: a robot file has no such."""
+    several = value if isinstance(value, list) else [value]
+    return all(math.isfinite(one) for one in several if isinstance(one, float))
+
+
 def _yaml_value(text: str) -> Any:
-    """Return a parameter of the command line, which ROS reads as YAML."""
+    """Return a parameter of the command line, which ROS reads as one of a parameter file."""
     if isinstance(text, Text):
         return text
-    plain = {"true": True, "false": False}
-    if text.lower() in plain:
-        return plain[text.lower()]
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
+    try:
+        (section,) = load_params(f"n:\n  ros__parameters:\n    value: {text}\n", "").nodes
+    except (RejectedError, ValueError):
+        return text
+    value = section.params.get("value", text)
+    return text if isinstance(value, dict) else _value_in(value)
 
 
 def _add_transform(draft: Draft, program: Program) -> None:
@@ -656,7 +660,7 @@ def _value_in(value: Any) -> Any:
     if isinstance(value, list):
         return list(map(_value_in, value))
     if isinstance(value, Word):
-        return _yaml_value(value.text) if value.plain else value.text
+        return value_of_word(value.text) if value.plain else value.text
     return value
 
 

@@ -113,7 +113,8 @@ class Tree:
             ):
                 continue
             received = 100 * S + round(at * S)
-            stamp = 100 * S + round(at * S * more.get("speed", 1.0))
+            stamp = 100 * S + round((at * more.get("speed", 1.0) + more.get("ahead", 0.0)) * S)
+            stamp = more.get("stamp", stamp)
             row = (parent, child, *divmod(stamp, S), *pose.xyz, *pose.quat_xyzw)
             self.observer.take([row], static=static, gid=gid, received_ns=received)
 
@@ -139,6 +140,36 @@ def tree() -> Tree:
 
 def test_a_tree_as_planned_has_no_findings(plan: Plan, tree: Tree) -> None:
     assert tree.reported(plan) == []
+
+
+@pytest.mark.parametrize(
+    ("sent", "code", "severity"),
+    [
+        ({"stamp": 0}, "TF825", "error"),
+        ({"stamp": 100 * S}, "TF823", "error"),
+        ({"ahead": -20.0}, "TF825", "error"),
+        ({"ahead": 3.0}, "TF835", "error"),
+        ({"ahead": 0.2}, "TF835", "warning"),
+        ({"ahead": -0.5}, "TF833", "warning"),
+    ],
+)
+def test_an_edge_that_no_lookup_gets_by_its_stamps_is_not_as_expected(
+    sent: dict[str, Any], code: str, severity: str, plan: Plan, tree: Tree
+) -> None:
+    tree.sent["base"] |= sent
+    (found,) = tree.reported(plan)
+    assert (found.code, found.severity) == (code, severity)
+    assert DRIVE in found.message
+
+
+def test_the_stamps_of_simulated_time_are_not_judged(plan: Plan, tree: Tree) -> None:
+    tree.sent["base"] |= {"ahead": -20.0}
+    assert tree.reported(replace(plan, ros=RosSettings(clock="sim"))) == []
+
+
+def test_a_loop_is_reported_of_the_tree(plan: Plan, tree: Tree) -> None:
+    tree.sent["odom"] = {"parent": "laser", "node": OTHER, "rate": 10.0}
+    assert "TF820" in {one.code for one in tree.reported(plan)}
 
 
 #: What is sent of a frame otherwise than planned, None: nothing; and what the finding is and

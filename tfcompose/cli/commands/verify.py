@@ -22,10 +22,11 @@ from tfcompose.cli.options import (
     add_variant,
     settle_duration,
 )
-from tfcompose.cli.terminal import print_findings
+from tfcompose.cli.terminal import fail, print_findings, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Mapping
 
     from tfcompose.foundation.findings import Span
     from tfcompose.guard.verdict.verify import Verdict
@@ -41,6 +42,11 @@ def arguments(parser: ArgumentParser) -> None:
         help="default: the robot that runs in this ROS domain, or robot.yaml",
     )
     add_variant(parser)
+    parser.add_argument(
+        "--running",
+        action="store_true",
+        help="expect the edges of the robot that runs in this ROS domain, as without FILE",
+    )
     parser.add_argument(
         "--live", action="store_true", help="use the running tree (default unless --bag is given)"
     )
@@ -69,6 +75,7 @@ def run(arguments: Namespace) -> int:
     plan, places = _running_plan(arguments) or expected_plan(
         arguments.file or DEFAULT_FILE, arguments
     )
+    other = other_plan(arguments, plan)
     settle_s = 0.0 if arguments.bag else SETTLE_S
     observers = {topics: TreeObserver(settle_s=settle_s) for topics in parts_of(plan)}
     # Programs get each missing edge; a robot without edges misses none.
@@ -85,7 +92,10 @@ def run(arguments: Namespace) -> int:
             may_be_silent=may_be_silent,
         )
     seconds = time.monotonic() - begun
-    return _report(arguments, plan, verify(plan, observers, arguments.tolerance, places), seconds)
+    verdicts = verify(plan, observers, arguments.tolerance, places)
+    if other:
+        verdicts = [of_other_plan(verdict, other) for verdict in verdicts]
+    return _report(arguments, plan, verdicts, seconds)
 
 
 def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
@@ -96,10 +106,50 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
     from tfcompose.cli.runs import plan_of_domain
 
     changed = arguments.profiles or arguments.overlays or arguments.settings or arguments.given
+    if arguments.running and (arguments.file or arguments.bag or changed):
+        fail("--running takes the plan of the robot that runs: no FILE, --bag or --profile")
     if arguments.file or arguments.bag or changed:
         return None
     plan = plan_of_domain()
+    if plan is None and arguments.running:
+        fail("no robot runs in this ROS domain, or several; tfcompose ps lists them")
     return (plan, {}) if plan else None
+
+
+def other_plan(arguments: Namespace, plan: Plan) -> Plan | None:
+    """Return the plan by which the robot runs here, after saying so, if that is a variant.
+
+    Its processes or owners differ, as by another profile; other poses are what is to be found.
+    """
+    from tfcompose.cli.runs import run_of_domain
+
+    running = None if arguments.bag else run_of_domain()
+    if running is None or running[1].robot != plan.robot or _shape(running[1]) == _shape(plan):
+        return None
+    warn(
+        f"{running[0].name} runs with other processes or owners than this plan has, as by another"
+        " --profile; tfcompose verify --running compares with the plan that runs"
+    )
+    return running[1]
+
+
+def _shape(plan: Plan) -> tuple[Mapping[str, str], Mapping[str, str]]:
+    """Return the kinds of a plan's processes, and the owners of its edges."""
+    kinds = {one.name: one.kind for one in plan.processes}
+    return kinds, {edge.child: edge.owner for edge in plan.edges}
+
+
+def of_other_plan(verdict: Verdict, running: Plan) -> Verdict:
+    """Return a verdict without advice about processes of the plan that runs."""
+    from dataclasses import replace
+
+    advice = "tfcompose verify --running compares with the plan that runs"
+    nodes = [node for process in running.processes for node in process.nodes]
+    found = list(verdict.found)
+    for index, one in enumerate(found):
+        if any(node in one.message for node in nodes):
+            found[index] = replace(one, help=advice)
+    return replace(verdict, found=tuple(found))
 
 
 def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:
@@ -109,8 +159,9 @@ def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: 
     if arguments.format == "junit":
         from tfcompose.compiler.render.formats import render_junit
 
+        holders = {None: "undeclared", "": "tree"}
         cases = [
-            (verdict.owner or "undeclared", verdict.edge, verdict.found) for verdict in verdicts
+            (holders.get(one.owner) or str(one.owner), one.edge, one.found) for one in verdicts
         ]
         sys.stdout.write(render_junit(plan.robot, cases, failing=failing, seconds=seconds))
     elif arguments.format == "json":

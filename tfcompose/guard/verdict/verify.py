@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.findings import Finding, Note, did_you_mean
 from tfcompose.foundation.geometry import Offset, Pose, offset_of
 from tfcompose.foundation.text import listed
+from tfcompose.guard.verdict.consumers import late_stamps
 from tfcompose.guard.verdict.drivers import (
     Expected,
     driver_pose_differs,
@@ -28,12 +29,14 @@ from tfcompose.guard.verdict.drivers import (
 )
 from tfcompose.guard.verdict.faults import SELF, Fault, fault_finding, group_of, sensor_of
 from tfcompose.guard.verdict.ownership import code_of, may_be_owners, relays_of
-from tfcompose.guard.verdict.publishers import SAME_POSE, flooded, pose_differs
+from tfcompose.guard.verdict.publishers import SAME_POSE, flooded, pose_differs, volatile_static
 from tfcompose.guard.verdict.rates import left, never_received, silent, slow
-from tfcompose.guard.verdict.tree import rejected_transforms
+from tfcompose.guard.verdict.stamps import stamp_repeated, stamps_ahead, wrong_clock
+from tfcompose.guard.verdict.tree import loop, rejected_transforms
 from tfcompose.model.plan import SLOW_BELOW
 from tfcompose.model.plan.stock import stand_ins
 from tfcompose.model.plan.topics import parts_of
+from tfcompose.tf.live.arrivals import KEPT_NS
 from tfcompose.tf.live.state import TreeState
 
 if TYPE_CHECKING:
@@ -418,7 +421,7 @@ def differs_from_plan(state: TreeState) -> Iterator[Finding]:
 class Verdict:
     """What is wrong with an edge, nothing if all is as expected.
 
-    ``owner`` is None where nobody declared it.
+    ``owner`` is None where nobody declared it, and empty for what is wrong with the whole tree.
     """
 
     edge: str
@@ -441,8 +444,9 @@ def verify(
     for topics, part in parts_of(plan).items():
         state = state_of(observers[topics], topics)
         for edge in state.edges:
-            if edge.stream.rejected is not None and edge.child in found:
+            if edge.child in found:
                 found[edge.child] += rejected_transforms(edge)
+                found[edge.child] += _wrong_times(edge, state, part)
         for one in differences(state, part, tolerance):
             # The parts of a plan differ in their edges only; a process is looked up in the whole.
             place = (places or {}).get(one.edge.child) if one.edge else None
@@ -451,11 +455,38 @@ def verify(
                 extra.append(Verdict(one.live.name, None, (reported,)))
             elif one.edge is not None:
                 found[one.edge.child].append(reported)
-        extra += [Verdict(listed(state.topics), None, (one,)) for one in flooded(state)]
+        # An edge that its owner hands over has one parent after the other, and closes no loop.
+        switched = {edge.child for edge in part.edges if edge.switched}
+        lasting = tuple(edge for edge in state.edges if edge.child not in switched)
+        in_all = *flooded(state), *loop(replace(state, edges=lasting)), *volatile_static(state)
+        extra += [Verdict(listed(state.topics), "", (one,)) for one in in_all]
     return [
         *(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges),
         *extra,
     ]
+
+
+#: A listener's buffer keeps this much, in seconds: what is as late is gone when it comes.
+_KEPT_S = KEPT_NS / 1e9
+#: Stamps that are so far ahead, in seconds, are of another clock, not for smoothness.
+_AHEAD_S = 1.0
+
+
+def _wrong_times(edge: EdgeState, state: TreeState, plan: Plan) -> Iterator[Finding]:
+    """Find stamps with which no lookup at the current time gets an edge's pose.
+
+    As the doctor has them; whether simulated time goes is not known here.
+    """
+    if plan.ros.clock == "sim":
+        return
+    alone = replace(state, edges=(edge,))
+    yield from wrong_clock(alone)
+    for found in stamp_repeated(alone):
+        yield replace(found, severity="error")
+    most_s = edge.timing.most_delay_s
+    for found in (*stamps_ahead(alone), *late_stamps(alone)):
+        is_useless = most_s is not None and (most_s <= -_AHEAD_S or most_s >= _KEPT_S)
+        yield replace(found, severity="error") if is_useless else found
 
 
 def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
@@ -473,8 +504,8 @@ def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
 
 def summary(verdicts: Sequence[Verdict]) -> str:
     """Return one line: how many edges are as expected, and how many are not declared."""
-    planned = [one for one in verdicts if one.owner is not None]
+    planned = [one for one in verdicts if one.owner]
     right = sum(not one.found for one in planned)
-    extra = len(verdicts) - len(planned)
+    extra = sum(one.owner is None for one in verdicts)
     more = f", {extra} that nobody declared" if extra else ""
     return f"{right} of {len(planned)} edges as expected{more}"

@@ -67,7 +67,11 @@ class TreeHistory:
     def observed(self, **more: Any) -> TreeState:
         publishers = more.pop("publishers", tuple(self.observer.publishers.known.values()))
         return TreeState(
-            SECONDS, edges=tuple(self.observer.edges(END_NS)), publishers=publishers, **more
+            SECONDS,
+            edges=tuple(self.observer.edges(END_NS)),
+            publishers=publishers,
+            sent=dict(self.observer.sent),
+            **more,
         )
 
 

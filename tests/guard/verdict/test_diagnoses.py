@@ -3,6 +3,7 @@
 How it is worded: tests/golden/scenes.
 """
 
+import time
 from dataclasses import replace
 
 import pytest
@@ -22,8 +23,9 @@ from tests.support.tree_history import (
 )
 from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.text import duration
-from tfcompose.guard.verdict.doctor import diagnose
+from tfcompose.guard.verdict.doctor import diagnose, examine
 from tfcompose.guard.verdict.setup import settings_apart
+from tfcompose.guard.verdict.stamps import other_clock
 from tfcompose.model.plan import EdgePattern, GuardPolicy, PlanProcess
 from tfcompose.tf.live.state import RosProcess, StampedData, TopicState, TreeState
 from tfcompose.tf.ros.environment import RANGE
@@ -380,6 +382,33 @@ def test_stamps_that_stand_with_the_clock_are_reported_of_the_clock_alone() -> N
     stands = history.observed(clock_ns=106 * SECOND_NS, clock_moves=False, graph=(clock,))
     assert codes(stands) == {"TF836"}
     assert "TF823" in codes(replace(stands, clock_moves=True))
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "name"),
+    [(37.0, "TAI"), (18.1, "GPS"), (3600.0, "local time"), (-7200.0, "local time"), (60.0, "")],
+)
+def test_a_clock_that_is_off_by_a_known_offset_is_named(ahead_s: float, name: str) -> None:
+    found = only(stamped(-ahead_s).observed())
+    assert found.code == "TF825"
+    assert (name in found.message) if name else ("(" not in found.message)
+
+
+def test_stamps_that_are_the_age_of_this_machine_are_named() -> None:
+    boot_ns = time.time_ns() - time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+    now_ns = time.time_ns()
+    named = other_clock(now_ns - boot_ns, now_ns, None, simulated=False)
+    other = other_clock(now_ns - boot_ns + 100 * SECOND_NS, now_ns, None, simulated=False)
+    assert ("this machine" in named, "this machine" in other) == (True, False)
+
+
+def test_the_cost_of_tf_names_who_sends_edges_one_by_one() -> None:
+    history = sound_tree()
+    for name in ("a", "b", "c"):
+        history = history.moving(f"base_link {name}", b"wheels")
+    heard = TopicState("/tf", TF_MESSAGE, ("/drive",), ("/nav", "/rviz"))
+    (cost,) = examine([history.observed(graph=(heard,))]).costs
+    assert all(word in cost for word in ("/tf", "2 listeners", "3 edges one by one"))
 
 
 def test_where_some_are_dropped_it_is_not_reported_that_the_frame_is_missing() -> None:

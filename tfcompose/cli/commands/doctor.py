@@ -93,6 +93,8 @@ def run(arguments: Namespace) -> int:
             f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
         )
         print(f"looked for {found.seconds:.1f} s at {observed}: {_summary(findings)}")
+        for cost in found.costs:
+            print(printable(cost))
         if found.edges and found.elsewhere:
             words = namespace_options(found.elsewhere)
             print(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {words}")

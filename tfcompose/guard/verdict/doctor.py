@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.text import counted
 from tfcompose.guard.verdict import (
     consumers,
     joints,
@@ -15,6 +16,7 @@ from tfcompose.guard.verdict import (
     tree,
     verify,
 )
+from tfcompose.tf.live.state import who
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
@@ -28,7 +30,8 @@ if TYPE_CHECKING:
 class Diagnosis:
     """What was found, and what was observed: edges, publishing nodes, seconds, the trees' roots.
 
-    ``elsewhere`` are topics with TF that were not observed.
+    ``elsewhere`` are topics with TF that were not observed, ``costs`` a sentence for each topic on
+    what it costs.
     """
 
     findings: list[Finding]
@@ -37,6 +40,7 @@ class Diagnosis:
     seconds: float
     roots: tuple[str, ...] = ()
     elsewhere: tuple[str, ...] = ()
+    costs: tuple[str, ...] = ()
 
 
 #: In the order in which one looks: is there anything, who sends it, what is its shape, and its
@@ -108,4 +112,35 @@ def examine(states: Sequence[TreeState]) -> Diagnosis:
         seconds=seconds,
         roots=roots,
         elsewhere=elsewhere,
+        costs=tuple(filter(None, map(cost, states))),
     )
+
+
+#: Who sends so many edges one by one could send fewer messages.
+_SINGLE_FROM = 3
+
+
+def cost(state: TreeState) -> str:
+    """Return what the topic of moving edges costs; empty where nothing came.
+
+    Each message goes to each listener: what sends several edges does so with one.
+    """
+    messages = sum(one.messages for one in state.sent.values())
+    if not messages or not state.seconds:
+        return ""
+    name = state.topics[0]
+    readers = next((topic.readers for topic in state.graph if topic.name == name), ())
+    transforms = sum(one.transforms for one in state.sent.values())
+    text = (
+        f"{name} carries {messages / state.seconds:.0f} messages a second with"
+        f" {transforms / state.seconds:.0f} transforms to {counted(len(readers), 'listener')}"
+    )
+    single = []
+    for gid, one in state.sent.items():
+        edges = [edge for edge in state.moving if edge.stream.gid == gid]
+        if one.messages == one.transforms and len(edges) >= _SINGLE_FROM:
+            hertz = one.messages / state.seconds
+            single.append(
+                f"{who(edges[0])} sends its {len(edges)} edges one by one ({hertz:.0f}/s)"
+            )
+    return "; ".join([text, *single])

@@ -7,6 +7,7 @@ simulated time as it comes on /clock.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -81,8 +82,12 @@ def other_clock(stamp_ns: int, received_ns: int, sim_ns: int | None, *, simulate
     if near_sim:
         return f"stamped with simulated time ({stamp_ns / 1e9:.1f} s), unlike others"
     if stamp_ns < _NO_DATE_NS:
-        return f"stamped {stamp_ns / 1e9:.1f} s, which is simulated time, or time since a start"
-    return f"stamped {_off(stamp_ns, received_ns)} the system's time"
+        since = "simulated time, or time since a start"
+        if _is_since_boot(stamp_ns, received_ns):
+            since = "the time since this machine was started"
+        return f"stamped {stamp_ns / 1e9:.1f} s, which is {since}"
+    name = offset_name((stamp_ns - received_ns) / 1e9)
+    return f"stamped {_off(stamp_ns, received_ns)} the system's time{name}"
 
 
 def _off(stamp_ns: int, reference_ns: int) -> str:
@@ -90,6 +95,34 @@ def _off(stamp_ns: int, reference_ns: int) -> str:
         f"{duration((reference_ns - stamp_ns) / 1e9)}"
         f" {'behind' if stamp_ns < reference_ns else 'ahead of'}"
     )
+
+
+#: How far the time scales of receivers and PTP are ahead of UTC since 2017, in seconds (IERS
+#: Bulletin C; GPS is TAI - 19 s).
+_SCALES = {37.0: "TAI, which PTP has", 18.0: "the time of GPS"}
+#: A clock that is that near to such an offset has it, in seconds.
+_NEAR_S, _NEAR_HOUR_S = 0.5, 20.0
+_MOST_HOURS = 14
+
+
+def offset_name(ahead_s: float) -> str:
+    """Return what a clock has that is so far ahead of UTC, in seconds; empty where that is open.
+
+    It goes on a sentence: " (TAI, which PTP has)".
+    """
+    for offset_s, name in _SCALES.items():
+        if abs(ahead_s - offset_s) <= _NEAR_S:
+            return f" ({name})"
+    hours = round(ahead_s / 3600)
+    is_zone = 1 <= abs(hours) <= _MOST_HOURS and abs(ahead_s - hours * 3600) <= _NEAR_HOUR_S
+    return " (whole hours: a local time taken for UTC)" if is_zone else ""
+
+
+def _is_since_boot(stamp_ns: int, received_ns: int) -> bool:
+    """Whether a stamp is the age of this machine, when it came; of a recording it is not."""
+    uptime_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+    then_ns = received_ns - (time.time_ns() - uptime_ns)
+    return 0 < then_ns <= uptime_ns and abs(stamp_ns - then_ns) <= KEPT_NS
 
 
 def message(code: str, publisher: str, edges: str, detail: str) -> str:
@@ -302,6 +335,7 @@ def host_clock_off(state: TreeState) -> Iterator[Finding]:
         if ahead:
             message = (
                 f"the clock of {listed(nodes)}{there} is {duration(skew)} ahead of this machine's"
+                f"{offset_name(skew)}"
             )
         else:
             message = (

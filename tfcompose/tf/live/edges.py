@@ -194,6 +194,14 @@ class Handover:
         return all((each.begun - 1) * MIN_RUN <= each.arrivals.count for each in self.streams)
 
 
+@dataclass(slots=True)
+class Traffic:
+    """How many messages a publisher sent on the topic of moving edges, and transforms in them."""
+
+    messages: int = 0
+    transforms: int = 0
+
+
 @dataclass(frozen=True, slots=True)
 class EdgeState:
     """What is known of an edge from one publisher at one time.
@@ -258,6 +266,7 @@ class TreeObserver:
     window_s: float = 0.0
     settle_s: float = 0.0
     messages: int = 0
+    sent: dict[bytes | None, Traffic] = field(default_factory=dict)
     begun_ns: int = 0
     last_ns: int = 0
     end_ns: int = 0
@@ -286,10 +295,15 @@ class TreeObserver:
         self.begun_ns = self.begun_ns or received_ns
         self.messages += 1
         self.last_ns = received_ns
+        traffic = None if static else self._traffic_of(gid)
+        if traffic:
+            traffic.messages += 1
         clock = received_ns if clock_ns is None else clock_ns
         streams = self._streams
         is_full = gid is not None and self._counts.get(gid, 0) >= MOST_OF_ONE
         for row in rows:
+            if traffic:
+                traffic.transforms += 1
             stream = streams.get((row[0], row[1], gid, static))
             if stream is None:
                 stream = self._new(
@@ -299,6 +313,11 @@ class TreeObserver:
                     self.beyond[gid] = self.beyond.get(gid, 0) + 1
                     continue
             stream.take(row, received_ns, clock)
+
+    def _traffic_of(self, gid: bytes | None) -> Traffic | None:
+        if gid not in self.sent and len(self.sent) < MOST_EDGES:
+            self.sent[gid] = Traffic()
+        return self.sent.get(gid)
 
     def floods(self, gid: bytes | None) -> bool:
         """Return whether the publisher has sent more edges than are kept."""

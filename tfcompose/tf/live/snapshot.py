@@ -298,6 +298,7 @@ class _TopicPair:
             ),
             malformed=dict(self.observer.malformed),
             beyond=dict(self.observer.beyond),
+            sent=dict(self.observer.sent),
             clock_ns=self.listener.clock_ns,
             clock_moves=self.clock[1] > self.observed - CLOCK_STANDS_S,
             skews_s=self.skews_s,

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.model.plan import Plan
-    from tfcompose.tf.live.edges import EdgeState
+    from tfcompose.tf.live.edges import EdgeState, Traffic
     from tfcompose.tf.live.publishers import Publisher
 
 #: How a publisher is called whose node has no name.
@@ -108,6 +108,7 @@ class TreeState:
         malformed: how many messages came that are no TFMessage, by their publisher's id.
         beyond: how many transforms came of edges that are not among ``edges``, because their
             publisher sends too many, by its id.
+        sent: what each publisher sent on the topic of moving edges, by its id.
         recorded: whether it is from a recording, which does not say who published.
     """
 
@@ -129,6 +130,7 @@ class TreeState:
     malformed: Mapping[bytes | None, int] = field(default_factory=dict)
     beyond: Mapping[bytes | None, int] = field(default_factory=dict)
     plan: Plan | None = None
+    sent: Mapping[bytes | None, Traffic] = field(default_factory=dict)
     recorded: bool = False
 
     @property

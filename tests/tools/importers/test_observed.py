@@ -11,6 +11,7 @@ from tests.support.tree_history import BEGUN_NS, END_NS, TreeHistory, sound_tree
 from tfcompose.cli import main
 from tfcompose.spec.load import load
 from tfcompose.tf.live.publishers import Publisher
+from tfcompose.tf.live.state import NO_NODE
 from tfcompose.tools.importers.draft import Draft
 from tfcompose.tools.importers.observed import Observed, round_rate, started_by
 
@@ -69,6 +70,15 @@ def test_which_model_a_calibrated_camera_is_stays_a_question_where_several_fit()
 def test_a_second_publisher_is_named() -> None:
     draft = drafted(sound_tree().moving("map base_link", b"x"))
     assert [one.code for one in draft.found] == ["TF020"]
+
+
+def test_a_publisher_that_is_no_ros_node_is_external_with_what_it_is(tmp_path: Path) -> None:
+    history = TreeHistory().moving("odom base_link", b"dds")
+    history.observer.take_graph([Publisher(b"dds", NO_NODE, static=False)])
+    draft = drafted(history)
+    assert draft.sections["processes"] == {"external": {"external": True}}
+    assert any(NO_NODE in note for note in draft.notes["processes", "external"])
+    assert not compiled(draft.text(), tmp_path).errors
 
 
 @pytest.mark.parametrize(

@@ -164,7 +164,7 @@ class Observed:
         renamed = {}
         for process, keys in sections["processes"].items():
             if process == name:
-                renamed[new] = keys | {"node": node}
+                renamed[new] = keys | ({"node": node} if node.startswith("/") else {})
             else:
                 renamed[process] = keys
         sections["processes"] = renamed
@@ -186,6 +186,8 @@ class Observed:
         return self._process(edge.nodes[0], edge)
 
     def _process(self, node: str, edge: EdgeState) -> str:
+        if not node.startswith("/"):
+            return self._stranger(node, edge)
         if node not in self._owners:
             base = posixpath.basename(node)
             name = self.draft.free_name(base)
@@ -195,6 +197,14 @@ class Observed:
             if _ANONYMOUS.fullmatch(base):
                 self.draft.note(("processes", self._owners[node]), _ANEW)
         return self._owners[node]
+
+    def _stranger(self, what: str, edge: EdgeState) -> str:
+        """Return the process of a publisher without a node, which is ``what``: a DDS program."""
+        key = f"{what} {edge.stream.gid!r}"
+        if key not in self._owners:
+            notes = (f"it is {what}", *self._notes(edge))
+            self._owners[key] = self.draft.process("external", {"external": True}, *notes)
+        return self._owners[key]
 
     def _notes(self, edge: EdgeState) -> Iterable[str]:
         where = self.where(edge.stream.gid)

@@ -8,7 +8,7 @@ from tfcompose.cli.tables import Table
 from tfcompose.compiler.render.text import GREEN, RED, YELLOW
 
 if TYPE_CHECKING:
-    from tfcompose.model.messages import ProcessStatus
+    from tfcompose.model.messages import ProcessStatus, RobotStatus
 
     #: (cores, bytes) by process number.
     Usage = dict[int, tuple[float, int]]
@@ -16,6 +16,13 @@ if TYPE_CHECKING:
 #: So much of why a process is in its state fits into the table, in characters; JSON has all of it.
 LONGEST_WHY = 40
 HEAD = ("PROCESS", "STATE", "PID", "UPTIME", "RESTARTS", "CPU", "MEMORY", "EDGES")
+
+
+def state_of(status: RobotStatus) -> str:
+    """Return the state of a robot in words."""
+    if status.stopping:
+        return "stopping"
+    return "tree complete" if status.complete else "tree not complete"
 
 
 def row(process: ProcessStatus, used: Usage) -> tuple[str, ...]:

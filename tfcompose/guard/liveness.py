@@ -230,7 +230,7 @@ class Liveness:
         for track in tracks:
             track.live = track.silent = track.slow = track.steady = False
             track.forget()
-        self._is_over(_children(tracks))
+        self._note_over(_children(tracks))
 
     def present(self, owner: str) -> None:
         """Note that the owner was started: its edges must be observed anew."""
@@ -261,7 +261,7 @@ class Liveness:
         for one in memory.silent:
             for track in self._parted(self._planned(one.children)):
                 track.silent, track.silent_since, track.last = True, one.since, one.since
-                self._is_wrong(_children([track]), silent(list(track.edges), now - one.since))
+                self._note_wrong(_children([track]), silent(list(track.edges), now - one.since))
         self._complete = not any(self._waiting.values())
 
     def _planned(self, children: tuple[str, ...]) -> tuple[str, ...]:
@@ -371,19 +371,19 @@ class Liveness:
             event = change_event(change, self._in_order(tracks), now)
             events.append(event)
             if isinstance(event, FindingShown):
-                self._is_wrong(_children(tracks), event.found)
+                self._note_wrong(_children(tracks), event.found)
             else:
-                self._is_over(_children(tracks))
+                self._note_over(_children(tracks))
         return events
 
     def wrong(self) -> list[Finding]:
         """Return what was reported of silent and slow edges and is not over."""
         return list(dict.fromkeys(self._wrong.values()))
 
-    def _is_wrong(self, children: Iterable[str], found: Finding) -> None:
+    def _note_wrong(self, children: Iterable[str], found: Finding) -> None:
         self._wrong.update(dict.fromkeys(children, found))
 
-    def _is_over(self, children: Iterable[str]) -> None:
+    def _note_over(self, children: Iterable[str]) -> None:
         for child in children:
             self._wrong.pop(child, None)
 
@@ -422,11 +422,11 @@ class Liveness:
             if edge.node not in nodes and owner not in self._gone:
                 self._gone.add(owner)
                 found = left([edge for track in tracks for edge in track.edges])
-                self._is_wrong(_children(tracks), found)
+                self._note_wrong(_children(tracks), found)
                 events.append(FindingShown(found))
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
-                self._is_over(_children(tracks))
+                self._note_over(_children(tracks))
                 events.append(RecoveredShown(f"{owner} ({edge.node}) is back"))
         self.changes += len(events)
         return events

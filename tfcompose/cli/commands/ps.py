@@ -45,7 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where a robot does not answer, or as --fail-on says."""
-    from tfcompose.cli.process_table import HEAD, TABLE, row, uptime
+    from tfcompose.cli.process_table import HEAD, TABLE, row, state_of, uptime
     from tfcompose.launcher.procfs import usage_of
 
     robots, code = _robots(arguments.robot)
@@ -61,13 +61,7 @@ def run(arguments: Namespace) -> int:
         name = arguments.robot
         print("no robot is running" if name is None else f"{name} is not running")
     for name, status in robots.items():
-        state = (
-            "stopping"
-            if status.stopping
-            else "tree complete"
-            if status.complete
-            else "tree not complete"
-        )
+        state = state_of(status)
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
         state += f", {_counted(status.findings)}" if status.findings else ""

@@ -7,7 +7,7 @@ import time
 import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
-from tfcompose.cli.process_table import HEAD, row, uptime
+from tfcompose.cli.process_table import HEAD, row, state_of, uptime
 from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject, warn
 from tfcompose.foundation.findings import finding
@@ -218,17 +218,10 @@ class LiveSource(SceneSource):
         if status is None:
             return f"no robot {self._plan.robot} runs here", []
         used = self._meter.usage([one.pid for one in status.processes if one.pid])
-        state = (
-            "stopping"
-            if status.stopping
-            else "tree complete"
-            if status.complete
-            else "tree not complete"
-        )
         columns = [HEAD.index(name) for name in _COLUMNS]
         table = [HEAD, *(row(process, used) for process in status.processes)]
         rows = [[cells[column] for column in columns] for cells in table]
-        return f"{self._plan.robot}: {state}, since {uptime(status.uptime)}", rows
+        return f"{self._plan.robot}: {state_of(status)}, since {uptime(status.uptime)}", rows
 
 
 def _status(name: str) -> RobotStatus | None:

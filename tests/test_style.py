@@ -138,15 +138,15 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_720,
-    "model": 2_107,
-    "spec": 4_801,
-    "compiler": 9_834,
-    "tf": 5_384,
-    "guard": 4_201,
-    "launcher": 3_815,
-    "cli": 5_358,
-    "tools": 11_058,
+    "foundation": 1_721,
+    "model": 1_891,
+    "spec": 4_825,
+    "compiler": 9_945,
+    "tf": 5_403,
+    "guard": 4_259,
+    "launcher": 3_835,
+    "cli": 5_436,
+    "tools": 11_247,
 }
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from tfcompose.launcher.runtime_dir import RuntimeDir
-    from tfcompose.model.messages import Message, Request
+    from tfcompose.model.messages import ProcessMessage, Request
 
 A = TypeVar("A")
 
@@ -140,7 +140,7 @@ class Control:
         self,
         listener: socket.socket,
         selector: selectors.BaseSelector,
-        answer: Callable[[Request], Message],
+        answer: Callable[[Request], ProcessMessage],
     ) -> None:
         self._listener = listener
         self._selector = selector

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from socket import socket
 
-    from tfcompose.model.messages import Message, Notice, Request
+    from tfcompose.model.messages import Notice, ProcessMessage, Request
 
 
 #: So much is kept for a slow reader; what the launcher itself says may take as much again; bytes.
@@ -156,7 +156,7 @@ class Notifier:
         self._owing: int | None = None
         self._control: Control | None = None
 
-    def listen(self, listener: socket, answer: Callable[[Request], Message]) -> None:
+    def listen(self, listener: socket, answer: Callable[[Request], ProcessMessage]) -> None:
         """Take requests of other commands at the control socket, in place of the one before."""
         if self._control:
             self._control.listen(listener)

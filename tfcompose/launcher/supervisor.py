@@ -105,7 +105,7 @@ class Session:
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
+class _Environments:
     """What commands are made with.
 
     The launcher's environment, and what makes a process's of it.
@@ -146,7 +146,7 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
         report(Ended(1))
         return 1
     with contextlib.ExitStack() as stack:
-        known = _Known(base, environment)
+        known = _Environments(base, environment)
         supervisor = _Supervisor(
             state, commands, report, session or Session(plan_file), known, stack
         )
@@ -160,7 +160,7 @@ class _Supervisor:
         commands: dict[str, ChildCommand],
         report: Callable[[Notice], None],
         session: Session,
-        known: _Known,
+        known: _Environments,
         stack: contextlib.ExitStack,
     ) -> None:
         self._state = state

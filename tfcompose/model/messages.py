@@ -18,23 +18,23 @@ from tfcompose.model.plan import LifecycleState, ProcessKind  # noqa: TC001
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
-class Message(msgspec.Struct, frozen=True):
+class ProcessMessage(msgspec.Struct, frozen=True):
     """What one process tells another, or a part of that."""
 
 
-class Event(Message, frozen=True, tag_field="event", tag=True):
+class _Event(ProcessMessage, frozen=True, tag_field="event", tag=True):
     """What happened: an event of the guard, a notice, or both."""
 
 
-class Order(Message, frozen=True, tag_field="order", tag=True):
+class _Order(ProcessMessage, frozen=True, tag_field="order", tag=True):
     """What the launcher has the guard do."""
 
 
-class Request(Message, frozen=True, tag_field="request", tag=True):
+class Request(ProcessMessage, frozen=True, tag_field="request", tag=True):
     """What another command asks of the launcher."""
 
 
-def line_of(message: Message) -> bytes:
+def line_of(message: ProcessMessage) -> bytes:
     """Return the message as one line of JSON, newline included."""
     return msgspec.json.encode(message) + b"\n"
 
@@ -42,24 +42,24 @@ def line_of(message: Message) -> bytes:
 # Events: from the guard to the launcher.
 
 
-class Clear(Event, frozen=True):
+class Clear(_Event, frozen=True):
     """The look before the start is over and no planned edge was published by anybody."""
 
 
-class Taken(Event, frozen=True):
+class Taken(_Event, frozen=True):
     """A planned edge was published before the start: the plan must not start, or must end."""
 
     found: Finding
 
 
-class Live(Event, frozen=True):
+class Live(_Event, frozen=True):
     """Edges, named by their children, were received from their owner for the first time."""
 
     owner: str
     children: tuple[str, ...]
 
 
-class Silent(Event, frozen=True):
+class Silent(_Event, frozen=True):
     """Edges, named by their children, that were live come no more.
 
     Or, if that is ``over``, come again.
@@ -69,13 +69,13 @@ class Silent(Event, frozen=True):
     over: bool
 
 
-class OwnerReady(Event, frozen=True):
+class OwnerReady(_Event, frozen=True):
     """All edges of a process are live."""
 
     process: str
 
 
-class TreeComplete(Event, frozen=True):
+class TreeComplete(_Event, frozen=True):
     """Every edge of the plan is live: a notice too.
 
     ``seconds`` is how long after the start; the guard, which does not know it, leaves it at 0.
@@ -85,7 +85,7 @@ class TreeComplete(Event, frozen=True):
     seconds: float = 0.0
 
 
-class FindingShown(Event, frozen=True, omit_defaults=True):
+class FindingShown(_Event, frozen=True, omit_defaults=True):
     """Something is wrong: a notice too, as it goes on to people.
 
     ``process`` is the plan's process that did it, where it can be stopped for it.
@@ -95,13 +95,13 @@ class FindingShown(Event, frozen=True, omit_defaults=True):
     process: str = ""
 
 
-class CurrentFindings(Event, frozen=True):
+class CurrentFindings(_Event, frozen=True):
     """All that is wrong now, worst first; what was sent before does not count any more."""
 
     findings: tuple[Finding, ...]
 
 
-class RecoveredShown(Event, frozen=True):
+class RecoveredShown(_Event, frozen=True):
     """A case that was reported is over; the text says which. A notice too.
 
     ``seconds`` is how long after the start, as in ``TreeComplete``.
@@ -111,7 +111,7 @@ class RecoveredShown(Event, frozen=True):
     seconds: float = 0.0
 
 
-class Unfenced(Event, frozen=True):
+class Unfenced(_Event, frozen=True):
     """A process of a strict plan sends past the fence.
 
     It must be stopped, whatever else is only reported.
@@ -124,7 +124,7 @@ class Unfenced(Event, frozen=True):
     pid: int = 0
 
 
-class GateState(Event, frozen=True):
+class GateState(_Event, frozen=True):
     """A process's gate, looked at: whether what it waits for is there.
 
     ``seen`` says what is there, or what is there instead.
@@ -135,7 +135,7 @@ class GateState(Event, frozen=True):
     is_open: bool
 
 
-class Remember(Event, frozen=True):
+class Remember(_Event, frozen=True):
     """What the next guard must know, should this one die.
 
     The launcher keeps it by key and does not look into it.
@@ -147,7 +147,7 @@ class Remember(Event, frozen=True):
 LoadState = Literal["loaded", "not loaded", "unloaded"]
 
 
-class ComponentState(Event, frozen=True):
+class ComponentState(_Event, frozen=True):
     """What has become of a component; ``number`` is that of the order that is answered.
 
     It is unloaded, too, where its container has it no more or does not answer. ``why`` says why it
@@ -160,7 +160,7 @@ class ComponentState(Event, frozen=True):
     why: str = ""
 
 
-class Alive(Event, frozen=True):
+class Alive(_Event, frozen=True):
     """The guard looks; it says so once a second."""
 
 
@@ -187,19 +187,19 @@ GUARD_EVENTS = msgspec.json.Decoder(GuardEvent)
 # Orders: from the launcher to the guard.
 
 
-class Absent(Order, frozen=True):
+class Absent(_Order, frozen=True):
     """A process of the plan was stopped on purpose, or ended: its silence is nobody's fault."""
 
     process: str
 
 
-class Present(Order, frozen=True):
+class Present(_Order, frozen=True):
     """A process of the plan is started, again: its edges are to be seen anew."""
 
     process: str
 
 
-class Gate(Order, frozen=True):
+class Gate(_Order, frozen=True):
     """Say when this is there: a topic with a publisher, a service, or nodes in lifecycle states.
 
     ``topic`` and ``service`` are full names, or empty. ``nodes`` holds the lifecycle states that
@@ -216,7 +216,7 @@ class Gate(Order, frozen=True):
     writers: tuple[str, ...] = ()
 
 
-class ComponentOrder(Order, frozen=True):
+class ComponentOrder(_Order, frozen=True):
     """Have a container load or unload a component, as the file says.
 
     A ``ComponentState`` with the order's ``number`` answers it. ``again`` says that a guard before
@@ -244,7 +244,7 @@ StateName = Literal[
 Stream = Literal["stdout", "stderr"]
 
 
-class LogLine(Event, frozen=True):
+class LogLine(_Event, frozen=True):
     """A line that a process wrote, without its end. A line longer than 64 KiB comes in pieces."""
 
     process: str
@@ -252,7 +252,7 @@ class LogLine(Event, frozen=True):
     text: str
 
 
-class ProcessState(Event, frozen=True):
+class ProcessState(_Event, frozen=True):
     """A process went into this state.
 
     ``detail`` says why, where there is more to say: "exit code 3; again in 2 s".
@@ -264,7 +264,7 @@ class ProcessState(Event, frozen=True):
     detail: str = ""
 
 
-class OwnerLive(Event, frozen=True):
+class OwnerLive(_Event, frozen=True):
     """All edges of an owner were received from it, ``seconds`` after the start.
 
     ``edges`` are their names.
@@ -276,7 +276,7 @@ class OwnerLive(Event, frozen=True):
     seconds: float
 
 
-class ProcessReady(Event, frozen=True):
+class ProcessReady(_Event, frozen=True):
     """A process that waited for something of its own is ready, ``seconds`` after the start.
 
     ``seen`` says by what.
@@ -287,7 +287,7 @@ class ProcessReady(Event, frozen=True):
     seconds: float
 
 
-class AllStarted(Event, frozen=True):
+class AllStarted(_Event, frozen=True):
     """Whatever can be started was.
 
     ``waiting`` are processes that wait for others to be ready, or done.
@@ -298,7 +298,7 @@ class AllStarted(Event, frozen=True):
     seconds: float
 
 
-class StartRow(Message, frozen=True):
+class StartRow(ProcessMessage, frozen=True):
     """When a process was started and ready, in seconds after the start; None: it is external."""
 
     process: str
@@ -306,7 +306,7 @@ class StartRow(Message, frozen=True):
     ready: float
 
 
-class AllReady(Event, frozen=True):
+class AllReady(_Event, frozen=True):
     """Every process is ready and every edge live, ``seconds`` after the start.
 
     But for those that were given up.
@@ -317,7 +317,7 @@ class AllReady(Event, frozen=True):
     without: tuple[str, ...] = ()
 
 
-class Replanned(Event, frozen=True):
+class Replanned(_Event, frozen=True):
     """A changed plan is followed from now on.
 
     The names of processes, and the frames that listeners will still hold.
@@ -329,7 +329,7 @@ class Replanned(Event, frozen=True):
     held: tuple[str, ...] = ()
 
 
-class Missing(Message, frozen=True):
+class Missing(ProcessMessage, frozen=True):
     """The unpublished edges of one owner, in the plan's order, of ``owned`` ones."""
 
     owner: str
@@ -338,13 +338,13 @@ class Missing(Message, frozen=True):
     owned: int
 
 
-class Waiting(Event, frozen=True):
+class Waiting(_Event, frozen=True):
     """Edges that nobody has published yet, by owner."""
 
     missing: tuple[Missing, ...]
 
 
-class FilesRestored(Event, frozen=True):
+class FilesRestored(_Event, frozen=True):
     """The files of the run were removed.
 
     They are in ``folder`` again, or nowhere, for the reason ``why``.
@@ -354,13 +354,13 @@ class FilesRestored(Event, frozen=True):
     why: str = ""
 
 
-class Stopping(Event, frozen=True):
+class Stopping(_Event, frozen=True):
     """Everything is being stopped, for this reason."""
 
     reason: str
 
 
-class Ended(Event, frozen=True):
+class Ended(_Event, frozen=True):
     """Nothing runs any more: the last notice.
 
     ``because`` is the failure that came first, and what was said last.
@@ -390,7 +390,7 @@ Notice = (
 NOTICES = msgspec.json.Decoder(Notice)
 
 
-class _Sent(Message, frozen=True):
+class _Timed(ProcessMessage, frozen=True):
     at: float
 
 
@@ -409,7 +409,7 @@ def read_notice(line: bytes) -> tuple[Notice, float]:
     Raises:
         UNREADABLE: if the line is none.
     """
-    return NOTICES.decode(line), msgspec.json.decode(line, type=_Sent).at
+    return NOTICES.decode(line), msgspec.json.decode(line, type=_Timed).at
 
 
 # Requests: what other commands ask of the launcher, and its answers.
@@ -451,20 +451,20 @@ REQUESTS = msgspec.json.Decoder(
 )
 
 
-class Refusal(Message, frozen=True):
+class Refusal(ProcessMessage, frozen=True):
     """Nothing was done, for this reason."""
 
     error: str
 
 
-class Done(Message, frozen=True):
+class Done(ProcessMessage, frozen=True):
     """It is being done; ``waits`` says what a process that is started waits for first."""
 
     ok: Literal[True] = True
     waits: str = ""
 
 
-class PlanChange(Message, frozen=True):
+class PlanChange(ProcessMessage, frozen=True):
     """What another plan changes.
 
     The processes that are different, new, and no more, and the fixed edges that vanish.
@@ -479,7 +479,7 @@ class PlanChange(Message, frozen=True):
     ok: Literal[True] = True
 
 
-class ProcessStatus(Message, frozen=True):
+class ProcessStatus(ProcessMessage, frozen=True):
     """One process.
 
     ``detail`` says why it is in its state, ``waits`` what it is without, ``seen`` what is there
@@ -505,7 +505,7 @@ class ProcessStatus(Message, frozen=True):
     nodes: tuple[str, ...]
 
 
-class RobotStatus(Message, frozen=True):
+class RobotStatus(ProcessMessage, frozen=True):
     """All that is known of a run.
 
     ``plan`` is the digest of what it was made from, ``uptime`` is in seconds, ``findings`` are

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class _Known(Collection[str]):
+class _NamesOrExcused(Collection[str]):
     """Names, with ``excuses`` for those that may be missing because of a refused entry."""
 
     names: Sequence[str]
@@ -47,11 +47,11 @@ def take_blocks(draft: Draft) -> Iterator[Finding]:
     hardware = tuple(
         _hardware(name, declared, spec) for name, declared in spec.ros2_control.items()
     )
-    yield from unknown_joints(hardware, _Known(moving, robot.excuses))
+    yield from unknown_joints(hardware, _NamesOrExcused(moving, robot.excuses))
     children = {edge.child for edge in robot.edges}
     frames = [frame for frame in robot.frames if frame in robot.links or frame in children]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
-    known = (_Known(frames, robot.excuses), _Known(joints, robot.excuses))
+    known = (_NamesOrExcused(frames, robot.excuses), _NamesOrExcused(joints, robot.excuses))
     blocks = []
     for name, text in spec.xml.items():
         at: Path = ("xml", name)

@@ -40,7 +40,7 @@ _DEFAULT_LIMIT = CalibrationLimit()
 
 def measure(draft: Draft) -> Iterator[Finding]:
     """Give mounts the poses of calibrations, which ``solve_poses`` makes those of their edges."""
-    work = _Work(draft, _Files(draft.read))
+    work = _Calibrations(draft, _Files(draft.read))
     for edge in draft.edges:
         if group := group_of(edge):
             work.inside.setdefault(group, set()).add(edge.child)
@@ -115,7 +115,7 @@ def _matches(
 
 
 @dataclass(slots=True)
-class _Work:
+class _Calibrations:
     draft: Draft
     files: _Files
     found: list[Finding] = field(default_factory=list)

@@ -36,7 +36,7 @@ def settle_claims(draft: Draft) -> Iterator[Finding]:
         for declared in draft.spec.processes.values()
     ):
         return
-    work = _Work(robot, draft.spec)
+    work = _Claims(robot, draft.spec)
     processes = tuple(work.process(process) for process in robot.processes)
     edges = tuple(work.edge(edge) for edge in robot.edges)
     draft.robot = replace(
@@ -46,7 +46,7 @@ def settle_claims(draft: Draft) -> Iterator[Finding]:
 
 
 @dataclass(slots=True)
-class _Work:
+class _Claims:
     robot: Robot
     spec: RobotSpec
     found: list[Finding] = field(default_factory=list)

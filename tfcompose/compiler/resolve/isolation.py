@@ -54,7 +54,7 @@ def isolate(draft: Draft) -> Iterator[Finding]:
     yield from _faults(robot, spec)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
     processes = []
-    filler = _Filler(draft)
+    filler = _ProcessFiller(draft)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
         processes.append(filler.filled(moved))
@@ -79,7 +79,7 @@ def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
 
 
 @dataclass(slots=True)
-class _Filler:
+class _ProcessFiller:
     """Fills in processes; ``found`` is what cannot be."""
 
     draft: Draft

@@ -28,7 +28,7 @@ def read_param_files(draft: Draft) -> Iterator[Finding]:
 
     A file may be in a package.
     """
-    robot, work = draft.robot, _Work(draft)
+    robot, work = draft.robot, _ParamFiles(draft)
     names = {
         process.name
         for process in draft.processes
@@ -46,7 +46,7 @@ def read_param_files(draft: Draft) -> Iterator[Finding]:
 
 
 @dataclass(slots=True)
-class _Work:
+class _ParamFiles:
     draft: Draft
     found: list[Finding] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)

@@ -361,7 +361,7 @@ def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
         if declared
         else {}
     )
-    fill = _Filler(sensor, settings_of(spec.ros).frame_prefix)
+    fill = _SensorFiller(sensor, settings_of(spec.ros).frame_prefix)
     for suffix, one in driver.also.items():
         if not sensor.holds(one.when):
             continue
@@ -400,7 +400,7 @@ def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
     driver = sensor.preset.driver
     if driver is None:
         return {}
-    fill = _Filler(sensor, prefix)
+    fill = _SensorFiller(sensor, prefix)
     named = _frame_names(sensor, driver)
     switch = (driver.on if sensor.tf == DRIVER else driver.off or {}) if sensor.driven() else {}
     claims = {key: value for claim in claims_of(sensor) for key, value in claim.off.items()}
@@ -428,7 +428,7 @@ def _node_parameters(
     driver = sensor.preset.driver
     if driver is None or not driver.launch:
         return computed
-    return _Filler(sensor, "").table(driver.params) if launched else {}
+    return _SensorFiller(sensor, "").table(driver.params) if launched else {}
 
 
 def _frame_names(sensor: Sensor, driver: PresetDriver) -> dict[str, str]:
@@ -443,7 +443,7 @@ def _frame_names(sensor: Sensor, driver: PresetDriver) -> dict[str, str]:
     }
 
 
-class _Filler:
+class _SensorFiller:
     """Fills a driver's parameters for one sensor; what ends up empty or undecided is left out."""
 
     def __init__(self, sensor: Sensor, prefix: str) -> None:

@@ -134,7 +134,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     answer = _answered(launch, draft.reach, "launch" if of_launch else "xml")
     draft.made |= answer["files"]
     records = [_with_texts(record) for record in answer["records"]]
-    work = _Work(draft, launch, target, records)
+    work = _LaunchImport(draft, launch, target, records)
     for record in records:
         work.add(record)
     work.finish(answer["decided"])
@@ -360,7 +360,7 @@ def _ended_by(number: int) -> str:
     return f"was ended by {name}, which it raised itself, or a module that it loads"
 
 
-class _Work:
+class _LaunchImport:
     """Turns records into entries."""
 
     def __init__(

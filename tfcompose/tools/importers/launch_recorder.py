@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import logging
 import os
+import posixpath
 import re
 import shlex
 import sys
@@ -601,11 +602,9 @@ def _common(action: Any, given: Mapping[str, Any], context: RecordingContext) ->
     for keyword in (*launch_keywords(*_READERS), Keyword("shell", "switch")):
         if given.get(keyword.name) is not None:
             what[keyword.name] = _READERS[keyword.kind](given[keyword.name], context)
-    configured = context.launch_configurations
-    if "prefix" not in what and "launch-prefix" in configured:
-        program = os.path.basename(text_of(given.get("executable") or given["cmd"][0], context))  # noqa: PTH119 (a word)
-        if re.match(configured.get("launch-prefix-filter", ""), program):
-            what["prefix"] = configured["launch-prefix"]
+    for keyword in launch_keywords("text"):
+        if keyword.name == _PREFIX and given.get(keyword.name) is None:
+            what |= _configured_prefix(keyword.attribute, given, context)
     for keyword in launch_keywords("shutdown"):
         follows = given.get(keyword.name)
         follows = follows if isinstance(follows, (list, tuple)) else [follows]
@@ -614,6 +613,20 @@ def _common(action: Any, given: Mapping[str, Any], context: RecordingContext) ->
             context.todo(place_of(action), f"{keyword.name} of a process")
         what[keyword.name] = any(map(_ends_all, follows))
     return what
+
+
+#: The keyword whose default is a launch configuration, of the name of its attribute.
+_PREFIX = "prefix"
+
+
+def _configured_prefix(
+    name: str, given: Mapping[str, Any], context: RecordingContext
+) -> dict[str, str]:
+    """Return the prefix that launch configurations set for all programs, or those of a filter."""
+    configured = context.launch_configurations
+    program = text_of(given.get("executable") or given["cmd"][0], context)
+    is_meant = re.match(configured.get(f"{name}-filter", ""), posixpath.basename(program))
+    return {_PREFIX: configured[name]} if name in configured and is_meant else {}
 
 
 def _texts(values: Any, context: RecordingContext) -> dict[str, str]:

@@ -151,11 +151,11 @@ def test_who_others_start_counts_when_its_edges_are_live() -> None:
     assert "1 of 1 processes" in view.lines[-1]
 
 
-def test_a_long_name_does_not_move_the_other_lines() -> None:
+def test_lines_begin_below_each_other_whatever_the_longest_name_is() -> None:
     view = View(plan_of("a" * 40, "b")).tell(
         LogLine("b", "stdout", "x"), LogLine("a" * 40, "stdout", "y")
     )
-    assert view.lines[:2] == [f"{'b':<24} | x", f"{'a' * 40} | y"]
+    assert view.lines[:2] == [f"{'b':<40} | x", f"{'a' * 40} | y"]
 
 
 def test_what_a_process_writes_moves_no_cursor_and_colours_nothing_else() -> None:

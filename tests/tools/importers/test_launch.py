@@ -858,6 +858,7 @@ from launch import LaunchDescription
 from launch.actions import ExecuteProcess, RegisterEventHandler, SetEnvironmentVariable, SetLaunchConfiguration
 from launch.event_handlers import OnProcessStart
 from launch_ros.actions import Node, SetParameter
+from launch_ros.substitutions import ExecutableInPackage
 
 def generate_launch_description():
     first = Node(package="p", executable="e", name="first")
@@ -871,6 +872,7 @@ def generate_launch_description():
         Node(package="p", executable="e", name="more", shell=True, arguments=["$HOME"]),
         ExecuteProcess(cmd=[static + "laser"], shell=True),
         ExecuteProcess(cmd=["sleep 1; " + static + "lost"], shell=True),
+        ExecuteProcess(cmd=[ExecutableInPackage(package="q", executable="tool"), "--fast"]),
         SetLaunchConfiguration("launch-prefix", "nice -n 5"),
         SetLaunchConfiguration("launch-prefix-filter", "pre"),
         Node(package="p", executable="prefixed", name="prefixed"),
@@ -894,9 +896,10 @@ def test_shells_prefixes_and_what_comes_later_are_as_launch_has_them(
     assert [name for name, one in processes.items() if "prefix" in one] == ["prefixed"]
     assert processes["prefixed"]["prefix"] == ["nice", "-n", "5"]
     assert processes["last"]["params"] == {"text": 1}
+    assert processes["tool"]["run"] == {"package": "q", "executable": "tool", "args": ["--fast"]}
     assert "laser" in data["frames"]
     assert "lost" not in data["frames"]
-    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:16", "a.launch.py:18"]
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:17", "a.launch.py:19"]
 
 
 NAMESPACED = """<launch>

@@ -250,7 +250,8 @@ _NODE = (
 _RECORDS: dict[str, Any] = {
     "node": _NODE,
     "container": _NODE,
-    "process": _COMMON | {"argv": [TEXT], "label": _OPTIONAL},
+    "process": _COMMON
+    | {"argv": [TEXT], "label": _OPTIONAL, "package?": _OPTIONAL, "executable?": str},
     "component": _AT
     | _OF_NODE
     | {

@@ -517,11 +517,18 @@ def include(path: str, context: RecordingContext) -> None:
 
 def _process(action: Any, context: RecordingContext) -> None:
     given = arguments_of(action)
+    program, *words = given["cmd"]
+    is_of_package = isinstance(program, ExecutableInPackage)
+    of_package = {}
+    if is_of_package:
+        of_package["package"] = text_of(program.package, context)
+        of_package["executable"] = text_of(program.executable, context)
     context.record(
         "process",
         place_of(action),
-        argv=[kept_text(word, context) for word in given["cmd"]],
+        argv=[kept_text(word, context) for word in (words if is_of_package else given["cmd"])],
         label=optional_text(given.get("name"), context),
+        **of_package,
         **_common(action, given, context),
     )
 

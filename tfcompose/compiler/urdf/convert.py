@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 from xml.sax.saxutils import quoteattr
 
@@ -322,7 +322,7 @@ def _numbers(
     return cls(**defaults | {name: value for name, value in given.items() if value is not None})
 
 
-@dataclass(slots=True)
+@dataclass
 class _Bodies:
     """Reads the links of a document; ``found`` holds what is wrong with their files."""
 
@@ -422,11 +422,14 @@ class _Bodies:
         found = self._described(name, material) or (self._named(name) if name else None)
         if found is None and name and element.tag == "visual" and name not in self._undescribed:
             self._undescribed.add(name)
-            known = [other for other, (one, *_) in self._elements.items() if one.children]
-            advice = did_you_mean(name, known, 'describe it: <color rgba="…"/>')
+            advice = did_you_mean(name, self._described_names, 'describe it: <color rgba="…"/>')
             message = f"no material {name} with a color or texture"
             self.values.refuse(message, material.at_value("name"), advice, "warning")
         return found
+
+    @cached_property
+    def _described_names(self) -> list[str]:
+        return [name for name, (one, *_) in self._elements.items() if one.children]
 
     def _named(self, name: str) -> Material | None:
         if name not in self._materials:

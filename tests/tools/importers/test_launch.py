@@ -902,6 +902,25 @@ def test_shells_prefixes_and_what_comes_later_are_as_launch_has_them(
     assert places(printed_errors(capsys), "TF020") == ["a.launch.py:17", "a.launch.py:19"]
 
 
+def test_a_component_that_the_source_does_not_name_is_named_with_its_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = """
+from launch import LaunchDescription
+from launch_ros.actions import ComposableNodeContainer
+from launch_ros.descriptions import ComposableNode
+
+def generate_launch_description():
+    camera = ComposableNode(package="camera_ros", plugin="camera::CameraNode")
+    return LaunchDescription([ComposableNodeContainer(
+        name="box", namespace="", package="rclcpp_components", executable="component_container",
+        composable_node_descriptions=[camera])])
+"""
+    _, data = import_of(source(tmp_path, "a.launch.py", text), code=None)
+    assert list(data["processes"]) == ["camera_node"]
+    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:7"]
+
+
 NAMESPACED = """<launch>
   <group><push_ros_namespace namespace="leader"/>
     <node pkg="robot_state_publisher" exec="robot_state_publisher">

@@ -551,6 +551,9 @@ class _LaunchImport:
             self._node(record | ({"params": []} if words else {}), span)
             return
         program = replace(self._program(record, span), plugin=plugin)
+        if not program.name:
+            unnamed = "the name that its class gives the component: here it has another"
+            program = replace(program, todo=(*program.todo, unnamed))
         name = add_program(self.draft, program, self.target) or ""
         self._started(record, name)
         self._components.append((name, record["container"], span))

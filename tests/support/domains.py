@@ -27,14 +27,14 @@ class Domain:
     environment: Mapping[str, str]
 
 
-def own_domains() -> range:
-    """Return the domains of this worker of pytest-xdist.
+def own_share(numbers: range) -> range:
+    """Return the numbers that this worker of pytest-xdist has to itself.
 
-    Each has as many, and none has another's.
+    Each worker has about as many.
     """
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    return DOMAINS[worker * len(DOMAINS) // workers : (worker + 1) * len(DOMAINS) // workers]
+    return numbers[worker * len(numbers) // workers : (worker + 1) * len(numbers) // workers]
 
 
 @contextmanager
@@ -46,7 +46,7 @@ def reserved_domain() -> Iterator[int]:
     Raises:
         RuntimeError: if there is none.
     """
-    domains = own_domains()
+    domains = own_share(DOMAINS)
     for _ in domains:
         number = domains[next(_WINDOW) % len(domains)]
         try:

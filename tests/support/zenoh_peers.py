@@ -6,28 +6,40 @@ rmw_zenoh hashes tokens with a copy of XXH3; PyPI's xxhash is the binding of the
 from __future__ import annotations
 
 import json
+import os
 import socket
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import xxhash
 import zenoh
 from zenoh import ext
 
+from tests.support.domains import own_share
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 HASH = "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"
+#: Below what Linux gives to clients by default, 32768 to 60999.
+PORTS = range(20_000, 32_000)
+_NEXT_PORT = count(os.getpid())
 TYPE = "tf2_msgs::msg::dds_::TFMessage_"
 
 
 def free_port() -> int:
-    """Return a port of loopback that nobody listens on."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port: int = one.getsockname()[1]
-        return port
+    """Return a port of loopback that nobody listens on, and that no other test gets.
+
+    The kernel does not give it to a client before the test listens (ip_local_port_range).
+    """
+    ports = own_share(PORTS)
+    while True:
+        port = ports[next(_NEXT_PORT) % len(ports)]
+        with suppress(OSError), socket.socket() as listener:
+            listener.bind(("127.0.0.1", port))
+            return port
 
 
 def config(

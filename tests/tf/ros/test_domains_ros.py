@@ -20,7 +20,7 @@ def test_a_domain_in_which_somebody_is_and_one_that_is_locked_are_not_taken(
         stranger.__enter__()
     try:  # nobody has locked it any more
         assert other in domains.domains_in_use()
-        own = domains.own_domains()
+        own = domains.own_share(domains.DOMAINS)
         order = itertools.cycle([own.index(domain.id), own.index(other), *range(len(own))])
         monkeypatch.setattr(domains, "_WINDOW", order)
         with domains.reserved_domain() as number:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from tfcompose.cli.dashboard import KEPT_LINES, Dashboard
-from tfcompose.cli.screen import KeyDecoder
+from tfcompose.cli.keys import KeyDecoder
 from tfcompose.foundation.findings import Note, finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.messages import (

@@ -8,10 +8,13 @@ import termios
 from collections.abc import Iterator
 from typing import TextIO
 
+import pyte
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tfcompose.cli.tables import LiveLines
-from tfcompose.cli.terminal import can_redraw
+from tfcompose.cli.screen import LiveLines, Rows
+from tfcompose.cli.terminal import can_redraw, plain
 
 END = "<the end>"
 
@@ -53,19 +56,39 @@ def terminal() -> Iterator[Terminal]:
     made.close()
 
 
-def test_each_drawing_replaces_the_last_one_and_what_was_below_it_goes(terminal: Terminal) -> None:
+def test_a_drawing_sends_the_lines_that_changed_and_what_was_below_it_goes(
+    terminal: Terminal,
+) -> None:
     lines = LiveLines(terminal.stream)
     lines.draw(["one", "two", "three"])
-    assert terminal.shown() == "one\033[K\ntwo\033[K\nthree\033[K\n\033[J"
+    assert terminal.shown() == "\r\033[Kone\n\r\033[Ktwo\n\r\033[Kthree\n"
+    lines.draw(["one", "2", "three"])
+    assert terminal.shown() == "\033[3A\n\r\033[K2\n\n"
+    lines.draw(["one", "2", "three"])
+    assert not terminal.shown()
     lines.draw(["four"])
-    assert terminal.shown() == "\r\033[3Afour\033[K\n\033[J"
+    assert terminal.shown() == "\033[3A\r\033[Kfour\n\r\033[K\n\033[J\033[A"
+
+
+ROWS = st.lists(st.sampled_from(["", "a", "\033[31mred\033[0m", "x" * 20]), min_size=1, max_size=6)
+
+
+@given(st.lists(ROWS, max_size=5))
+def test_a_terminal_shows_the_rows_of_the_last_drawing(drawings: list[list[str]]) -> None:
+    screen = pyte.Screen(20, 6)
+    stream, rows = pyte.Stream(screen), Rows()
+    for drawing in drawings:
+        stream.feed(rows.change(drawing).replace("\n", "\r\n"))
+        shown = [line.rstrip() for line in screen.display]
+        assert shown == [*map(plain, drawing), *[""] * (6 - len(drawing))]
+        assert screen.cursor.y == len(drawing) - 1
 
 
 def test_no_line_is_longer_than_the_terminal_and_there_are_no_more_than_it_shows(
     terminal: Terminal,
 ) -> None:
     LiveLines(terminal.stream).draw(["x" * 100, *map(str, range(50))])
-    lines = terminal.shown().replace("\033[K", "").split("\n")
+    lines = terminal.shown().replace("\r\033[K", "").split("\n")
     assert lines[0] == "x" * 38 + "…"
     assert (lines[8][:9], lines[8][38:]) == ("… 43 more", "…")
     assert len(lines) == 10
@@ -78,7 +101,7 @@ def test_after_the_window_shrank_the_screen_is_drawn_anew(terminal: Terminal) ->
     terminal.shown()
     terminal.resize(20, 10)
     lines.draw(["y" * 30])
-    assert terminal.shown() == "\033[H\033[2J" + "y" * 18 + "…\033[K\n\033[J"
+    assert terminal.shown() == "\033[H\033[2J\r\033[K" + "y" * 18 + "…\n"
 
 
 def test_a_terminal_that_cannot_move_its_cursor_and_a_pipe_get_plain_lines(

@@ -5,6 +5,7 @@ import os
 import stat
 import time
 from argparse import ArgumentTypeError
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,15 @@ def test_a_follower_sees_each_line_once_also_when_the_file_is_turned_over(tmp_pa
     observed += [text for _, _, text in follower.more()]
     logs.close()
     assert observed == [f"line {number}" for number in range(200)]
+
+
+def test_a_follower_that_reads_back_leaves_out_what_was_before_a_time(tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(
+        "2026-11-26T10:00:00+00:00 before\n2026-11-26T11:00:00+00:00 after\n"
+    )
+    begin_s = datetime.fromisoformat("2026-11-26T11:00:00+00:00").timestamp()
+    follower = Follower(tmp_path, ["a"], back=1000, since_s=begin_s)
+    assert [text for _, _, text in follower.more()] == ["after"]
 
 
 def test_a_full_disk_is_reported_once_costs_lines_and_stops_nobody(

@@ -10,7 +10,7 @@ from functools import singledispatchmethod
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.cli.reading import line_of
-from tfcompose.cli.terminal import coloured_only, plain
+from tfcompose.cli.terminal import CLEAR_LINE, coloured_only, plain
 from tfcompose.compiler.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
 from tfcompose.foundation.text import counted, listed
 from tfcompose.model.messages import (
@@ -52,7 +52,6 @@ STATUS_EVERY_S = 0.2
 #: Columns that stay free: the terminal writes ``^C`` there, and must not begin a new line.
 STATUS_FREE_COLUMNS = 3
 STATUS_NAMED_AT_MOST = 3
-_CLEAR_LINE = "\r\033[K"
 
 
 def prefix_of(name: str, width: int) -> str:
@@ -371,7 +370,7 @@ class StatusLine:
     def cleared(self) -> str:
         """Return what takes the line away, so that others can be written in its place."""
         self._shown = ""
-        return _CLEAR_LINE if self._drawn else ""
+        return CLEAR_LINE if self._drawn else ""
 
     def drawn(self) -> str:
         """Return what draws the line anew.
@@ -383,7 +382,7 @@ class StatusLine:
         if text == self._shown or (self._shown and now - self._at < STATUS_EVERY_S):
             return ""
         before, self._shown, self._at, self._drawn = self._shown, text, now, True
-        return f"{_CLEAR_LINE}{text}" if before else text
+        return f"{CLEAR_LINE}{text}" if before else text
 
     def _fitting(self, columns: int) -> str:
         """Return the longest way to say it that fits."""

@@ -11,19 +11,21 @@ shorten numbers.
 from __future__ import annotations
 
 import re
+import sys
 import time
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from rich.cells import chop_cells
+from rich.console import Console as Renderer
 from rich.text import Text
 
 from tfcompose.cli.console import Console, Nowhere
 from tfcompose.cli.process_table import HEAD, TABLE, row, uptime
 from tfcompose.cli.reading import line_of
 from tfcompose.cli.tables import Table, shortened
-from tfcompose.cli.terminal import plain
+from tfcompose.cli.terminal import coloured, plain
 from tfcompose.compiler.render.text import GREEN, RED, YELLOW, render_text
 from tfcompose.foundation.text import counted
 from tfcompose.model.messages import Ended, FindingShown, RecoveredShown, Stopping
@@ -62,6 +64,7 @@ Keys
   f or g           findings, with notes and what helps
   Esc              back to the processes
   q                back; on the first page: end the robot, after another q
+  Ctrl-L           draw the screen anew
   Ctrl-C           end the robot
   Ctrl-Z           back to the shell; the robot goes on, and fg shows it again
 
@@ -150,11 +153,15 @@ class Dashboard:
     _events: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=KEPT_EVENTS))
     _counts: dict[str, int] = field(default_factory=lambda: {"error": 0, "warning": 0})
     _console: Console = field(init=False)
+    _renderer: Renderer = field(init=False)
     _began: float = field(init=False)
     _at: float = 0.0
 
     def __post_init__(self) -> None:
         self._console = Console(self.plan, Nowhere(), colour=False, keep=self._keep)
+        self._renderer = Renderer(
+            force_terminal=True, no_color=not coloured(sys.stdout), highlight=False
+        )
         self._began = self.clock()
         self.forget()
 
@@ -261,6 +268,13 @@ class Dashboard:
             self._events.append((self._at, line))
 
     # What is shown.
+
+    def rows(self, columns: int, rows: int) -> list[str]:
+        """Return the lines with their colours as control sequences."""
+        with self._renderer.capture() as captured:
+            text = Text("\n").join(self.lines(columns, rows))
+            self._renderer.print(text, soft_wrap=True, end="")
+        return captured.get().split("\n")
 
     def lines(self, columns: int, rows: int) -> list[Text]:
         """Return as many lines as the terminal has, each at most as wide as it."""

@@ -22,7 +22,7 @@ from tfcompose.cli.runs import plan_of_run
 from tfcompose.cli.terminal import FAILED, can_redraw, coloured, warn
 from tfcompose.foundation.text import counted
 from tfcompose.launcher.control import connect
-from tfcompose.launcher.output import Follower, NonBlockingOutput
+from tfcompose.launcher.output import Follower, NonBlockingOutput, runs_of
 from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.supervisor import ENDING, Signals
 from tfcompose.model.messages import (
@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 #: How often the launcher is asked for its state, at least and at most; what processes use is
 #: measured more rarely.
 STATUS_EVERY_S, STATUS_AT_MOST_EVERY_S, USAGE_EVERY_S = 1.0, 0.2, 5.0
+#: What changes is drawn at most so often; after a key at once.
+DRAW_EVERY_S = 0.2
 #: How often the log that is shown is read.
 LOG_EVERY_S = 0.25
 #: So much of a log is read when it is opened; bytes.
@@ -146,7 +148,7 @@ class _LiveView:
     def __init__(
         self, place: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals
     ) -> None:
-        from tfcompose.cli.screen import KeyDecoder
+        from tfcompose.cli.keys import KeyDecoder
 
         self._place = place
         self._dashboard = dashboard
@@ -161,6 +163,7 @@ class _LiveView:
         self._last: list[Notice] = []
         self._left_out = 0
         self._fault = ""
+        self._draw_at = 0.0
         now = time.monotonic()
         self._status_at = self._usage_at = self._log_at = self._connect_at = self._requested_at = (
             now
@@ -278,16 +281,23 @@ class _LiveView:
 
     def _take_keys(self, keys: list[str]) -> None:
         for key in keys:
+            if key == "redraw":
+                self._screen.redraw()
             shown = self._dashboard.log_of
             if self._dashboard.press(key):
                 self._pass_on(signal.SIGINT)
             if self._dashboard.log_of != shown:
-                name = self._dashboard.log_of
-                self._follower = (
-                    Follower(self._place.logs, [name], back=LOG_BYTES) if name else None
-                )
-                self._log_at = 0.0
-        self._stale = True
+                self._follow_log(self._dashboard.log_of)
+        self._stale, self._draw_at = True, 0.0
+
+    def _follow_log(self, name: str | None) -> None:
+        """Read the process's log from this run's begin, or no more."""
+        folder = self._place.logs
+        since_s = max(runs_of(folder), default=0.0)
+        self._follower = (
+            Follower(folder, [name], back=LOG_BYTES, since_s=since_s) if name else None
+        )
+        self._log_at = 0.0
 
     def _take_signal(self, number: int) -> None:
         if number == signal.SIGTSTP:
@@ -309,6 +319,7 @@ class _LiveView:
     def _sleep_s(self) -> float:
         due = [self._status_at, self._usage_at]
         due += [self._log_at] if self._follower else []
+        due += [self._draw_at] if self._stale and not self._fault and not self._owing else []
         due += (
             [] if self._dashboard.ended or (self._events and self._states) else [self._connect_at]
         )
@@ -343,10 +354,12 @@ class _LiveView:
             self._requested, self._requested_at = True, now
 
     def _draw(self) -> None:
-        if not self._stale or self._fault:
+        now = time.monotonic()
+        if not self._stale or self._fault or now < self._draw_at:
             return
+        self._draw_at = now + DRAW_EVERY_S
         try:
-            self._stale = not self._screen.draw(self._dashboard.lines)
+            self._stale = not self._screen.draw(self._dashboard.rows)
         except OSError:
             self._lose_terminal()
         except Exception as error:  # noqa: BLE001 (a fault of the view ends no robot)

@@ -1,105 +1,97 @@
-"""The terminal of a live view.
+"""What is drawn again in its place on a terminal.
 
-Its other screen, keys as they are pressed, and how everything is put back.
+A drawing sends the rows that changed since the last one: a view that changes 20 times a second
+costs a slow link a few rows, and not a screen, each time.
 """
 
 from __future__ import annotations
 
 import contextlib
-import re
 import sys
 import termios
-from io import StringIO
 from typing import TYPE_CHECKING
 
-from rich.console import Console, ConsoleDimensions
-from rich.live import Live
-from rich.text import Text
-
-from tfcompose.cli.terminal import coloured, size_of
+from tfcompose.cli.tables import shortened
+from tfcompose.cli.terminal import CLEAR, CLEAR_LINE, plain, size_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from types import TracebackType
+    from typing import TextIO
 
     from typing_extensions import Self
 
     from tfcompose.launcher.output import NonBlockingOutput
 
-#: Keys that send more than one byte, in the forms that terminals use.
-_NAMED = {
-    "A": "up",
-    "B": "down",
-    "C": "right",
-    "D": "left",
-    "H": "home",
-    "F": "end",
-    "1~": "home",
-    "4~": "end",
-    "7~": "home",
-    "8~": "end",
-    "5~": "pgup",
-    "6~": "pgdn",
-    "\r": "enter",
-    "\n": "enter",
-    "\033": "esc",
-    "\x7f": "backspace",
-    "\b": "backspace",
-    " ": "pgdn",
-}
-_KEY = re.compile(r"\033[\[O]([0-9;]*[~A-Za-z])|([^\033]|\033)", re.DOTALL)
-_BEGUN = re.compile(r"\033(?:[\[O][0-9;]*)?\Z")
+#: Clears what is below the cursor's row.
+_CLEAR_BELOW = "\n\033[J\033[A"
+#: The other screen of a terminal, without the cursor, and the way back: xterm's modes 1049 and 25.
+_OTHER_SCREEN = "\033[?1049h\033[?25l"
+_OWN_SCREEN = "\033[?25h\033[?1049l"
 
 
-class KeyDecoder:
-    """Bytes of a terminal into the names of keys."""
+class Rows:
+    """Rows of text that are drawn again in their place.
+
+    The cursor stands on the last one between drawings.
+    """
 
     def __init__(self) -> None:
-        self._rest = ""
+        self._drawn: list[str] = []
 
-    @property
-    def waits(self) -> bool:
-        """Whether a key has begun that may go on.
+    def forget(self) -> None:
+        """Take the cursor's row for the first one, and what is below it for empty."""
+        self._drawn = []
 
-        After a moment without more, ``end`` says what it was.
+    def change(self, rows: Sequence[str]) -> str:
+        """Return what a terminal needs to show these rows instead of those drawn before."""
+        before, self._drawn = self._drawn, list(rows)
+        if before == self._drawn:
+            return ""
+        up = f"\033[{len(before) - 1}A" if len(before) > 1 else ""
+        kept = [*before, *[""] * (len(rows) - len(before))]
+        lines = [  # cleared before it is written: behind a full row the cursor stands on it
+            "" if row == old else f"{CLEAR_LINE}{row}"
+            for row, old in zip(rows, kept, strict=False)
+        ]
+        below = _CLEAR_BELOW if len(rows) < len(before) else ""
+        return up + "\n".join(lines) + below
+
+
+class LiveLines:
+    """Some lines at the end of a terminal's output, which the next drawing replaces."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._rows = Rows()
+        self._columns = 0
+
+    def draw(self, lines: Sequence[str]) -> None:
+        """Draw the lines where the last ones were.
+
+        Those that the terminal has no room for are counted only.
         """
-        return bool(self._rest)
-
-    def feed(self, data: bytes) -> list[str]:
-        """Return the keys that are complete."""
-        text = self._rest + data.decode(errors="replace")
-        begun = _BEGUN.search(text)
-        self._rest = text[begun.start() :] if begun else ""
-        return _keys(text[: len(text) - len(self._rest)])
-
-    def end(self) -> list[str]:
-        """Return the keys in what came, as nothing followed."""
-        text, self._rest = self._rest, ""
-        return _keys(text)
-
-
-def _keys(text: str) -> list[str]:
-    return [_key_name(*match.groups()) for match in _KEY.finditer(text)]
-
-
-def _key_name(sequence: str, char: str) -> str:
-    """Return the name of a key; an escape sequence that no key sends has none."""
-    return _NAMED.get(sequence, "") if sequence else _NAMED.get(char, char)
+        columns, rows = size_of(self._stream.fileno())
+        room = max(rows - 1, 2)
+        shown = list(lines)
+        if len(shown) > room:
+            shown = [
+                *shown[: room - 1],
+                f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe",
+            ]
+        if columns < self._columns:
+            # What was drawn takes more lines now, and how many is the terminal's secret.
+            self._stream.write(CLEAR)
+            self._rows.forget()
+        self._columns = columns
+        fitted = [_fitted(line, columns - 1) for line in shown]
+        self._stream.write(self._rows.change([*fitted, ""]))
+        self._stream.flush()
 
 
-class _Stream(StringIO):
-    """A text stream for rich, which writes what it is given to the output when it is flushed."""
-
-    def __init__(self, output: NonBlockingOutput) -> None:
-        super().__init__()
-        self._output = output
-
-    def flush(self) -> None:
-        text = self.getvalue()
-        self.seek(0)
-        self.truncate()
-        if text:
-            self._output.write(text)
+def _fitted(line: str, width: int) -> str:
+    text = plain(line)
+    return line if len(text) <= width else shortened(text, width, at_end=True)
 
 
 class Screen:
@@ -113,7 +105,9 @@ class Screen:
         self.fd = keys_fd
         self.output = output
         self._before = termios.tcgetattr(keys_fd)
-        self._live: Live | None = None
+        self._rows = Rows()
+        self._size = (0, 0)
+        self._is_shown = False
 
     def __enter__(self) -> Self:
         self.enter()
@@ -136,38 +130,35 @@ class Screen:
         termios.tcsetattr(
             self.fd, termios.TCSANOW, settings
         )  # the others wait until the terminal has taken all
-        stream = _Stream(self.output)
-        console = Console(
-            file=stream, force_terminal=True, no_color=not coloured(sys.stdout), highlight=False
-        )
-        self._live = Live(
-            console=console,
-            screen=True,
-            auto_refresh=False,
-            redirect_stdout=False,
-            redirect_stderr=False,
-        )
-        console.size = ConsoleDimensions(*size_of(sys.stdout.fileno()))
-        self._live.start()
+        self._is_shown = True
+        self.output.write(_OTHER_SCREEN)
+        self.redraw()
+
+    def redraw(self) -> None:
+        """Have the next drawing send all rows: others may have written to the terminal."""
+        self._size = (0, 0)
 
     def leave(self) -> None:
         """Put the terminal back to what it was; one that has gone needs nothing."""
-        live, self._live = self._live, None
-        if live is None:
+        if not self._is_shown:
             return
+        self._is_shown = False
         with contextlib.suppress(OSError):
-            live.stop()
+            self.output.write(_OWN_SCREEN)
         self.output.finish()
         with contextlib.suppress(termios.error):
             termios.tcsetattr(self.fd, termios.TCSANOW, self._before)
 
-    def draw(self, lines: Callable[[int, int], list[Text]]) -> bool:
-        """Draw the lines returned for this size, unless the terminal is still busy."""
-        if self._live is None:
+    def draw(self, rows: Callable[[int, int], list[str]]) -> bool:
+        """Draw the rows returned for this size, unless the terminal is still busy."""
+        if not self._is_shown:
             return True
         if self.output.owes:
             return False
         size = size_of(sys.stdout.fileno())
-        self._live.console.size = ConsoleDimensions(*size)
-        self._live.update(Text("\n").join(lines(*size)), refresh=True)
+        if size != self._size:
+            self._size = size
+            self.output.write(CLEAR)
+            self._rows.forget()
+        self.output.write(self._rows.change(rows(*size)))
         return True

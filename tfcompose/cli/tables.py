@@ -1,6 +1,6 @@
 """Tables of text: as wide as they are for files and pipes.
 
-For a terminal fitted, coloured and drawn again in place.
+For a terminal fitted and coloured.
 
 A pipe gets the same bytes whatever the terminal is. On a narrow terminal the columns that matter
 least are left out, and names are shortened after their first third: their ends tell them apart. Of
@@ -13,12 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.terminal import plain, size_of
 from tfcompose.compiler.render.text import PLAIN
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from typing import TextIO
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,43 +105,3 @@ def shortened(text: str, width: int, *, at_end: bool = False) -> str:
         )
     head = width - 1 if at_end else (width - 1) // 3
     return f"{text[:head]}…{text[len(text) - (width - 1 - head) :]}"
-
-
-class LiveLines:
-    """Some lines at the end of a terminal's output.
-
-    Each drawing replaces the last one, without flicker.
-    """
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._drawn = 0
-        self._columns = 0
-
-    def draw(self, lines: Sequence[str]) -> None:
-        """Draw the lines where the last ones were.
-
-        Those that the terminal has no room for are counted only.
-        """
-        columns, rows = size_of(self._stream.fileno())
-        room = max(rows - 1, 2)
-        shown = list(lines)
-        if len(shown) > room:
-            shown = [
-                *shown[: room - 1],
-                f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe",
-            ]
-        up = f"\r\033[{self._drawn}A" if self._drawn else ""
-        if (
-            columns < self._columns
-        ):  # what was drawn takes more lines now, and how many is the terminal's secret
-            up = "\033[H\033[2J"
-        body = "".join(f"{_fitted(line, columns - 1)}\033[K\n" for line in shown)
-        self._stream.write(f"{up}{body}\033[J")  # what was below the last line goes
-        self._stream.flush()
-        self._drawn, self._columns = len(shown), columns
-
-
-def _fitted(line: str, width: int) -> str:
-    text = plain(line)
-    return line if len(text) <= width else shortened(text, width, at_end=True)

@@ -31,6 +31,8 @@ _LACKING = frozenset({"TF001", "TF901", "TF905", "TF906", "TF920"})
 #: Control sequences (ECMA-48): those that end in m set colours, the others do something; and
 #: titles and links.
 _SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?|\033[ -/]*[0-~])")
+#: What clears the screen, and the line in which the cursor is.
+CLEAR, CLEAR_LINE = "\033[H\033[2J", "\r\033[K"
 _COLOUR = re.compile(r"\033\[[0-9;:]*m")
 
 

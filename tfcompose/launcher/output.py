@@ -384,15 +384,26 @@ def _lines(folder: Path, name: str) -> Iterator[tuple[str, str, str]]:
 class Follower:
     """Reads what is added to the logs, across turning over."""
 
-    def __init__(self, folder: Path, names: list[str], *, back: int = 0) -> None:
-        """Begin at the current end, or at the first line within so many bytes before it."""
+    def __init__(
+        self, folder: Path, names: list[str], *, back: int = 0, since_s: float = 0.0
+    ) -> None:
+        """Begin at the current end, or at the first line within so many bytes before it.
+
+        Lines from before ``since_s``, in seconds since 1970, are left out.
+        """
+        self._since_s = since_s
         self._folder, self._names = folder, names
         self._at = {name: self._before(back, *self._end(name), name) for name in names}
         self._rest = dict.fromkeys(names, b"")
 
     def more(self) -> list[tuple[str, str, str]]:
         """Return (time, process, text) of the lines since the last call, oldest first."""
-        found = [line for name in self._names for line in self._more(name)]
+        found = [
+            line
+            for name in self._names
+            for line in self._more(name)
+            if not self._since_s or _instant(line[0]) >= self._since_s
+        ]
         return sorted(found, key=lambda line: line[0])
 
     def _before(self, back: int, inode: int, end: int, name: str) -> tuple[int, int]:

@@ -16,6 +16,7 @@ from tfcompose import __version__
 from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
 from tfcompose.cli.robot_search import YAML_ENDINGS, is_robot, robots_in
 from tfcompose.cli.terminal import (
+    CLEAR,
     MOST_OF_ONE_CODE,
     UNREADABLE,
     can_redraw,
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
 URDF_ENDINGS = (".urdf", ".xacro")
 #: How often --watch checks the files, in seconds.
 CHECK_EVERY_S = 0.3
-#: Moves the cursor home and clears the screen (ECMA-48).
-CLEAR = "\033[H\033[2J"
 
 
 def arguments(parser: ArgumentParser) -> None:

@@ -20,7 +20,7 @@ from tfcompose.cli.terminal import UNREADABLE, can_redraw, coloured, fail, table
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.cli.tables import LiveLines
+    from tfcompose.cli.screen import LiveLines
     from tfcompose.model.plan.topics import Topics
     from tfcompose.tf.live.edges import TreeObserver
 
@@ -53,7 +53,7 @@ def run(arguments: Namespace) -> int:
     Exit code 1 if no TF came, or no chain from A to B is there, 2 for a bad bag.
     """
     from tfcompose.cli.live import observe, read_bag
-    from tfcompose.cli.tables import LiveLines
+    from tfcompose.cli.screen import LiveLines
     from tfcompose.model.plan.topics import topics_below
     from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
 

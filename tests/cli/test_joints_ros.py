@@ -4,6 +4,7 @@ Up moves it, and up again gives it another description while it runs.
 """
 
 import json
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -126,6 +127,12 @@ def test_a_second_sender_of_a_joint_is_named_while_it_sends(tfc: Callable[..., s
             return codes() == {"TF860", "TF861"}
 
         assert until(is_named)
+        verify = [sys.executable, "-m", "tfcompose", "verify", "--format", "json"]
+        verifying = processes.start(verify, stdout=subprocess.PIPE)
+        assert until(lambda: is_named() and verifying.poll() is not None)
+        found = json.loads(verifying.communicate()[0])
+        assert {one["code"] for one in found} == {"TF860", "TF861"}
+        assert verifying.returncode == 1
     assert until(lambda: codes() == set())
 
 

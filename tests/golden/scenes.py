@@ -90,11 +90,11 @@ from tfcompose.spec.language.tool_keys import problems_with
 from tfcompose.spec.load import Source, load
 from tfcompose.tf.bags import BagError
 from tfcompose.tf.live.publishers import Message, OtherRun, Publisher, Senders
+from tfcompose.tf.live.sent_joints import SentJoints
 from tfcompose.tf.live.state import (
     NO_NODE,
     MovingJoint,
     RosProcess,
-    SentJoints,
     StampedData,
     TopicState,
     TreeState,

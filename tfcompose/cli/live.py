@@ -15,7 +15,9 @@ from tfcompose.foundation.signals import Stop
 from tfcompose.guard.verdict.setup import elsewhere_help, settings_text
 from tfcompose.model.plan import RosSettings
 from tfcompose.model.plan.topics import parts_of, topics_below
-from tfcompose.tf.bags import BagError, missing_rosbags, observe_bag
+from tfcompose.tf.bags import BagError, BagFeed, missing_rosbags
+from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+from tfcompose.tf.live.feed import follow
 from tfcompose.tf.ros.environment import (
     RosError,
     child_environment,
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from tfcompose.model.plan import Plan
-    from tfcompose.tf.live.edges import TreeObserver
+    from tfcompose.tf.live.feed import Feed
 
     Topics = tuple[str, str]
 
@@ -63,24 +65,6 @@ def observed_topics(arguments: Namespace) -> tuple[Plan | None, list[Topics]]:
     return plan, list(parts_of(plan)) or [topics_below(plan.ros.namespace)]
 
 
-def read_bag(
-    path: str, observers: Mapping[Topics, TreeObserver], *, may_be_silent: bool = False
-) -> None:
-    """Put a bag into the observers of these topics (moving, fixed).
-
-    Raises:
-        SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
-    """
-    from_bag(lambda: observe_bag(path, observers))
-    if not may_be_silent and not any(observer.received_any for observer in observers.values()):
-        message = f"no message was recorded on {names_of(observers)} in {path}"
-        help_ = (
-            "was the robot running? /tf_static is sent once: record it with durability"
-            " transient_local"
-        )
-        reject([finding("TF811", message, None, help=help_)])
-
-
 def from_bag(read: Callable[[], T]) -> T:
     """Return what is read from a bag.
 
@@ -97,41 +81,62 @@ def from_bag(read: Callable[[], T]) -> T:
         reject([finding("TF907", str(error), None, help=error.help)], UNREADABLE)
 
 
+def observed(  # noqa: PLR0913 (all but two are named)
+    name: str,
+    pairs: Iterable[Topics],
+    *,
+    bag: str | None,
+    ros: RosSettings | None = None,
+    duration_s: float | None = None,
+    may_be_silent: bool = False,
+    joint_topics: Iterable[str] = (),
+) -> dict[Topics, TreeObserver]:
+    """Return what was observed on pairs of topics (moving, fixed), as ``observe`` does."""
+    settle_s = 0.0 if bag else SETTLE_S
+    observers = {pair: TreeObserver(settle_s=settle_s) for pair in pairs}
+    observe(
+        name,
+        observers,
+        bag=bag,
+        ros=ros,
+        duration_s=duration_s,
+        may_be_silent=may_be_silent,
+        joint_topics=joint_topics,
+    )
+    return observers
+
+
 def observe(  # noqa: PLR0913 (all but two are named)
     name: str,
     observers: Mapping[Topics, TreeObserver],
     *,
+    bag: str | None = None,
     ros: RosSettings | None = None,
-    duration_s: float | None,
+    duration_s: float | None = None,
     every_s: float = 1.0,
     show: Callable[[], object] | None = None,
     may_be_silent: bool = False,
+    joint_topics: Iterable[str] = (),
 ) -> None:
-    """Fill the observers from the running system, until the time is over or a signal comes.
+    """Fill the observers from a bag, or else from the running system.
 
-    ``show`` is called as by ``listen``.
+    That is until the time is over or a signal comes. ``show`` is called ``every_s``; who sends
+    joint states is observed on the ``joint_topics``.
 
     Raises:
         SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
     """
-    alone = set_up_ros(ros, zenoh_alone=True)
-    elsewhere: tuple[str, ...] = ()
+    if bag:
+        from_bag(lambda: follow(BagFeed(bag, observers), Stop()))
+        if not may_be_silent and not any(one.received_any for one in observers.values()):
+            _reject_silent_bag(bag, list(observers))
+        return
+    feed = _live_feed(name, observers, ros, joint_topics)
     with Stop() as stop:
         try:
-            if alone:
-                from tfcompose.tf.live.zenoh_listener import listen_on_zenoh
-
-                seconds = listen_on_zenoh(
-                    observers, stop, duration_s=duration_s, every_s=every_s, show=show
-                )
-            else:
-                from tfcompose.tf.live.listener import (
-                    listen,  # rclpy reads the environment when it is loaded
-                )
-
-                seconds, elsewhere = listen(
-                    name, observers, stop, duration_s=duration_s, every_s=every_s, show=show
-                )
+            with feed:
+                seconds = follow(feed, stop, duration_s=duration_s, every_s=every_s, show=show)
+                elsewhere = feed.elsewhere()
         except RosError as error:
             reject([finding("TF901", str(error), None)])
         heard = any(observer.received_any for observer in observers.values())
@@ -139,6 +144,22 @@ def observe(  # noqa: PLR0913 (all but two are named)
             check_early_end(seconds, duration_s, heard=heard)
     if not heard and not may_be_silent:
         _reject_silence(list(observers), seconds, elsewhere)
+
+
+def _live_feed(
+    name: str,
+    observers: Mapping[Topics, TreeObserver],
+    ros: RosSettings | None,
+    joint_topics: Iterable[str],
+) -> Feed:
+    """Return the feed that this process can have, set up as the plan says."""
+    if set_up_ros(ros, zenoh_alone=True):
+        from tfcompose.tf.live.zenoh_feed import ZenohFeed
+
+        return ZenohFeed(observers)
+    from tfcompose.tf.live.ros_feed import RosFeed  # rclpy reads the environment when loaded
+
+    return RosFeed(name, observers, joint_topics)
 
 
 def set_up_ros(ros: RosSettings | None = None, *, zenoh_alone: bool = False) -> bool:
@@ -172,6 +193,14 @@ def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) ->
         fail(f"ended by a signal after {seconds:.1f} s, before any message came", INTERRUPTED)
     if duration_s is not None:
         warn(f"listened for only {seconds:.1f} s, too short to find every publisher")
+
+
+def _reject_silent_bag(bag: str, topics: Sequence[Topics]) -> None:
+    message = f"no message was recorded on {names_of(topics)} in {bag}"
+    help_ = (
+        "was the robot running? /tf_static is sent once: record it with durability transient_local"
+    )
+    reject([finding("TF811", message, None, help=help_)])
 
 
 def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:

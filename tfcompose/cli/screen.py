@@ -50,10 +50,10 @@ class Rows:
             return ""
         up = f"\033[{len(before) - 1}A" if len(before) > 1 else ""
         kept = [*before, *[""] * (len(rows) - len(before))]
-        lines = [  # cleared before it is written: behind a full row the cursor stands on it
-            "" if row == old else f"{CLEAR_LINE}{row}"
-            for row, old in zip(rows, kept, strict=False)
-        ]
+        lines = [""] * len(rows)
+        for number, row in enumerate(rows):
+            if row != kept[number]:  # cleared first: behind a full row the cursor stands on it
+                lines[number] = f"{CLEAR_LINE}{row}"
         below = _CLEAR_BELOW if len(rows) < len(before) else ""
         return up + "\n".join(lines) + below
 

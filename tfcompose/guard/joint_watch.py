@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.guard.verdict.joints import planned_joints, sent_twice, unknown_joints
 from tfcompose.model.messages import FindingShown, RecoveredShown
-from tfcompose.model.plan.topics import joint_states_topic
+from tfcompose.model.plan.topics import joint_states_topics
 from tfcompose.tf.live.joint_states import JointStates
 from tfcompose.tf.ros.clock import wall_ns
 
@@ -34,10 +34,7 @@ class JointWatch:
     """Judges the topics from which a plan's publishers take joint states."""
 
     def __init__(self, node: Node, plan: Plan, emit: Callable[[GuardEvent], None]) -> None:
-        names = dict.fromkeys(
-            joint_states_topic(plan, edge) for edge in plan.edges if edge.kind == "joint"
-        )
-        self._topics = [JointStates(node, name) for name in names]
+        self._topics = [JointStates(node, name) for name in joint_states_topics(plan)]
         self._joints = planned_joints(plan)
         self._emit = emit
         self._due = 0.0

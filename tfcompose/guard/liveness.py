@@ -24,7 +24,6 @@ from tfcompose.model.messages import (
     RecoveredShown,
     TreeComplete,
 )
-from tfcompose.model.plan import SLOW_BELOW
 from tfcompose.tf.live.arrivals import Arrivals
 
 if TYPE_CHECKING:
@@ -38,8 +37,6 @@ if TYPE_CHECKING:
 WINDOW_S = 2.0
 WINDOW_PERIODS = 8.0
 STRETCH = 0.6
-#: A rate is fast enough again above this part of what is declared.
-FAST_AGAIN_ABOVE = 0.9
 #: For so many combinations of edges their tracks are remembered.
 MOST_MESSAGES = 1000
 #: So many edges one event names: a line of it is shorter than what a pipe's reader takes.
@@ -470,13 +467,11 @@ def _change(track: Track, watched: float, speed: float) -> str | None:
         track.silent = track.slow = False
         track.forget()
         return "back"
-    rate, wanted = track.rate(), speed * (track.edge.rate or 0.0)
+    rate = track.rate()
     if rate is None:
         return None
-    if not track.slow and rate < SLOW_BELOW * wanted:
-        track.slow = True
-        return "slow"
-    if track.slow and not track.silent and rate > FAST_AGAIN_ABOVE * wanted:
-        track.slow = False
-        return "fast"
-    return None
+    is_slow = track.edge.is_slow(rate, speed, was_slow=track.slow)
+    if is_slow == track.slow or (track.slow and track.silent):
+        return None
+    track.slow = is_slow
+    return "slow" if is_slow else "fast"

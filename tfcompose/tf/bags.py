@@ -21,7 +21,10 @@ from tfcompose.tf.tf2.pose_buffer import CACHE_NS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from typing_extensions import Self
+
     from tfcompose.foundation.geometry import Pose
+    from tfcompose.foundation.signals import Stop
     from tfcompose.tf.live.edges import TreeObserver
     from tfcompose.tf.live.pose_query import OnPose, PoseQuery
     from tfcompose.tf.ros.tf_codec import Row
@@ -142,28 +145,59 @@ class Recording:
                 self._clock_ns = seconds * _SECOND_NS + nanoseconds
 
 
-def observe_bag(path: str, observers: Mapping[Topics, TreeObserver]) -> None:
-    """Feed a bag's messages to the observers of these topics, and note when it ends.
+class BagFeed:
+    """Feeds a bag's messages to the observers of pairs of topics (moving, fixed).
+
+    Topics may be missing as long as some are there.
 
     Raises:
-        BagError: as ``Recording`` does; topics may be missing as long as some are there.
+        BagError: if there is no bag.
     """
-    recording = Recording(path)
-    for each in recording.messages(*observers):
-        observer = observers[each.topics]
-        if each.rows is None:
-            observer.take_malformed(None)
-        else:
-            clock_ns = nearer_clock(each.rows, each.received_ns, each.clock_ns, static=each.static)
-            observer.take(
-                each.rows,
-                static=each.static,
-                gid=None,
-                received_ns=each.received_ns,
-                clock_ns=clock_ns,
-            )
-    for observer in observers.values():
-        observer.end_ns = recording.end_ns
+
+    def __init__(self, path: str, observers: Mapping[Topics, TreeObserver]) -> None:
+        self._recording = Recording(path)
+        self._observers = observers
+
+    def __enter__(self) -> Self:
+        """Begin; files are opened as they are read."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+
+    def take(self, timeout_s: float, stop: Stop) -> bool:
+        """Put all of the bag into the observers, and note when it ends.
+
+        Return that no more comes.
+
+        Raises:
+            BagError: if the bag cannot be read.
+        """
+        del timeout_s
+        for each in self._recording.messages(*self._observers):
+            observer = self._observers[each.topics]
+            if each.rows is None:
+                observer.take_malformed(None)
+            else:
+                clock_ns = nearer_clock(
+                    each.rows, each.received_ns, each.clock_ns, static=each.static
+                )
+                observer.take(
+                    each.rows,
+                    static=each.static,
+                    gid=None,
+                    received_ns=each.received_ns,
+                    clock_ns=clock_ns,
+                )
+            if stop.requested:
+                break
+        for observer in self._observers.values():
+            observer.end_ns = self._recording.end_ns
+        return False
+
+    def elsewhere(self) -> tuple[str, ...]:
+        """Return no topics: a bag with TF on others only is refused with their names."""
+        return ()
 
 
 def echo_bag(path: str, query: PoseQuery, on_pose: OnPose) -> NoPose | None:

@@ -5,7 +5,8 @@ import pytest
 from tests.support.tree_history import SECOND_NS, sound_tree
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.joints import sent_twice, unknown_joints
-from tfcompose.tf.live.state import MovingJoint, SentJoints, TopicState
+from tfcompose.tf.live.sent_joints import SentJoints
+from tfcompose.tf.live.state import MovingJoint, TopicState
 
 TOPIC = "/joint_states"
 

@@ -36,6 +36,7 @@ from tfcompose.model.plan import (
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tf.live.edges import TreeObserver
 from tfcompose.tf.live.publishers import Publisher
+from tfcompose.tf.live.sent_joints import SentJoints
 from tfcompose.tf.live.state import NAMELESS
 
 S = 10**9
@@ -170,6 +171,16 @@ def test_the_stamps_of_simulated_time_are_not_judged(plan: Plan, tree: Tree) -> 
 def test_a_loop_is_reported_of_the_tree(plan: Plan, tree: Tree) -> None:
     tree.sent["odom"] = {"parent": "laser", "node": OTHER, "rate": 10.0}
     assert "TF820" in {one.code for one in tree.reported(plan)}
+
+
+def test_two_senders_of_a_joint_and_an_unknown_joint_are_reported_once(
+    plan: Plan, tree: Tree
+) -> None:
+    tree.observer.sent_joints = (
+        SentJoints("/joint_states", "/arm", frozenset({"wheel_joint"}), 0, 10 * S),
+        SentJoints("/joint_states", OTHER, frozenset({"wheel_joint", "weel"}), 0, 10 * S),
+    )
+    assert [one.code for one in tree.reported(plan)] == ["TF860", "TF861"]
 
 
 #: What is sent of a frame otherwise than planned, None: nothing; and what the finding is and

@@ -17,7 +17,8 @@ from tfcompose.guard.verdict.doctor import examine
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live import snapshot
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
-from tfcompose.tf.live.listener import listen
+from tfcompose.tf.live.feed import follow
+from tfcompose.tf.live.ros_feed import RosFeed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -57,7 +58,8 @@ def test_a_doctor_that_scans_processes_for_long_blames_nobody(
 def test_an_observer_that_is_read_late_blames_nobody() -> None:
     def is_fine(_: int) -> bool:
         observer = TreeObserver(settle_s=SETTLE_S)
-        listen("late", {GLOBAL: observer}, Stop(), duration_s=3.0)
+        with RosFeed("late", {GLOBAL: observer}) as feed:
+            follow(feed, Stop(), duration_s=3.0)
         time.sleep(DELAY_S)
         edges = observer.edges(observer.until_ns)
         return bool(edges) and all(edge.age_s < DELAY_S / 2 for edge in edges)

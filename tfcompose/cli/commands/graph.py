@@ -161,21 +161,16 @@ def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
 
 def _published_graph(arguments: Namespace) -> Graph:
     """Return the published tree as a graph."""
-    from tfcompose.cli.live import observe, observed_topics, read_bag
-    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+    from tfcompose.cli.live import observed, observed_topics
 
     plan, pairs = observed_topics(arguments)
-    settle_s = 0.0 if arguments.bag else SETTLE_S
-    observers = {pair: TreeObserver(settle_s=settle_s) for pair in pairs}
-    if arguments.bag:
-        read_bag(arguments.bag, observers)
-    else:
-        observe(
-            "tfcompose_graph",
-            observers,
-            ros=plan.ros if plan else None,
-            duration_s=arguments.duration,
-        )
+    observers = observed(
+        "tfcompose_graph",
+        pairs,
+        bag=arguments.bag,
+        ros=plan.ros if plan else None,
+        duration_s=arguments.duration,
+    )
     title = arguments.bag or (plan.robot if plan else pairs[0][0])
     return graph_of_observers(list(observers.values()), title, plan, poses=arguments.poses)
 

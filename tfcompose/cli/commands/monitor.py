@@ -52,7 +52,7 @@ def run(arguments: Namespace) -> int:
 
     Exit code 1 if no TF came, or no chain from A to B is there, 2 for a bad bag.
     """
-    from tfcompose.cli.live import observe, read_bag
+    from tfcompose.cli.live import observe
     from tfcompose.cli.screen import LiveLines
     from tfcompose.model.plan.topics import topics_below
     from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
@@ -68,7 +68,7 @@ def run(arguments: Namespace) -> int:
     observer = TreeObserver(0.0 if covers_all else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
     table = _Table(observer, topics, frames, as_json=arguments.format == "json")
     if arguments.bag:
-        read_bag(arguments.bag, {topics: observer})
+        observe("tfcompose_monitor", {topics: observer}, bag=arguments.bag)
         return table.show(None)
     lines = (
         LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None

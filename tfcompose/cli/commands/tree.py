@@ -132,23 +132,19 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
 
 def _print_published(arguments: Namespace) -> None:
     from tfcompose.cli.edge_table import not_kept
-    from tfcompose.cli.live import observe, observed_topics, read_bag
+    from tfcompose.cli.live import observed, observed_topics
     from tfcompose.model.plan.topics import parts_of
-    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver, forest
+    from tfcompose.tf.live.edges import forest
 
     plan, pairs = observed_topics(arguments)
     parts = parts_of(plan) if plan else {}
-    settle_s = 0.0 if arguments.bag else SETTLE_S
-    observers = {pair: TreeObserver(settle_s=settle_s) for pair in pairs}
-    if arguments.bag:
-        read_bag(arguments.bag, observers)
-    else:
-        observe(
-            "tfcompose_tree",
-            observers,
-            ros=plan.ros if plan else None,
-            duration_s=arguments.duration,
-        )
+    observers = observed(
+        "tfcompose_tree",
+        pairs,
+        bag=arguments.bag,
+        ros=plan.ros if plan else None,
+        duration_s=arguments.duration,
+    )
     for pair, observer in observers.items():
         planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
         trees = forest(observer.edges(observer.until_ns), planned)

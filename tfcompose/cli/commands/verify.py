@@ -64,11 +64,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
-    from tfcompose.cli.live import observe, read_bag, refuse_live_bag
+    from tfcompose.cli.live import observed, refuse_live_bag
     from tfcompose.cli.plans import expected_plan
     from tfcompose.guard.verdict.verify import verify
-    from tfcompose.model.plan.topics import parts_of
-    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+    from tfcompose.model.plan.topics import joint_states_topics, parts_of
 
     refuse_live_bag(arguments)
     settle_duration(arguments, 5.0, is_live=not arguments.bag)
@@ -76,21 +75,18 @@ def run(arguments: Namespace) -> int:
         arguments.file or DEFAULT_FILE, arguments
     )
     other = other_plan(arguments, plan)
-    settle_s = 0.0 if arguments.bag else SETTLE_S
-    observers = {topics: TreeObserver(settle_s=settle_s) for topics in parts_of(plan)}
     # Programs get each missing edge; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()
-    if arguments.bag:
-        read_bag(arguments.bag, observers, may_be_silent=may_be_silent)
-    else:
-        observe(
-            "tfcompose_verify",
-            observers,
-            ros=plan.ros,
-            duration_s=arguments.duration,
-            may_be_silent=may_be_silent,
-        )
+    observers = observed(
+        "tfcompose_verify",
+        parts_of(plan),
+        bag=arguments.bag,
+        ros=plan.ros,
+        duration_s=arguments.duration,
+        may_be_silent=may_be_silent,
+        joint_topics=joint_states_topics(plan),
+    )
     seconds = time.monotonic() - begun
     verdicts = verify(plan, observers, arguments.tolerance, places)
     if other:

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from tfcompose.model.plan import Plan
-    from tfcompose.tf.live.state import SentJoints, TopicState, TreeState
+    from tfcompose.tf.live.sent_joints import SentJoints
+    from tfcompose.tf.live.state import TopicState, TreeState
 
 _NAMED_AT_MOST = 8
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.text import duration, listed, with_more
-from tfcompose.model.plan import SILENT_AT_LEAST_S, SILENT_PERIODS
+from tfcompose.model.plan import silent_after_s
 from tfcompose.tf.live.arrivals import KEPT_NS
 from tfcompose.tf.live.state import who
 
@@ -258,7 +258,7 @@ def is_silent(edge: EdgeState) -> bool:
     count = edge.stream.arrivals.count
     span_s = (edge.stream.arrivals.last_ns - edge.stream.first_ns) / 1e9
     period_s = span_s / (count - 1) if count >= FEWEST else float("inf")
-    return edge.age_s > max(SILENT_AT_LEAST_S, SILENT_PERIODS * period_s)
+    return edge.age_s > silent_after_s(period_s)
 
 
 def _has_gap(edge: EdgeState) -> bool:

@@ -28,12 +28,12 @@ from tfcompose.guard.verdict.drivers import (
     is_off,
 )
 from tfcompose.guard.verdict.faults import SELF, Fault, fault_finding, group_of, sensor_of
+from tfcompose.guard.verdict.joints import planned_joints, sent_twice, unknown_joints
 from tfcompose.guard.verdict.ownership import code_of, may_be_owners, relays_of
 from tfcompose.guard.verdict.publishers import SAME_POSE, flooded, pose_differs, volatile_static
 from tfcompose.guard.verdict.rates import left, never_received, silent, slow
 from tfcompose.guard.verdict.stamps import stamp_repeated, stamps_ahead, wrong_clock
 from tfcompose.guard.verdict.tree import loop, rejected_transforms
-from tfcompose.model.plan import SLOW_BELOW
 from tfcompose.model.plan.stock import stand_ins
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tf.live.arrivals import KEPT_NS
@@ -250,7 +250,7 @@ def _times(edge: PlanEdge, one: EdgeState, *, simulated: bool) -> Iterator[Diffe
     elif (
         observed_rate is not None
         and one.stream.arrivals.count >= FEWEST
-        and observed_rate < SLOW_BELOW * rate * speed
+        and edge.is_slow(observed_rate, speed)
     ):
         yield Difference("TF805", edge, one)
 
@@ -458,8 +458,15 @@ def verify(
         # An edge that its owner hands over has one parent after the other, and closes no loop.
         switched = {edge.child for edge in part.edges if edge.switched}
         lasting = tuple(edge for edge in state.edges if edge.child not in switched)
-        in_all = *flooded(state), *loop(replace(state, edges=lasting)), *volatile_static(state)
+        in_all = (
+            *flooded(state),
+            *loop(replace(state, edges=lasting)),
+            *volatile_static(state),
+        )
         extra += [Verdict(listed(state.topics), "", (one,)) for one in in_all]
+    sent = list(dict.fromkeys(one for each in observers.values() for one in each.sent_joints))
+    of_joints = (*sent_twice(sent), *unknown_joints(sent, planned_joints(plan)))
+    extra += [Verdict(listed({each.topic for each in sent}), "", (one,)) for one in of_joints]
     return [
         *(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges),
         *extra,

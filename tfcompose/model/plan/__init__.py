@@ -9,9 +9,6 @@ messages too.
 from tfcompose.model.plan.plan import (
     DESCRIPTION,
     PROGRAM,
-    SILENT_AT_LEAST_S,
-    SILENT_PERIODS,
-    SLOW_BELOW,
     STOCK_DESCRIPTION,
     VERSION,
     Clock,
@@ -57,15 +54,13 @@ from tfcompose.model.plan.plan import (
     Sweep,
     UnknownEdges,
     known_at_launch,
+    silent_after_s,
     switch_text,
 )
 
 __all__ = [
     "DESCRIPTION",
     "PROGRAM",
-    "SILENT_AT_LEAST_S",
-    "SILENT_PERIODS",
-    "SLOW_BELOW",
     "STOCK_DESCRIPTION",
     "VERSION",
     "Clock",
@@ -111,5 +106,6 @@ __all__ = [
     "Sweep",
     "UnknownEdges",
     "known_at_launch",
+    "silent_after_s",
     "switch_text",
 ]

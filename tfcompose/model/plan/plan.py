@@ -75,12 +75,17 @@ FenceWay = Literal["auto", "partition", "remap"]
 
 
 #: An edge is silent after four periods, and never before this: what a loaded machine can delay.
-SILENT_AT_LEAST_S = 0.6
-SILENT_PERIODS = 4.0
-#: It is too slow below this part of the rate that is declared.
-SLOW_BELOW = 0.8
+_SILENT_AT_LEAST_S = 0.6
+_SILENT_PERIODS = 4.0
+#: It is too slow below this part of the rate that is declared, and from then on up to that one.
+_SLOW_BELOW, _SLOW_UP_TO = 0.8, 0.9
 #: How often a process is started again in a row, unless it says so itself.
 MAX_RESTARTS = 5
+
+
+def silent_after_s(period_s: float) -> float:
+    """Return how long an edge that comes every ``period_s`` seconds may be quiet."""
+    return max(_SILENT_AT_LEAST_S, _SILENT_PERIODS * period_s)
 
 
 #: A time or rate.
@@ -151,7 +156,15 @@ class PlanEdge:
         """How long a moving edge may be quiet, in seconds, or None if it says no rate."""
         if not self.rate or self.kind == "static":
             return None
-        return max(SILENT_AT_LEAST_S, SILENT_PERIODS / self.rate)
+        return silent_after_s(1 / self.rate)
+
+    def is_slow(self, rate: float, speed: float, *, was_slow: bool = False) -> bool:
+        """Return whether it comes too seldom, at ``rate`` in hertz.
+
+        Time goes by ``speed`` times as fast as the time of day, as in a simulation.
+        """
+        share = _SLOW_UP_TO if was_slow else _SLOW_BELOW
+        return rate < share * speed * (self.rate or 0.0)
 
     def may_hang_on(self, parent: str) -> bool:
         """Return whether the owner may publish the child below this parent."""

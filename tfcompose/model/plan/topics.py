@@ -69,6 +69,12 @@ def joint_states_topic(plan: Plan, edge: PlanEdge) -> str:
     return posixpath.join(posixpath.dirname(edge.node), remap.get(name, remap.get(topic, topic)))
 
 
+def joint_states_topics(plan: Plan) -> list[str]:
+    """Return the topics on which the plan's owners hear joint states, each once."""
+    edges = [edge for edge in plan.edges if edge.kind == "joint"]
+    return list(dict.fromkeys(joint_states_topic(plan, edge) for edge in edges))
+
+
 def partition_of(plan: Plan) -> str:
     """Return the partition that the plan's processes send TF in.
 

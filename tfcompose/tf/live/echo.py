@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.tf.live.flood import EdgeBounds, ReadingTime
-from tfcompose.tf.live.listener import tf_elsewhere
 from tfcompose.tf.live.pose_query import NoPose
+from tfcompose.tf.live.ros_feed import tf_elsewhere
 from tfcompose.tf.live.topics import TFTopics
 from tfcompose.tf.ros.clock import SimClock
 from tfcompose.tf.ros.graph import topics

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from tfcompose.model.plan import PlanEdge
+    from tfcompose.tf.live.sent_joints import SentJoints
     from tfcompose.tf.ros.tf_codec import Row
 
 
@@ -258,7 +259,8 @@ class TreeObserver:
     ``window_s`` is the stretch of time to which rates, jitter, gaps and delays refer (one to two
     of them); 0: all. Of the first ``settle_s`` of each edge they take nothing. ``end_ns`` is when
     a recording ended, of any topic; 0 for a running tree, of which ``observed_ns`` says when what
-    had come was taken last. ``nodes`` are the names of all nodes in the graph. ``beyond`` counts
+    had come was taken last. ``nodes`` are the names of all nodes in the graph, ``sent_joints`` who
+    sent joint states, where that is observed. ``beyond`` counts
     the transforms of edges that are not kept, by their publisher's id: so many edges of one
     publisher, and of all together, are.
     """
@@ -275,6 +277,7 @@ class TreeObserver:
     malformed: dict[bytes | None, int] = field(default_factory=dict)
     publishers: Publishers = field(default_factory=Publishers)
     nodes: tuple[str, ...] = ()
+    sent_joints: tuple[SentJoints, ...] = ()
     _streams: dict[tuple[str, str, bytes | None, bool], EdgeStream] = field(default_factory=dict)
     _counts: dict[bytes, int] = field(default_factory=dict)
     _handovers: dict[tuple[str, bytes], Handover] = field(default_factory=dict)

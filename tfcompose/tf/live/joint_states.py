@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from tfcompose.tf.live.state import SentJoints
+from tfcompose.tf.live.sent_joints import SentJoints
 from tfcompose.tf.ros.clock import wall_ns
 from tfcompose.tf.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.tf.ros.joint_codec import read_names

@@ -7,27 +7,26 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 from xml.parsers import expat
 
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+from tfcompose.tf.live.feed import follow
 from tfcompose.tf.live.joint_states import JointStates
-from tfcompose.tf.live.listener import LAST_WAIT_S, TreeListener
+from tfcompose.tf.live.ros_feed import RosFeed
 from tfcompose.tf.live.state import (
     MovingJoint,
     RosProcess,
-    SentJoints,
     StampedData,
     TopicState,
     TreeState,
 )
-from tfcompose.tf.ros.clock import wall_ns
 from tfcompose.tf.ros.environment import RMW
 from tfcompose.tf.ros.graph import ends, nodes, topics, volatile_readers
 from tfcompose.tf.ros.joint_codec import JOINT_STATE_TYPE
-from tfcompose.tf.ros.node import LATCHED, TextSubscription, middleware, open_node
+from tfcompose.tf.ros.node import LATCHED, TextSubscription, middleware
 from tfcompose.tf.ros.processes import ros_processes, settings_in
 from tfcompose.tf.ros.sensor_data import (
     HEADED,
@@ -41,7 +40,8 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.signals import Stop
     from tfcompose.model.plan import Plan
-    from tfcompose.tf.live.topics import TFData
+    from tfcompose.tf.live.ros_feed import TreeListener
+    from tfcompose.tf.live.sent_joints import SentJoints
 
     Topics = tuple[str, str]
 
@@ -215,25 +215,33 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
     Raises:
         RosError: if ROS cannot start a node, or take messages.
     """
-    with open_node("tfcompose_doctor", "") as node:
-        views = [_TopicPair(node, pair) for pair in expected]
+    observers = {pair: TreeObserver(0.0, SETTLE_S) for pair in expected}
+    with RosFeed("tfcompose_doctor", observers) as feed:
+        node = feed.node
+        views = [_TopicPair(listener) for listener in feed.listeners]
         graph: dict[str, TopicState] = {}
         robot = _robot_nodes(expected.values())
-        due = begun = time.monotonic()  # a slow machine may take seconds until it listens
-        while not stop.requested and (now := time.monotonic()) < begun + seconds:
+        due = 0.0
+
+        def scan() -> None:
+            """Take what came besides TF, and from time to time who is there."""
+            nonlocal due
             for view in views:
-                view.listen(min(WAIT_S, begun + seconds - now), stop)
-            if now >= due:
-                due = now + ASK_EVERY_S
-                graph |= topics_in(node, robot)
+                view.take()
+            if time.monotonic() >= due:
+                due = time.monotonic() + ASK_EVERY_S
+                graph.update(topics_in(node, robot))
                 for view in views:
                     view.sensors.subscribe(graph.values(), _robots_inside(view, graph))
+
+        scan()
+        listened_s = follow(feed, stop, duration_s=seconds, every_s=WAIT_S, show=scan)
         for view in views:
-            view.listen(LAST_WAIT_S, stop)  # what came while this process was kept from looking
+            view.take()
         # The newest counts, but what was seen before is not forgotten.
         graph |= topics_in(node, robot)
         common = TreeState(
-            time.monotonic() - begun,
+            listened_s,
             nodes=tuple(name for name in nodes(node) if not _is_tool(name, robot)),
             graph=tuple(graph.values()),
             settings=own_settings(),
@@ -245,63 +253,43 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
         ]
 
 
-@dataclass(slots=True)
 class _TopicPair:
     """What is observed on one pair of topics, and below its namespace."""
 
-    node: Node
-    topics: Topics
-    observer: TreeObserver = field(default_factory=lambda: TreeObserver(0.0, SETTLE_S))
-    skews_s: dict[bytes, float] = field(default_factory=dict)
-    clock: tuple[int | None, float] = (
-        None,
-        0.0,
-    )  # the newest, and when it moved, of the monotonic clock; 0: not yet
-    observed: float = 0.0  # when what had come was taken last, of the monotonic clock
-    listener: TreeListener = field(init=False)
-    sensors: SensorTopics = field(init=False)
+    def __init__(self, listener: TreeListener) -> None:
+        self.listener = listener
+        self.topics = listener.topics
+        self.namespace = self.topics[0].removesuffix("/tf")
+        self.sensors = SensorTopics(listener.node, self.namespace)
+        #: The newest time on /clock, and when it moved, of the monotonic clock; 0: not yet.
+        self._clock: tuple[int | None, float] = (None, 0.0)
+        self._taken_at = 0.0
 
-    def __post_init__(self) -> None:
-        self.listener = TreeListener(self.node, self.observer, self.topics)
-        self.sensors = SensorTopics(self.node, self.namespace)
-
-    @property
-    def namespace(self) -> str:
-        return self.topics[0].removesuffix("/tf")
-
-    def listen(self, timeout_s: float, stop: Stop) -> None:
-        for data in self.listener.listen(timeout_s, stop):
-            self._compare_clocks(data)
-        clock_ns, self.observed = self.listener.clock_ns, time.monotonic()
-        if clock_ns != self.clock[0]:
-            self.clock = (clock_ns, 0.0 if self.clock[0] is None else self.observed)
+    def take(self) -> None:
+        """Take what has come besides TF."""
+        clock_ns, self._taken_at = self.listener.clock_ns, time.monotonic()
+        if clock_ns != self._clock[0]:
+            self._clock = (clock_ns, 0.0 if self._clock[0] is None else self._taken_at)
         self.sensors.take(clock_ns)
 
-    def _compare_clocks(self, data: TFData) -> None:
-        """Note by how much the sender's clock is ahead at least: a latched message may be old."""
-        received = data.received
-        if received.gid is None or data.static or not received.source_ns:
-            return
-        ahead_s = (received.source_ns - (received.received_ns or wall_ns())) / 1e9
-        self.skews_s[received.gid] = max(ahead_s, self.skews_s.get(received.gid, ahead_s))
-
     def state(self, common: TreeState) -> TreeState:
+        observer = self.listener.observer
         return replace(
             common,
             topics=self.topics,
-            edges=tuple(self.observer.edges(self.observer.until_ns)),
+            edges=tuple(observer.edges(observer.until_ns)),
             publishers=tuple(self.listener.graph.publishers()),
             volatile_readers=tuple(
                 name
-                for name in volatile_readers(self.node, self.topics[1])
+                for name in volatile_readers(self.listener.node, self.topics[1])
                 if not name.startswith(TOOLS)
             ),
-            malformed=dict(self.observer.malformed),
-            beyond=dict(self.observer.beyond),
-            sent=dict(self.observer.sent),
+            malformed=dict(observer.malformed),
+            beyond=dict(observer.beyond),
+            sent=dict(observer.sent),
             clock_ns=self.listener.clock_ns,
-            clock_moves=self.clock[1] > self.observed - CLOCK_STANDS_S,
-            skews_s=self.skews_s,
+            clock_moves=self._clock[1] > self._taken_at - CLOCK_STANDS_S,
+            skews_s=self.listener.skews_s,
             stamped=self.sensors.stamped(),
             moving_joints=self.sensors.moving_joints,
             sent_joints=self.sensors.sent_joints(),

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tfcompose.model.plan import Plan
     from tfcompose.tf.live.edges import EdgeState, Traffic
     from tfcompose.tf.live.publishers import Publisher
+    from tfcompose.tf.live.sent_joints import SentJoints
 
 #: How a publisher is called whose node has no name.
 NAMELESS = "a publisher without a node name"
@@ -59,21 +60,6 @@ class MovingJoint:
     parent: str
     child: str
     mimic: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class SentJoints:
-    """The joints that a publisher of joint states sent on a topic.
-
-    ``node`` is its full name, empty while that is not known. ``first_ns`` and ``last_ns`` are when
-    its first and newest message came, in nanoseconds of the system's clock.
-    """
-
-    topic: str
-    node: str
-    joints: frozenset[str]
-    first_ns: int = 0
-    last_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

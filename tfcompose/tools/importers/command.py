@@ -241,29 +241,28 @@ def _add_vehicles(draft: Draft, arguments: Namespace) -> None:
 def _import_observed(arguments: Namespace) -> int:
     """Import what is published, or was recorded."""
     from tfcompose.cli.compiling import library
-    from tfcompose.cli.live import observe, read_bag
+    from tfcompose.cli.live import observed
     from tfcompose.model.plan.topics import topics_below
-    from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
     from tfcompose.tf.ros.processes import words_of
     from tfcompose.tools.importers.draft import Draft, robot_name
     from tfcompose.tools.importers.observed import Observed
 
-    observer = TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S)
     topics = topics_below(arguments.namespace)
+    observer = observed(
+        "tfcompose_import", [topics], bag=arguments.bag, duration_s=arguments.duration
+    )[topics]
     if arguments.bag:
-        read_bag(arguments.bag, {topics: observer})
         name = Path(arguments.bag).stem
         head = f"imported from the recording {name} by tfcompose"
     else:
-        observe("tfcompose_import", {topics: observer}, duration_s=arguments.duration)
         name, head = "robot", "imported from a running robot by tfcompose"
     draft = Draft(arguments.robot or robot_name(name), [head])
     if arguments.namespace:
         draft.sections["ros"] |= {"namespace": arguments.namespace, "isolate": "topics"}
-    observed = Observed(draft, observer.publishers.where, words_of, arguments.namespace)
-    observed.add(observer.edges(observer.until_ns))
+    tree = Observed(draft, observer.publishers.where, words_of, arguments.namespace)
+    tree.add(observer.edges(observer.until_ns))
     if not arguments.no_sensors:
-        observed.recognise(library())
+        tree.recognise(library())
     return _finish(draft, arguments)
 
 

@@ -14,10 +14,12 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation.signals import Stop
 from tfcompose.foundation.text import duration
 from tfcompose.guard.verdict.verify import state_of
-from tfcompose.tf.bags import observe_bag
+from tfcompose.tf.bags import BagFeed
 from tfcompose.tf.live.edges import TreeObserver
+from tfcompose.tf.live.feed import follow
 from tfcompose.tf.tf2.exceptions import rejection_of
 from tfcompose.tools.view.judgement import Judgement, PlanJudge
 from tfcompose.tools.view.picture import ShownTree
@@ -100,7 +102,7 @@ class Recorded:
 
     def __init__(self, path: str, topics: Iterable[Topics]) -> None:
         self.observers = {pair: RecordingObserver() for pair in topics}
-        observe_bag(path, self.observers)
+        follow(BagFeed(path, self.observers), Stop())
         begins = [one.begun_ns for one in self.observers.values() if one.begun_ns]
         self.begin_ns = min(begins, default=0)
         self.end_ns = max((one.last_ns for one in self.observers.values()), default=0)

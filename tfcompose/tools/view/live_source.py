@@ -18,6 +18,7 @@ from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of
 from tfcompose.model.messages import RobotStatus, StatusRequest
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver
+from tfcompose.tf.live.feed import follow
 from tfcompose.tf.live.state import NAMELESS
 from tfcompose.tf.ros.environment import RosError
 from tfcompose.tools.view.joints import JointSender, first_positions, joint_topics
@@ -115,39 +116,30 @@ class LiveSource(SceneSource):
         Raises:
             RosError: if ROS cannot start a node, or take messages.
         """
-        from tfcompose.tf.live.listener import (
-            TreeListener,  # rclpy reads the environment when it is loaded
+        from tfcompose.tf.live.ros_feed import (
+            RosFeed,  # rclpy reads the environment when it is loaded
         )
-        from tfcompose.tf.ros.node import open_node
 
         # A window may close between two looks at which are open: viser warns of what it then gets.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
-        with open_node("tfcompose_view", "") as node:
-            listeners = [
-                TreeListener(node, observer, topics)
-                for topics, observer in self._observers.items()
-            ]
-            begun, show_at = time.monotonic(), 0.0
-            self._follow(windows.session, node)
-            while not stop.requested:
-                for listener in listeners:
-                    listener.listen(_SHOW_EVERY_S / len(listeners), stop)
-                if not listeners:
-                    stop.wait(_SHOW_EVERY_S)
+        with RosFeed("tfcompose_view", self._observers) as feed:
+            begun = time.monotonic()
+            self._follow(windows.session, feed.node)
+
+            def show() -> None:
+                """Show what came, of the files as they are now."""
                 now = time.monotonic()
-                if now < show_at:
-                    continue
-                show_at = now + _SHOW_EVERY_S
                 if changed.is_set():
                     changed.clear()
                     if windows.reload():
-                        self._follow(windows.session, node)
+                        self._follow(windows.session, feed.node)
                 shown = self._open(windows)
                 self._show(shown, now, now - begun)
                 if self.senders:
                     self._take_positions(windows.panels)
-                    clock_ns = next((one.clock_ns for one in listeners), None)
-                    self._send(shown, now, clock_ns, windows.session.robot)
+                    self._send(shown, now, feed.clock_ns, windows.session.robot)
+
+            follow(feed, stop, every_s=_SHOW_EVERY_S, show=show)
             for sender in self.senders:
                 sender.close()
 

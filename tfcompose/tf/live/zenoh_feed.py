@@ -1,4 +1,4 @@
-"""Listens to TF on Zenoh where no ROS has rmw_zenoh, and feeds observers.
+"""Feeds observers from TF on Zenoh, where no ROS has rmw_zenoh.
 
 Liveliness tokens name who sent what.
 """
@@ -15,7 +15,9 @@ from tfcompose.tf.ros.tf_codec import Decoder
 from tfcompose.tf.ros.zenoh_graph import ZenohGraph, ZenohTF, domain_of, open_session
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
+
+    from typing_extensions import Self
 
     from tfcompose.foundation.signals import Stop
     from tfcompose.tf.live.edges import TreeObserver
@@ -23,12 +25,8 @@ if TYPE_CHECKING:
 
     Topics = tuple[str, str]
 
-#: A wait for messages is not longer, so that what is shown is shown in time, and a signal is
-#: followed.
-_WAIT_S = 0.1
 
-
-class ZenohListener:
+class _Listener:
     """Feeds an observer with what comes on a pair of TF topics (moving, fixed)."""
 
     def __init__(
@@ -40,7 +38,7 @@ class ZenohListener:
         self._observer = observer
         self._decoder = Decoder()
 
-    def listen(self, timeout_s: float) -> None:
+    def take(self, timeout_s: float) -> None:
         """Wait for messages, at most so long, and put what has come into the observer."""
         self._data.wait(timeout_s)
         observer = self._observer
@@ -74,39 +72,40 @@ def _publisher(token: TokenOfPublisher, *, static: bool) -> Publisher:
     )
 
 
-def listen_on_zenoh(
-    observers: Mapping[Topics, TreeObserver],
-    stop: Stop,
-    *,
-    duration_s: float | None,
-    every_s: float = 1.0,
-    show: Callable[[], object] | None = None,
-) -> float:
-    """Feed the observers of the topics for some seconds, or until ``stop``.
+class ZenohFeed:
+    """Feeds the observers of pairs of TF topics (moving, fixed) from a session of its own."""
 
-    ``show`` is called ``every_s``. Return for how many seconds it listened.
+    def __init__(self, observers: Mapping[Topics, TreeObserver]) -> None:
+        self._observers = observers
+        self._stack = ExitStack()
 
-    Raises:
-        RosError: if there is no router.
-    """
-    with ExitStack() as stack:
+    def __enter__(self) -> Self:
+        """Open the session.
+
+        Raises:
+            RosError: if there is no router.
+        """
         session = open_session(os.environ)
-        stack.callback(session.close)
+        self._stack.callback(session.close)
         domain = domain_of(os.environ)
         graph = ZenohGraph(session, domain)
-        listeners = []
-        for topics, observer in observers.items():
-            data = ZenohTF(session, domain, topics)
-            listeners.append(ZenohListener(graph, data, topics, observer))
-        begun = time.monotonic()
-        end = float("inf") if duration_s is None else begun + duration_s
-        due = begun + every_s
-        while not stop.requested and (now := time.monotonic()) < end:
-            for listener in listeners:
-                listener.listen(min(_WAIT_S / len(listeners), end - now))
-            if show is not None and time.monotonic() >= due:
-                due = time.monotonic() + every_s
-                show()
-        for listener in listeners:
-            listener.listen(0.0)
-        return time.monotonic() - begun
+        self._listeners = [
+            _Listener(graph, ZenohTF(session, domain, topics), topics, observer)
+            for topics, observer in self._observers.items()
+        ]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the session."""
+        self._stack.close()
+
+    def take(self, timeout_s: float, stop: Stop) -> bool:
+        """Wait for messages, at most so long, and put what has come into the observers."""
+        del stop  # it wakes nobody here
+        for listener in self._listeners:
+            listener.take(timeout_s / len(self._listeners))
+        return True
+
+    def elsewhere(self) -> tuple[str, ...]:
+        """Return no topics: those of others are not known."""
+        return ()

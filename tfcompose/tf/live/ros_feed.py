@@ -1,13 +1,15 @@
-"""Listens to TF topics of the running system, without an executor, and feeds observers."""
+"""Feeds observers from TF topics of the running system, without an executor."""
 
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.tf.live.edges import nearer_clock
 from tfcompose.tf.live.flood import ReadingTime
+from tfcompose.tf.live.joint_states import JointStates
 from tfcompose.tf.live.topics import TFGraph, TFTopics
 from tfcompose.tf.ros.clock import SimClock, wall_ns
 from tfcompose.tf.ros.graph import nodes, topics
@@ -15,24 +17,21 @@ from tfcompose.tf.ros.node import open_node, wait
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE, Decoder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from rclpy.node import Node
+    from typing_extensions import Self
 
     from tfcompose.foundation.signals import Stop
     from tfcompose.tf.live.edges import TreeObserver
     from tfcompose.tf.live.topics import TFData
+    from tfcompose.tf.ros.node import Received
 
     Topics = tuple[str, str]
 
 #: The graph is asked so often, in seconds, and sooner where somebody sends who has no name yet.
 ASK_EVERY_S = 0.5
 ASK_AGAIN_S = 0.02
-#: A wait for messages is not longer, so that what is shown is shown in time.
-_WAIT_S = 0.1
-#: So long the last look waits: where the whole process was kept from running, what came is still
-#: under way in it.
-LAST_WAIT_S = 0.1
 
 
 class TreeListener:
@@ -52,14 +51,16 @@ class TreeListener:
         self._decoder = Decoder()
         self._time = ReadingTime(self._decoder)
         self._requested_at = float("-inf")
+        #: By how much the clock of each publisher is ahead at least, in seconds, by its id.
+        self.skews_s: dict[bytes, float] = {}
 
     @property
     def clock_ns(self) -> int | None:
         """The newest time on /clock in nanoseconds, or None."""
         return self._clock.now_ns()
 
-    def listen(self, timeout_s: float, stop: Stop) -> list[TFData]:
-        """Wait for messages for a bounded time; observe and return those that were read.
+    def take(self, timeout_s: float, stop: Stop) -> None:
+        """Wait for messages for a bounded time, and observe them.
 
         Raises:
             RosError: if ROS cannot take messages.
@@ -67,7 +68,7 @@ class TreeListener:
         wait(self.node, self._data.readers, timeout_s, stop)
         sim_ns, now_ns = self.clock_ns, wall_ns()
         self.observer.observed_ns = now_ns
-        taken: list[TFData] = []
+        senders: set[bytes] = set()
 
         def read(data: TFData) -> None:
             received = data.received
@@ -82,13 +83,20 @@ class TreeListener:
             self.observer.take(
                 rows, static=data.static, gid=received.gid, received_ns=came_ns, clock_ns=clock_ns
             )
-            taken.append(data)
+            if received.gid is not None:
+                senders.add(received.gid)
+                if not data.static:  # a latched message may be old
+                    self._compare_clocks(received.gid, received)
 
         now = time.monotonic()
         for data in list(self._data.take()):
             self._time.read(data.received, partial(read, data), self.observer.floods, now)
-        self._ask_graph({each.received.gid for each in taken if each.received.gid is not None})
-        return taken
+        self._ask_graph(senders)
+
+    def _compare_clocks(self, gid: bytes, received: Received) -> None:
+        if received.source_ns:
+            ahead_s = (received.source_ns - (received.received_ns or wall_ns())) / 1e9
+            self.skews_s[gid] = max(ahead_s, self.skews_s.get(gid, ahead_s))
 
     def _ask_graph(self, senders: set[bytes]) -> None:
         """Query the graph if it is due, or if a sender has no name yet."""
@@ -99,41 +107,67 @@ class TreeListener:
             self.observer.take_graph(self.graph.publishers(), nodes(self.node))
 
 
-def listen(  # noqa: PLR0913 (all but three are named)
-    name: str,
-    observers: Mapping[Topics, TreeObserver],
-    stop: Stop,
-    *,
-    duration_s: float | None,
-    every_s: float = 1.0,
-    show: Callable[[], object] | None = None,
-) -> tuple[float, tuple[str, ...]]:
-    """Feed the observers of the topics for some seconds, or until ``stop``.
+class RosFeed:
+    """Feeds the observers of pairs of TF topics (moving, fixed) from a node of that name.
 
-    ``show`` is called ``every_s``. The node's name is ``name``.
-    Return for how many seconds it listened, and the names of other topics on which there is TF.
-
-    Raises:
-        RosError: if ROS cannot start a node, or take messages.
+    Args:
+        name: the node's.
+        observers: by topics.
+        joint_topics: topics of joint states of which it is observed who sends which joints.
     """
-    with open_node(name, "") as node:
-        listeners = [TreeListener(node, observer, pair) for pair, observer in observers.items()]
-        begun = time.monotonic()  # a slow machine may take seconds until it listens
-        end = float("inf") if duration_s is None else begun + duration_s
-        due = begun + every_s
-        while not stop.requested and (now := time.monotonic()) < end:
-            for listener in listeners:
-                listener.listen(min(_WAIT_S / len(listeners), end - now), stop)
-            if show is not None and time.monotonic() >= due:
-                due = time.monotonic() + every_s
-                show()
-        for listener in listeners:
-            listener.listen(
-                LAST_WAIT_S, stop
-            )  # what came while this process was kept from looking
-        return time.monotonic() - begun, tf_elsewhere(
-            topics(node), [topic for pair in observers for topic in pair]
-        )
+
+    def __init__(
+        self, name: str, observers: Mapping[Topics, TreeObserver], joint_topics: Iterable[str] = ()
+    ) -> None:
+        self._name = name
+        self._observers = observers
+        self._joint_topics = tuple(joint_topics)
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        """Start the node.
+
+        Raises:
+            RosError: if ROS cannot start one.
+        """
+        self.node = self._stack.enter_context(open_node(self._name, ""))
+        self.listeners = [
+            TreeListener(self.node, observer, pair) for pair, observer in self._observers.items()
+        ]
+        self._joints = [JointStates(self.node, topic) for topic in self._joint_topics]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the node."""
+        self._stack.close()
+
+    @property
+    def clock_ns(self) -> int | None:
+        """The newest time on /clock in nanoseconds, or None."""
+        return next((listener.clock_ns for listener in self.listeners), None)
+
+    def take(self, timeout_s: float, stop: Stop) -> bool:
+        """Wait for messages, at most so long, and put what has come into the observers.
+
+        Raises:
+            RosError: if ROS cannot take messages.
+        """
+        for listener in self.listeners:
+            listener.take(timeout_s / len(self.listeners), stop)
+        if not self.listeners:
+            stop.wait(timeout_s)
+        for joints in self._joints:
+            joints.take()
+        if self._joints:
+            sent = tuple(one for joints in self._joints for one in joints.sent())
+            for observer in self._observers.values():
+                observer.sent_joints = sent
+        return True
+
+    def elsewhere(self) -> tuple[str, ...]:
+        """Return the names of other topics on which there is TF."""
+        own = [topic for pair in self._observers for topic in pair]
+        return tf_elsewhere(topics(self.node), own)
 
 
 def tf_elsewhere(

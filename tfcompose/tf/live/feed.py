@@ -1,0 +1,74 @@
+"""Feeds: where the messages of TF trees come from, and how observers get them.
+
+A feed puts what comes on pairs of topics (moving, fixed) into the observer of each pair: from ROS
+(``ros_feed``), from Zenoh where no ROS has rmw_zenoh (``zenoh_feed``), or from a recording
+(``tf.bags``).
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from typing_extensions import Self
+
+    from tfcompose.foundation.signals import Stop
+
+#: A wait for messages is not longer, so that a signal is followed.
+WAIT_S = 0.1
+
+
+class Feed(Protocol):
+    """Puts messages into observers, within its ``with`` block."""
+
+    def __enter__(self) -> Self:
+        """Begin to listen, or raise RosError."""
+
+    def __exit__(self, *_: object) -> None:
+        """Listen no more."""
+
+    def take(self, timeout_s: float, stop: Stop) -> bool:
+        """Wait for messages, at most so long, and put what has come into the observers.
+
+        Return whether more may come.
+
+        Raises:
+            RosError: if ROS cannot take messages.
+            BagError: if a recording cannot be read.
+        """
+
+    def elsewhere(self) -> tuple[str, ...]:
+        """Return the names of other topics on which there is TF."""
+
+
+def follow(
+    feed: Feed,
+    stop: Stop,
+    *,
+    duration_s: float | None = None,
+    every_s: float = WAIT_S,
+    show: Callable[[], object] | None = None,
+) -> float:
+    """Take from a feed for some seconds, or until ``stop`` is requested or nothing more may come.
+
+    ``show`` is called ``every_s``. Return for how many seconds it listened.
+
+    Raises:
+        RosError: if ROS cannot take messages.
+        BagError: if a recording cannot be read.
+    """
+    begun = time.monotonic()  # a slow machine may take seconds until it listens
+    end = float("inf") if duration_s is None else begun + duration_s
+    due = begun + every_s
+    while not stop.requested and (now := time.monotonic()) < end:
+        if not feed.take(max(0.0, min(WAIT_S, end - now, due - now)), stop):
+            return time.monotonic() - begun
+        if time.monotonic() >= due:
+            due = time.monotonic() + every_s
+            if show is not None:
+                show()
+    feed.take(WAIT_S, stop)  # what came while this process was kept from looking
+    return time.monotonic() - begun

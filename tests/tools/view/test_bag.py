@@ -19,7 +19,7 @@ from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.bags import BagError
 from tfcompose.tools.view.bag import BagTree, Recorded
-from tfcompose.tools.view.live_panel import BagPanel
+from tfcompose.tools.view.bag_source import show_recording
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.server import start_server, stop_server
 
@@ -123,7 +123,7 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         panel = Panel(server, session, edit=False, joints=False)
         recorded = Recorded(str(bag), [GLOBAL])
         tree = BagTree(session.robot, plan_of(session.robot), recorded, TOLERANCE)
-        shown = BagPanel(server, panel, tree, recorded.length_s)
+        shown = show_recording(server, panel, tree, recorded.length_s)
         assert body_pose(panel.scene, "base_link").xyz == (
             0,
             0,
@@ -131,11 +131,11 @@ def test_the_slider_moves_the_scene(bag: Path, tmp_path: Path) -> None:
         ), "the robot stays in the picture"
         shown.tree.fixed = "odom"
         for at_s in (8.0, 3.0):
-            shown.slider.value = at_s
+            shown.time.value = at_s
             assert body_pose(panel.scene, "base_link").xyz[0] == pytest.approx(at_s)
         shown.fixed.value = "mast"
         later = Panel(server, session, edit=False, joints=False, choices=panel.choices)
-        assert BagPanel(server, later, tree, recorded.length_s).fixed.value == "mast", (
+        assert show_recording(server, later, tree, recorded.length_s).fixed.value == "mast", (
             "it outlives a reload"
         )
     finally:

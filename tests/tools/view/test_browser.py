@@ -300,7 +300,7 @@ def test_a_tree_of_hundreds_of_frames_stays_where_it_was_scrolled_to(
         assert not in_view(page, "f250")
 
 
-def test_the_window_has_the_robots_name_and_frames_have_all_of_theirs(
+def test_the_window_has_the_robots_name_all_of_frames_names_and_named_views(
     tmp_path: Path, server: viser.ViserServer
 ) -> None:
     frame = "wrist_camera_depth_optical_frame_of_the_second_arm"
@@ -315,6 +315,11 @@ def test_the_window_has_the_robots_name_and_frames_have_all_of_theirs(
         name.wait_for()
         assert name.evaluate("name => name.scrollWidth <= name.clientWidth"), "nothing is cut"
         assert until(lambda: page.title() == "rover_7")
+        for label in ("top", "orthographic"):
+            page.get_by_text(label, exact=True).click()
+        (client,) = server.get_clients().values()
+        assert until(lambda: client.camera.fov < math.radians(2))
+        assert until(lambda: client.camera.position[2] > 10 * abs(client.camera.position[1]))
 
 
 def in_view(page: Page, frame: str) -> bool:

@@ -27,7 +27,7 @@ from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.tf2 import Buffer, TransformListener
 from tfcompose.tools.view.bag import BagTree, Recorded
-from tfcompose.tools.view.live_panel import BagPanel
+from tfcompose.tools.view.bag_source import show_recording
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.server import start_server, stop_server
 
@@ -117,7 +117,7 @@ def test_a_recording_is_scrubbed_forward_and_back_in_the_browser(tmp_path: Path)
     server = start_server("127.0.0.1", 0, "test", TOKEN)
     try:
         panel = Panel(server, session, edit=False, joints=False)
-        BagPanel(
+        show_recording(
             server,
             panel,
             BagTree(session.robot, plan_of(session.robot), recorded, TOLERANCE),

@@ -26,6 +26,7 @@ from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.geometry import Pose, offset_of, quat_from_rpy
 from tfcompose.model.plan.file import read_plan
 from tfcompose.tools.view import command
+from tfcompose.tools.view.camera import begin_at
 from tfcompose.tools.view.kinematics import poses_in_roots
 from tfcompose.tools.view.panel import Panel
 from tfcompose.tools.view.plan_robot import robot_of_plan
@@ -292,7 +293,7 @@ links: {base_link: {}, car: {parent: base_link, xyz: [2, 0, 0.5], visual: {box: 
 """
     robot = compile_robot(text, "r.yaml", PRESETS).robot
     assert robot
-    RobotScene(server.scene, robot).frame_camera(server, poses_in_roots(robot, {}))
+    begin_at(server, RobotScene(server.scene, robot).add_grid(poses_in_roots(robot, {})))
     camera = server.initial_camera
     assert camera.look_at == pytest.approx([2, 0, 0.5])
     assert math.dist(camera.position, camera.look_at) > math.hypot(2, 1, 1)

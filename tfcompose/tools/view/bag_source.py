@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.live import from_bag
 from tfcompose.cli.terminal import UNREADABLE, fail
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tools.view.bag import BagTree, Recorded
-from tfcompose.tools.view.live_panel import BagPanel
+from tfcompose.tools.view.published_tree import PublishedTree
 from tfcompose.tools.view.view_session import plan_of_session
 from tfcompose.tools.view.windows import SceneSource
 
 if TYPE_CHECKING:
+    import viser
+
     from tfcompose.foundation.geometry import Offset
+    from tfcompose.tools.view.panel import Panel
     from tfcompose.tools.view.reload import ReloadedPanel
     from tfcompose.tools.view.session import Session
 
 #: A larger time counts from the epoch.
 _LONGEST_S = 1e8
+#: What the slider moves by, in seconds.
+_STEP_S = 0.01
 
 
 class BagSource(SceneSource):
@@ -46,9 +52,28 @@ class BagSource(SceneSource):
         session, choices = shown.session, shown.panel.choices
         tree = BagTree(session.robot, plan_of_session(session), self._recorded, self._tolerance)
         tree.at_s = self._at_s if choices.at_s is None else choices.at_s
-        panel = BagPanel(shown.server, shown.panel, tree, self._recorded.length_s)
+        show_recording(shown.server, shown.panel, tree, self._recorded.length_s)
 
-        def keep(_event: object) -> None:
-            choices.at_s = tree.at_s
 
-        panel.slider.on_update(keep)
+def show_recording(
+    server: viser.ViserServer | viser.ClientHandle, panel: Panel, tree: BagTree, length_s: float
+) -> PublishedTree:
+    """Show a recorded tree beside the panel of its robot, with a slider of its time."""
+    section = PublishedTree(server, panel, tree, "Tree")
+    with server.gui.add_folder("Recording", order=-2):
+        slider = server.gui.add_slider(
+            "time (s)", 0.0, max(length_s, _STEP_S), _STEP_S, min(tree.at_s, length_s)
+        )
+    lock = threading.Lock()
+
+    def show(_event: object = None) -> None:
+        with lock:
+            tree.at_s = panel.choices.at_s = slider.value
+            section.show()
+            section.show_text()
+
+    for control in (slider, section.fixed):
+        control.on_update(show)
+    show()
+    section.time = slider
+    return section

@@ -22,6 +22,7 @@ class Choices:
         owners: owners whose edges were shown or hidden.
         sensors: sensors whose fields of view were shown or hidden.
         reach: how far fields of view are drawn, in metres; None: as suits the robot.
+        is_parallel: whether the camera shows parallel lines as parallel.
         has_names: whether the names of all frames are shown in the scene.
         has_blocked: whether blocked rays are shown.
         snaps: whether mounts snap to mm and degrees.
@@ -38,6 +39,7 @@ class Choices:
     owners: dict[str, bool] = field(default_factory=dict)
     sensors: dict[str, bool] = field(default_factory=dict)
     reach: float | None = None
+    is_parallel: bool = False
     has_names: bool = False
     has_blocked: bool = False
     snaps: bool = True

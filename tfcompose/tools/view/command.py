@@ -200,6 +200,7 @@ def _source_of(session: Session, arguments: Namespace) -> SceneSource:
 def _write(session: Session, path: Path) -> None:
     """Write the scene as one file; ends where it cannot be written."""
     from tfcompose.cli.writing import replace_file
+    from tfcompose.tools.view.camera import begin_at
     from tfcompose.tools.view.kinematics import poses_in_roots
     from tfcompose.tools.view.page import page_of
     from tfcompose.tools.view.scene import RobotScene
@@ -211,7 +212,7 @@ def _write(session: Session, path: Path) -> None:
         scene = RobotScene(server.scene, robot)
         scene.add_meshes()
         scene.update(robot, poses)
-        scene.frame_camera(server, poses)
+        begin_at(server, scene.add_grid(poses))
         page = page_of(server.scene.as_html(), robot, session.state.sources, scene.colours)
         replace_file(path, page.encode())
     except OSError as error:

@@ -207,6 +207,19 @@ class FieldsOfView:
                 handle.wxyz, handle.position = (w, x, y, z), poses[optics.frame].xyz
         self._at = poses
 
+    def points(self, poses: Mapping[str, Pose]) -> Any:
+        """Return the ends of what is drawn of the shown fields of view, shape (n, 3), in metres.
+
+        That is where frames have these poses in the roots of their trees.
+        """
+        found = [np.zeros((0, 3))]
+        for sensor, optics in self._streams:
+            if self.shown[sensor.name] and optics.frame in poses:
+                pose = poses[optics.frame]
+                ends = outline(optics, self.reach).reshape(-1, 3)
+                found.append(np.array([(pose @ Pose(tuple(end))).xyz for end in ends.tolist()]))
+        return np.concatenate(found)
+
     def pose(self, index: int) -> Pose:
         """Return where the scene has the frame of a stream."""
         w, x, y, z = (float(value) for value in self._frames[index].wxyz)

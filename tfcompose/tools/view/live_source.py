@@ -23,7 +23,7 @@ from tfcompose.tf.live.state import NAMELESS
 from tfcompose.tf.ros.environment import RosError
 from tfcompose.tools.view.joints import JointSender, first_positions, joint_topics
 from tfcompose.tools.view.live import LiveTree
-from tfcompose.tools.view.live_panel import LivePanel
+from tfcompose.tools.view.published_tree import PublishedTree
 from tfcompose.tools.view.view_session import plan_of_session
 from tfcompose.tools.view.windows import SceneSource, Windows
 
@@ -58,7 +58,7 @@ class LiveWindow(NamedTuple):
     """What shows a running tree in a window."""
 
     tree: LiveTree
-    panel: LivePanel
+    panel: PublishedTree
 
 
 class LiveSource(SceneSource):
@@ -92,7 +92,7 @@ class LiveSource(SceneSource):
         robot, plan = shown.session.robot, plan_of_session(shown.session)
         known = {pair: self._observers.get(pair) or TreeObserver() for pair in parts_of(plan)}
         tree = LiveTree(robot, plan, known, self._tolerance)
-        self.shown[shown] = LiveWindow(tree, LivePanel(shown.server, shown.panel, tree))
+        self.shown[shown] = LiveWindow(tree, PublishedTree(shown.server, shown.panel, tree))
         self._judge_at = self._ask_at = 0.0
 
     def run(self, windows: Windows, changed: threading.Event) -> int:

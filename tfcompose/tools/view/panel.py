@@ -13,9 +13,10 @@ from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.foundation.geometry import Pose, quat_from_rpy
+from tfcompose.foundation.geometry import Pose, norm, quat_from_rpy
 from tfcompose.foundation.numbers import clean_rpy
 from tfcompose.foundation.text import listed
+from tfcompose.tools.view.camera import VIEWS, begin_at, go_to, project
 from tfcompose.tools.view.choices import Choices
 from tfcompose.tools.view.edit import ImmovableError
 from tfcompose.tools.view.facts import facts_of, numbers
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 _SNAP_MM, _SNAP_DEG = 1.0, 1.0
 #: The gizmo of a robot whose largest body is 1 m long, in metres.
 _GIZMO_M = 0.25
+#: Sliders of joints move by a tenth of a millimetre or of a degree.
+_STEP, _DECIMALS = 0.1, 1
 #: The frame in which a pose is shown, unless another is chosen.
 _PARENT = "its parent"
 #: The colour of an owner, at the right of the line below it.
@@ -119,6 +122,8 @@ class Panel:
         #: What the selected mount is dragged by, None where it cannot be moved.
         self.gizmo: Any = None
         self._numbers: list[Any] = []
+        #: Of joints that follow no other, in degrees or mm.
+        self.sliders: list[Any] = []
         self._showing = False
         self._blocked: Any = None
         #: Whether the joints are being moved to and fro.
@@ -137,6 +142,7 @@ class Panel:
             self._names: Any = server.gui.add_checkbox(
                 "names of all frames", initial_value=self.choices.has_names
             )
+        self._add_views()
         self.tree.on_select(self._show_selected)
         self.tree.on_show(lambda: self.scene.hide(self.tree.hidden))
         self._base.on_update(lambda _: self._choose_base())
@@ -150,9 +156,8 @@ class Panel:
         if joints:
             self._add_joints(session.robot)
         self._begin()
-        self.scene.frame_camera(
-            self.window.server or server, poses_in_roots(session.robot, self.positions)
-        )
+        self._bounds = self.scene.add_grid(poses_in_roots(session.robot, self.positions))
+        begin_at(self.window.server or server, self._bounds)
         threading.Thread(target=self.scene.add_meshes, name="meshes", daemon=True).start()
 
     def _begin(self) -> None:
@@ -185,6 +190,24 @@ class Panel:
         """The selected frame."""
         return self.choices.selected
 
+    def _add_views(self) -> None:
+        with self._gui.add_folder("View"):
+            views: Any = self._gui.add_button_group("from", tuple(VIEWS))
+            parallel = self._gui.add_checkbox(
+                "orthographic", initial_value=self.choices.is_parallel
+            )
+        views.on_click(lambda event: self._go_to(event, views.value))
+        parallel.on_update(lambda event: self._project(event, is_parallel=parallel.value))
+
+    def _go_to(self, event: viser.GuiEvent[Any], view: str) -> None:
+        if event.client is not None:
+            go_to(event.client, self._bounds, view, is_parallel=self.choices.is_parallel)
+
+    def _project(self, event: viser.GuiEvent[Any], *, is_parallel: bool) -> None:
+        self.choices.is_parallel = is_parallel
+        if event.client is not None:
+            project(event.client, is_parallel=is_parallel)
+
     def _choose_base(self) -> None:
         self.choices.base = "" if self._base.value == _PARENT else self._base.value
         self._show_selected()
@@ -199,9 +222,12 @@ class Panel:
         first, *further = facts_of(robot, self.session.state.sources, frame)
         lines = [f"<b>{escape(first)}</b>", *map(escape, further)]
         base, poses = self.choices.base, self.poses()
-        if {base, frame} <= poses.keys():
-            relative = numbers(poses[base].inverse() @ poses[frame])
-            lines += [f"in <b>{escape(base)}</b>, as shown:", relative]
+        is_measured = base != frame and {base, frame} <= poses.keys()
+        if is_measured:
+            relative = poses[base].inverse() @ poses[frame]
+            distance = f"{norm(relative.xyz) * 1000:.4g} mm away"
+            lines += [f"in <b>{escape(base)}</b>, as shown, {distance}:", numbers(relative)]
+        self.scene.measure((base, frame) if is_measured else ())
         self._about.content = paragraphs(lines)
         if self._numbers:
             self._show_mount()
@@ -266,27 +292,28 @@ class Panel:
         if not joints:
             return
         with self._gui.add_folder("Joints"):
-            sliders = [self._slider(joint) for joint in joints]
-            self._gui.add_button("zero").on_click(lambda _: self._zero(sliders))
+            self.sliders = [self._slider(joint) for joint in joints]
+            self._gui.add_button("zero").on_click(lambda _: self._zero())
             self._sweeps = self._gui.add_checkbox("sweep", initial_value=False)
-            self._sweeps.on_update(lambda _: self._sweep(sliders))
+            self._sweeps.on_update(lambda _: self._sweep())
 
     def _slider(self, joint: Joint) -> Any:
         slides = joint.type == "prismatic"
         lower, upper = slider_range(joint)
         scale, unit = (1000.0, "mm") if slides else (math.degrees(1), "deg")
         start = min(max(self.positions.get(joint.name, 0.0), lower), upper)
+        least, most = (round(limit * scale, _DECIMALS) for limit in (lower, upper))
         slider = self._gui.add_slider(
             f"{joint.name} ({unit})",
-            lower * scale,
-            max(upper, lower + 1e-6) * scale,
-            0.1,
-            start * scale,
+            least,
+            max(most, least + _STEP),
+            _STEP,
+            min(max(round(start * scale, _DECIMALS), least), most),
         )
         self.positions[joint.name] = start
 
         def changed(_event: Any) -> None:
-            self.set_joint(joint.name, slider.value / scale)
+            self.set_joint(joint.name, min(max(slider.value / scale, lower), upper))
 
         slider.on_update(changed)
         return slider
@@ -297,19 +324,19 @@ class Panel:
         if not self.is_sweeping:
             self.refresh()
 
-    def _sweep(self, sliders: list[Any]) -> None:
+    def _sweep(self) -> None:
         """Sweep each joint between its limits until switched off or closed."""
         if self._sweeps.value and not self.is_sweeping:
             self.is_sweeping = True
-            threading.Thread(target=self._sweep_until_over, args=(sliders,), daemon=True).start()
+            threading.Thread(target=self._sweep_until_over, daemon=True).start()
 
-    def _sweep_until_over(self, sliders: list[Any]) -> None:
-        begin, starts = time.monotonic(), [_phase(slider) for slider in sliders]
+    def _sweep_until_over(self) -> None:
+        begin, starts = time.monotonic(), [_phase(slider) for slider in self.sliders]
         try:
             while self._sweeps.value and not self.is_gone:
                 angle = (time.monotonic() - begin) / _SWEEP_S * math.tau
                 with self._server.atomic():
-                    for slider, start in zip(sliders, starts, strict=True):
+                    for slider, start in zip(self.sliders, starts, strict=True):
                         middle, half = (slider.max + slider.min) / 2, (slider.max - slider.min) / 2
                         slider.value = middle + half * math.sin(angle + start)
                     self.refresh()
@@ -317,8 +344,8 @@ class Panel:
         finally:
             self.is_sweeping = False
 
-    def _zero(self, sliders: list[Any]) -> None:
-        for slider in sliders:
+    def _zero(self) -> None:
+        for slider in self.sliders:
             slider.value = min(max(0.0, slider.min), slider.max)
 
     def _add_editor(self) -> None:
@@ -358,8 +385,12 @@ class Panel:
         try:
             mount = self.session.mount(self.selected)
         except ImmovableError as error:
-            self._given.content = paragraphs([escape(str(error))])
+            self._given.content = paragraphs(
+                [f'<span style="color: #888">{escape(str(error))}</span>']
+            )
+            self._enable(is_enabled=False)
             return
+        self._enable(is_enabled=True)
         given = mount.given(mount.edge.pose)
         self._given.content = paragraphs(
             [f"pose of <b>{escape(mount.place)}</b> in <b>{escape(mount.relative_to)}</b>"]
@@ -371,6 +402,12 @@ class Panel:
             "/gizmo", scale=scale, wxyz=wxyz(at), position=at.xyz
         )
         self.gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
+
+    def _enable(self, *, is_enabled: bool) -> None:
+        """Let the mount be edited, or show its numbers in grey."""
+        for handle in (*self._numbers, self._snap):
+            if handle.disabled == is_enabled:
+                handle.disabled = not is_enabled
 
     def _fill(self, given: Pose) -> None:
         values = [value * 1000 for value in given.xyz] + [

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tfcompose.foundation.geometry import Pose
+from tfcompose.tools.view.camera import Bounds
 from tfcompose.tools.view.fields import FieldsOfView
 from tfcompose.tools.view.shapes import mesh_of
 
@@ -36,10 +37,7 @@ _AXES_M = 0.08
 #: How much larger the axes of the selected frame are.
 _SELECTED = 2.0
 _GHOST = (60, 120, 220)
-#: Where the camera begins, as a direction from the middle of the robot, and how many radii of it
-#: away.
-_FROM = np.array([0.62, 0.62, 0.48])
-_RADII = 2.0
+_RULER = (20, 20, 20)
 
 
 def wxyz(pose: Pose) -> tuple[float, float, float, float]:
@@ -105,6 +103,8 @@ class RobotScene:
         self._hidden: frozenset[str] = frozenset()
         self._selected = ""
         self._names_all = False
+        self._measured: tuple[str, ...] = ()
+        self._ruler: Any = None
         #: What is called with the frame of a body that is clicked.
         self.clicked: Callable[[str], None] = lambda _: None
         scene.set_up_direction("+z")
@@ -202,6 +202,8 @@ class RobotScene:
         else:
             self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
         self._draw_edges()
+        if self._measured:
+            self._draw_measured()
 
     def _draw_edges(self) -> None:
         poses, shown = self._at, self._at.keys() - self._hidden
@@ -218,20 +220,15 @@ class RobotScene:
                     f"/edges/{index}", points, colour, thickness=3, thickness_units="screen"
                 )
 
-    def frame_camera(
-        self, server: viser.ViserServer | viser.ClientHandle, poses: Mapping[str, Pose]
-    ) -> None:
-        """Start a new client's camera where the robot fills the picture, above a grid."""
+    def add_grid(self, poses: Mapping[str, Pose]) -> Bounds:
+        """Draw a grid below the robot; return the bounds of all that is shown."""
         bodies = [
             (poses[frame] @ Pose(xyz)).xyz
             for frame, corners in self._corners.items()
             for xyz in corners
         ]
         points = np.array([pose.xyz for pose in poses.values()] + bodies).reshape(-1, 3)
-        least, most = points.min(axis=0), points.max(axis=0)
-        middle, radius = (least + most) / 2, float(np.linalg.norm(most - least)) / 2 + self._axes_m
-        server.initial_camera.look_at = middle
-        server.initial_camera.position = middle + _RADII * radius * _FROM
+        bounds = Bounds.around(np.concatenate((points, self.fields.points(poses))), self._axes_m)
         self._scene.add_grid(
             "/grid",
             20,
@@ -239,9 +236,29 @@ class RobotScene:
             cell_size=0.1,
             section_size=1,
             cell_color=(235, 235, 235),
-            fade_distance=max(12.0, 4 * radius),
-            position=(0.0, 0.0, float(least[2])),
+            fade_distance=max(12.0, 4 * bounds.radius),
+            position=(0.0, 0.0, float(points[:, 2].min())),
         )
+        return bounds
+
+    def measure(self, frames: tuple[str, ...]) -> None:
+        """Draw a line between two frames, or none."""
+        self._measured = frames
+        self._draw_measured()
+
+    def _draw_measured(self) -> None:
+        ends = [self._at[frame].xyz for frame in self._measured if frame in self._at]
+        if self._ruler is not None:
+            self._ruler.remove()
+            self._ruler = None
+        if len(ends) == 2:  # noqa: PLR2004 (a line's)
+            self._ruler = self._scene.add_line_segments(
+                "/ruler",
+                np.array([ends], np.float32),
+                _RULER,
+                thickness=2,
+                thickness_units="screen",
+            )
 
     def hide(self, frames: Iterable[str]) -> None:
         """Hide these frames with bodies, labels and edges, and show all others."""

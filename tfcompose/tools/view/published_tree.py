@@ -1,11 +1,10 @@
-"""The panel and the scene of a running tree.
+"""What a panel and a scene show of a tree that runs, or was recorded.
 
 Frames as published, ghosts, what is wrong, and the robot's processes.
 """
 
 from __future__ import annotations
 
-import threading
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -19,19 +18,16 @@ if TYPE_CHECKING:
 
     import viser
 
-    from tfcompose.tools.view.bag import BagTree
     from tfcompose.tools.view.panel import Panel
     from tfcompose.tools.view.picture import Picture, ShownTree
 
 _RED = (220, 30, 30)
-#: What the slider of a recording moves by, in seconds.
-_STEP_S = 0.01
 #: Of the names of frames that nobody declared so many are shown.
 _MOST = 40
 
 
-class LivePanel:
-    """Shows a tree that runs, or was recorded, beside the panel of its robot."""
+class PublishedTree:
+    """The section of a tree that runs, or was recorded, in the panel of its robot."""
 
     def __init__(
         self,
@@ -46,6 +42,8 @@ class LivePanel:
         self._ghosts = Ghosts(server.scene, tree.robot)
         self._wrong = _ColouredLines(server.scene, "/live/wrong", _RED)
         self._further: dict[str, Any] = {}
+        #: The slider of a recording's time, in seconds; None: the tree runs.
+        self.time: Any = None
         fixed = panel.choices.fixed or tree.robot.base  # what drives off stays in the picture
         tree.fixed = fixed if fixed in tree.robot.frames else tree.robot.roots()[0]
         with server.gui.add_folder(title, order=-1):
@@ -101,36 +99,6 @@ class LivePanel:
                     break
                 self._further[frame] = self._scene.add_label(f"/live/further/{number}", frame)
             self._further[frame].position = pose.xyz
-
-
-class BagPanel:
-    """Shows a recording at the time of a slider, in seconds after its first transform."""
-
-    def __init__(
-        self,
-        server: viser.ViserServer | viser.ClientHandle,
-        panel: Panel,
-        tree: BagTree,
-        length_s: float,
-    ) -> None:
-        self.tree = tree
-        self._lock = threading.Lock()
-        with server.gui.add_folder("Recording", order=-2):
-            self.slider: Any = server.gui.add_slider(
-                "time (s)", 0.0, max(length_s, _STEP_S), _STEP_S, min(tree.at_s, length_s)
-            )
-        self._panel = LivePanel(server, panel, tree, "Tree")
-        self.fixed = self._panel.fixed
-        for control in (self.slider, self.fixed):
-            control.on_update(lambda _: self.show())
-        self.show()
-
-    def show(self) -> None:
-        """Show the time of the slider."""
-        with self._lock:
-            self.tree.at_s = self.slider.value
-            self._panel.show()
-            self._panel.show_text()
 
 
 class _ColouredLines:

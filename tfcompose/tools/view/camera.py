@@ -1,0 +1,74 @@
+"""Where the camera is: named views of all that a scene shows, in perspective or parallel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import viser
+
+#: Vertical angles of view in radians: viser's own, and one at which lines that are parallel look
+#: so. viser has no orthographic camera.
+_WIDE_RAD, _PARALLEL_RAD = math.radians(75), math.radians(1)
+#: Directions from the robot to the camera, by the names of views: x is forward, y left (REP 103).
+#: From above and from below forward is up in the picture.
+VIEWS = {
+    "corner": (0.62, 0.62, 0.48),
+    "front": (1.0, 0.0, 0.0),
+    "back": (-1.0, 0.0, 0.0),
+    "left": (0.0, 1.0, 0.0),
+    "right": (0.0, -1.0, 0.0),
+    "top": (-1e-3, 0.0, 1.0),
+    "bottom": (-1e-3, 0.0, -1.0),
+}
+#: What is shown takes this part of the picture.
+_FILLED = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The sphere around what a scene shows: ``middle`` (3,) and ``radius`` in metres."""
+
+    middle: Any
+    radius: float
+
+    @classmethod
+    def around(cls, points: Any, least_m: float) -> Bounds:
+        """Return the bounds of points, shape (n, 3), and ``least_m`` beyond them."""
+        least, most = points.min(axis=0), points.max(axis=0)
+        return cls((least + most) / 2, float(np.linalg.norm(most - least)) / 2 + least_m)
+
+    def position(self, view: str, *, is_parallel: bool = False) -> Any:
+        """Return where the camera of a named view is, in metres."""
+        direction = np.array(VIEWS[view]) / np.linalg.norm(VIEWS[view])
+        angle = _PARALLEL_RAD if is_parallel else _WIDE_RAD
+        return self.middle + direction * self.radius / _FILLED / math.sin(angle / 2)
+
+
+def begin_at(server: viser.ViserServer | viser.ClientHandle, bounds: Bounds) -> None:
+    """Let the camera of each new window begin where all is in the picture."""
+    server.initial_camera.look_at = bounds.middle
+    server.initial_camera.position = bounds.position("corner")
+
+
+def go_to(client: viser.ClientHandle, bounds: Bounds, view: str, *, is_parallel: bool) -> None:
+    """Move the camera of a window to a named view."""
+    camera = client.camera
+    with client.atomic():
+        camera.fov = _PARALLEL_RAD if is_parallel else _WIDE_RAD
+        camera.position = bounds.position(view, is_parallel=is_parallel)
+        camera.look_at = bounds.middle
+
+
+def project(client: viser.ClientHandle, *, is_parallel: bool) -> None:
+    """Show what the window shows in parallel, or in perspective again, as large as before."""
+    camera = client.camera
+    angle = _PARALLEL_RAD if is_parallel else _WIDE_RAD
+    nearer = math.tan(camera.fov / 2) / math.tan(angle / 2)
+    with client.atomic():
+        camera.position = camera.look_at + (camera.position - camera.look_at) * nearer
+        camera.fov = angle

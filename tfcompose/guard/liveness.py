@@ -43,8 +43,8 @@ MOST_MESSAGES = 1000
 MOST_NAMED = 1000
 #: Of the time between two ticks only so much counts; the guard ticks ten times a second.
 MAX_TICK_S = 0.25
-#: After so long without a tick messages are lost, and come when the writer's next heartbeat does:
-#: 3 s in Fast DDS.
+#: After so long without a tick messages are lost. What is lost comes when the writer's next
+#: heartbeat does: 3 s in Fast DDS.
 STALLED_S = 1.0
 CATCH_UP_S = 3.5
 
@@ -95,12 +95,12 @@ class WatchedTime:
 
     def begins_late(self, until: float) -> None:
         """Take what is missing until then as not found yet."""
-        self._catching_up_until = until
+        self._catching_up_until = max(self._catching_up_until, until)
 
     def is_behind(self, now: float) -> bool:
         """Return whether what comes now may have waited.
 
-        The guard was kept from running, or still catches up.
+        The guard was kept from running, or lost messages, or still catches up.
         """
         stalled = self._ticked is not None and now - self._ticked > STALLED_S
         return stalled or now < self._catching_up_until
@@ -147,13 +147,17 @@ class Track:
         if not self.arrivals.count:
             self.forget()
 
-    def arrived(self, watched: float, now: float) -> None:
-        """Note an arrival; two arrivals close together end an edge's silence."""
+    def arrived(self, watched: float, now: float, *, late: bool = False) -> None:
+        """Note an arrival; two arrivals close together end an edge's silence.
+
+        ``late`` says that it may have waited: it tells nothing of the rate.
+        """
         after = self.silent_after
         self.steady = after is not None and self.live and watched - self.heard <= after
         self.last, self.heard = now, watched
         if after is not None:
-            self.arrivals.arrived(int(watched * 1e9), None)
+            at_ns = int(watched * 1e9)
+            self.arrivals.resumed(at_ns) if late else self.arrivals.arrived(at_ns, None)
 
     def forget(self) -> None:
         """Take the next arrival as the first one."""
@@ -268,11 +272,11 @@ class Liveness:
         self, children: tuple[str, ...], now: float, delay_s: float | None = None
     ) -> list[GuardEvent]:
         """Note that owners sent these edges, in one message, and return what that means."""
-        watched, events = self._watched.at(now), []
+        watched, late, events = self._watched.at(now), self._watched.is_behind(now), []
         for track in self._of_message.get(children) or self._parted(children):
             if track.edge.owner in self._absent:
                 continue
-            track.arrived(watched, now)
+            track.arrived(watched, now, late=late)
             track.delay_s = delay_s
             if not track.live:
                 track.live = True
@@ -336,6 +340,10 @@ class Liveness:
     def is_behind(self, now: float) -> bool:
         """Return whether what comes now may have waited for the guard."""
         return self._watched.is_behind(now)
+
+    def lost(self, now: float) -> None:
+        """Note that the guard itself lost messages: nobody is silent until they have come."""
+        self._watched.begins_late(now + CATCH_UP_S)
 
     def tick(self, now: float) -> None:
         """Note that the guard runs, without judging anybody."""

@@ -34,6 +34,7 @@ from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.joint_watch import JointWatch
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.ledger import MOST_UNDECLARED
+from tfcompose.guard.losses import LossWatch
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.model.messages import Clear, TreeComplete
 from tfcompose.model.plan.middleware import IMPLEMENTATIONS
@@ -341,10 +342,11 @@ def guard(own: Own, stop: Stop) -> None:
         CATALOGUE.load()
         diagnostics = DiagnosticsPage(node, own.plan.robot)
         joints = JointWatch(node, own.plan, emit)
-        wrong = [joints.wrong, *(judge.wrong for judge in judged)]
+        losses = LossWatch(judged, emit)
+        wrong = [losses.wrong, joints.wrong, *(judge.wrong for judge in judged)]
         silence = [judge.live.wrong for judge in judged]
         orders = OrderReader(judged, Gates(node, emit), Components(node, emit))
-        steps = [orders.take, *(watch.step for watch in watches)]
+        steps = [orders.take, losses.check, *(watch.step for watch in watches)]
         steps += [memory.hand_on for memory in memories]
         steps += [
             joints.check,

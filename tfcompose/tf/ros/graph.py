@@ -44,7 +44,14 @@ ASKING = "/_tfcompose/who_am_i"
 #: How long one's own publisher may take to come into the graph, in seconds.
 SHOWN_WITHIN_S = 0.5
 
+#: The names of so many publishers and listeners are remembered.
+MOST_NAMES = 10_000
+
 _says_who: dict[str, bool] = {}
+#: By their ids, the nodes of publishers and listeners that had a name, the last to have it last. A
+#: participant that DDS had given up, as after a gap in the network, returns with its ids, and
+#: rmw_fastrtps does not get its nodes' names again.
+_names: dict[bytes, str] = {}
 #: Where rmw_zenoh's tokens are asked instead of rclpy, the one graph of them.
 _tokens: list[RobotGraph] = []
 
@@ -54,9 +61,10 @@ class GraphPublisher:
     """One publisher of a topic.
 
     ``gid`` is its id, 16 bytes, and equals ``Received.gid`` of its messages. ``node`` is the full
-    name, such as ``/rover/static``. A publisher is discovered before its node's name is: until
-    then, and for good when it belongs to no ROS node, ``node`` is ``UNKNOWN_NODE``, or
-    ``BARE_DDS`` where rmw knows that, while id, type and QoS are right. ``type`` reads like
+    name, such as ``/rover/static``; of an id that had a name once, that one. A publisher is
+    discovered before its node's name is: until then, and for good when it belongs to no ROS node,
+    ``node`` is ``UNKNOWN_NODE``, or ``BARE_DDS`` where rmw knows that, while id, type and QoS are
+    right. ``type`` reads like
     ``tf2_msgs/msg/TFMessage``.
     """
 
@@ -103,10 +111,7 @@ def volatile_readers(node: Node, topic: str) -> list[str]:
     own = own_name(node)
     infos = node.get_subscriptions_info_by_topic(topic)
     volatile = [info for info in infos if info.qos_profile.durability == DurabilityPolicy.VOLATILE]
-    return sorted(
-        {_full_name(info.node_namespace, info.node_name) for info in volatile}
-        - {own, UNKNOWN_NODE}
-    )
+    return sorted({_name_of(info) for info in volatile} - {own, UNKNOWN_NODE})
 
 
 def own_gid(node: Node, topic: str) -> bytes:
@@ -125,11 +130,24 @@ def _writer(info: TopicEndpointInfo) -> GraphPublisher:
     best_effort = info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
     return GraphPublisher(
         gid=bytes(info.endpoint_gid[:16]),
-        node=_full_name(info.node_namespace, info.node_name),
+        node=_name_of(info),
         durability="transient_local" if latched else "volatile",
         reliability="best_effort" if best_effort else "reliable",
         type=info.topic_type,
     )
+
+
+def _name_of(info: TopicEndpointInfo) -> str:
+    """Return the full name of an endpoint's node, and remember it, or the one that it had."""
+    gid, name = bytes(info.endpoint_gid[:16]), _full_name(info.node_namespace, info.node_name)
+    known = _names.pop(gid, name)
+    if name in {UNKNOWN_NODE, BARE_DDS}:
+        name = known
+    if name not in {UNKNOWN_NODE, BARE_DDS}:
+        _names[gid] = name
+        if len(_names) > MOST_NAMES:
+            del _names[next(iter(_names))]
+    return name
 
 
 def _full_name(namespace: str, name: str) -> str:
@@ -200,10 +218,7 @@ def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
     own = own_name(node)
     infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
     infos += [(info, False) for info in node.get_subscriptions_info_by_topic(topic)]
-    named = [
-        (_full_name(info.node_namespace, info.node_name), info.topic_type, sends)
-        for info, sends in infos
-    ]
+    named = [(_name_of(info), info.topic_type, sends) for info, sends in infos]
     return sorted({one for one in named if one[0] not in {own, UNKNOWN_NODE}})
 
 
@@ -213,7 +228,10 @@ def nodes(node: Node) -> list[str]:
     names = {
         _full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()
     }
-    return sorted(names - {own, UNKNOWN_NODE})
+    names |= set(
+        publishing_nodes(node, "/parameter_events")
+    )  # of each node, also one that returns
+    return sorted(names - {own, UNKNOWN_NODE, BARE_DDS})
 
 
 # Ids.

@@ -31,6 +31,7 @@ from std_msgs.msg import String
 
 from tfcompose.tf.ros.environment import RosError
 from tfcompose.tf.ros.graph import Allocator, gid_of, ids_say_who, rcl
+from tfcompose.tf.ros.sockets import widen_buffers
 from tfcompose.tf.ros.typesupport import capsule_address, tf_message_type
 
 if TYPE_CHECKING:
@@ -107,6 +108,7 @@ def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterato
     try:
         context.init(args=["--ros-args", *args] if args else [], initialize_logging=False)
         node = _node(context, name, namespace)
+        widen_buffers()
     except (RuntimeError, NameValidationException) as error:
         context.try_shutdown()
         raise RosError(f"ROS cannot start a node: {' '.join(str(error).split())}") from None
@@ -410,6 +412,7 @@ class PublicTFReader(MessageSource):
         if not made:
             library.rcutils_reset_error()
             raise RosError(f"rmw makes no reader of {topic} outside of partitions")
+        widen_buffers()
         self._reader: ctypes.c_void_p | None = ctypes.c_void_p(made)
         self._taken = ctypes.c_bool()
         taken, info = ctypes.byref(self._taken), ctypes.byref(self._info)

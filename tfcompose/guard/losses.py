@@ -1,0 +1,73 @@
+"""Watches what the guard itself loses: nobody is called silent for that.
+
+A burst of messages that is more than the guard's sockets hold loses its last ones on the way.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Note, finding
+from tfcompose.foundation.text import counted
+from tfcompose.model.messages import FindingShown, RecoveredShown
+from tfcompose.tf.ros.sockets import LIMIT, WANTED, LostDatagrams, buffer_limit, widen_buffers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.foundation.findings import Finding
+    from tfcompose.guard.judge import Judge
+    from tfcompose.model.messages import GuardEvent
+
+CHECK_EVERY_S = 0.1
+#: It is over when nothing was lost for so long.
+OVER_S = 10.0
+
+
+class LossWatch:
+    """Tells judges when the guard lost something, and says so once."""
+
+    def __init__(self, judges: Sequence[Judge], emit: Callable[[GuardEvent], None]) -> None:
+        self._judges, self._emit = judges, emit
+        self._lost = LostDatagrams()
+        self._due = self._over_at = 0.0
+        self._wrong: list[Finding] = []
+
+    def wrong(self) -> list[Finding]:
+        """Return what was reported and is not over."""
+        return self._wrong
+
+    def check(self) -> None:
+        """See whether something was lost, if it is time; call it before the judges judge."""
+        if (now := time.monotonic()) >= self._due:
+            self._due = now + CHECK_EVERY_S
+            self.take(self._lost.take(), now)
+
+    def take(self, lost: int, now: float) -> None:
+        """Take how many datagrams were lost since the last time."""
+        if lost:
+            self._over_at = now + OVER_S
+            for judge in self._judges:
+                judge.live.lost(now)
+            widen_buffers()  # the limit may be higher now
+            if not self._wrong:
+                self._wrong = [datagrams_lost(lost, buffer_limit())]
+                self._emit(FindingShown(self._wrong[0]))
+        elif self._wrong and now >= self._over_at:
+            self._wrong = []
+            self._emit(RecoveredShown(f"the guard has lost nothing for {OVER_S:g} s"))
+
+
+def datagrams_lost(lost: int, limit: int | None) -> Finding:
+    """Return the finding for so many lost datagrams, where a socket can hold ``limit`` bytes."""
+    message = (
+        f"the guard itself lost {counted(lost, 'datagram')}: more came at once than it could take"
+    )
+    note = Note("meanwhile no owner is called silent or slow")
+    if limit is None or limit < WANTED:
+        held = f", which is {limit} here" if limit is not None else ""
+        advice = f"let its sockets hold more{held}: sudo sysctl -w {LIMIT}={WANTED}"
+    else:
+        advice = "give the guard more of a processor, or let publishers send at different moments"
+    return finding("TF862", message, None, notes=[note], help=advice)

@@ -60,6 +60,7 @@ from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.foundation.tool import Command as ToolCommand
 from tfcompose.foundation.tool import Key, Tool, installed
+from tfcompose.guard.losses import datagrams_lost
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.drivers import SentPoses, not_taken
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
@@ -675,6 +676,7 @@ def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
 
 def surroundings() -> Iterator[Finding]:
     """Look at plans, hosts, bags and installations that are not as they should be."""
+    yield from (datagrams_lost(38, limit) for limit in (212_992, None, 16_777_216))
     yield from _refused(partial(read_own, [], "static"))
     for text in (
         "nonsense",

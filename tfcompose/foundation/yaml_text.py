@@ -5,6 +5,7 @@ An entry on a line where it fits, numbers, names and words bare, all else in quo
 
 from __future__ import annotations
 
+import math
 import re
 from textwrap import dedent, indent
 from typing import TYPE_CHECKING, Any
@@ -104,6 +105,8 @@ def parameter(value: Any) -> Any:
         return value
     if isinstance(value, int):
         return Bare(value)
+    if not math.isfinite(value):
+        return Bare(f"{'-' * (value < 0)}.{'nan' if math.isnan(value) else 'inf'}")
     mantissa, exponent, power = repr(value).partition("e")
     return Bare(f"{mantissa}{'' if '.' in mantissa else '.0'}{exponent}{power}")
 

@@ -244,6 +244,62 @@ def generate_launch_description():
 """  # noqa: E501 (a text as its reader has it)
 
 
+def test_files_that_a_launch_file_writes_come_with_the_robot_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data = import_of(source(tmp_path, "a.launch.py", WRITING))
+    process = data["processes"]["n"]
+    assert process["params"]["file"] == "a_params/tmp0.yaml"
+    assert process["run"]["args"] == ["-d", "${file(a_params/view.rviz)}"]
+    made = {path.name: path.read_text("utf-8") for path in (tmp_path / "a_params").iterdir()}
+    assert yaml.safe_load(made["tmp0.yaml"])["n"]["ros__parameters"] == {"speed": 1.5}
+    assert made["view.rviz"] == "Fixed Frame: map\n"
+    assert not (tmp_path / "cache").exists()
+    lines = [f"a.launch.py:{line}" for line in (16, 17)]
+    assert places(printed_errors(capsys), "TF020") == lines, "an empty folder, an unused file"
+
+
+WRITING = """
+import os, tempfile, yaml
+from pathlib import Path
+from launch import LaunchDescription
+from launch_ros.actions import Node
+def generate_launch_description():
+    here = Path(__file__).parent
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
+        yaml.dump({"n": {"ros__parameters": {"speed": 1.5}}}, file)
+    os.makedirs(here / "cache", exist_ok=True)
+    view = here / "cache" / "view.rviz"
+    view.write_text("Fixed Frame: map\\n")
+    assert "map" in view.read_text()
+    with open(file.name) as again:
+        assert "speed" in again.read()
+    os.mkdir(here / "empty")
+    open(here / "unused", "w").close()
+    return LaunchDescription([Node(package="p", executable="e", name="n", parameters=[file.name],
+                                   arguments=["-d", str(view)])])
+"""
+
+
+def test_an_address_of_a_package_that_the_source_writes_itself_is_a_text(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = source(tmp_path, "a.launch.xml", ADDRESSES)
+    _, data = import_of(file)
+    words = ["--mesh", "package://meshes/a.stl", "--map", "package://maps/b.yaml"]
+    assert data["processes"]["n"]["run"]["args"] == words
+    printed = printed_errors(capsys)
+    assert "maps" in printed
+    assert "meshes" not in printed
+
+
+ADDRESSES = """<launch>
+  <node pkg="p" exec="e" name="n"
+        args="--mesh package://meshes/a.stl --map $(find-pkg-share maps)/b.yaml"/>
+</launch>
+"""
+
+
 def test_a_number_with_a_point_stays_a_double_as_a_parameter_and_keeps_its_text_in_a_command(
     tmp_path: Path,
 ) -> None:

@@ -234,9 +234,9 @@ def test_launch_starts_nothing_and_reaches_nothing(
     assert text.splitlines()[0].endswith("read by ROS's launch")
     assert set(data["processes"]) == {"n"}
     assert not (tmp_path / "touched").exists()
-    assert places(printed_errors(capsys), "TF020") == [
+    assert set(places(printed_errors(capsys), "TF020")) == {
         f"a.launch.py:{line}" for line in (5, 7, 11, 15)
-    ]
+    }
 
 
 REACHING = """import os, socket

@@ -72,6 +72,7 @@ def test_arguments_say_the_edge_that_the_program_publishes(
         "lidar_link",
         xyz,
     )
+    assert ("slashes" in transform.order) is ("/base_link" in words), "a comment says so"
     expected = Rotation.from_euler("xyz", rpy).as_quat()  # lower case: about fixed axes
     assert angle_between(normalised(transform.pose.quat_xyzw), tuple(expected)) < 1e-9
 

@@ -208,7 +208,12 @@ class DocumentReader:
             return self.tagged(tag, text, place)
         except OverflowError as error:
             self.found.append(
-                finding("TF007", str(error), place.span, help="give a finite number")
+                finding(
+                    "TF007",
+                    str(error),
+                    place.span,
+                    help="give a finite number; a node's parameter file may have infinite ones",
+                )
             )
             return 1.0  # which sizes, masses and axes can be: one fault is one finding
 

@@ -330,8 +330,8 @@ def _finish(draft: Draft, arguments: Namespace) -> int:
         fail("nothing was written: the source starts nothing that a robot file has")
     folder = posixpath.dirname(arguments.output or "")
     neighbours = {posixpath.join(folder, path): text for path, text in draft.neighbours.items()}
-    text, compiled = text_with_findings(draft, lambda text: _lint(text, arguments, neighbours))
     _write_neighbours(neighbours, arguments)
+    text, compiled = text_with_findings(draft, lambda text: _lint(text, arguments))
     _write(text, arguments.output)
     print_findings(draft.found, sys.stderr)
     found = (
@@ -419,7 +419,7 @@ def _target(arguments: Namespace) -> Target:
     )
 
 
-def _lint(text: str, arguments: Namespace, neighbours: dict[str, str] | None = None) -> Compiled:
+def _lint(text: str, arguments: Namespace) -> Compiled:
     from tfcompose.cli.compiling import library
     from tfcompose.cli.reading import read_text
     from tfcompose.compiler.compile import compile_robot
@@ -429,7 +429,7 @@ def _lint(text: str, arguments: Namespace, neighbours: dict[str, str] | None = N
         text,
         arguments.output or "robot.yaml",
         library(),
-        read=lambda path: (neighbours or {}).get(path) or read_text(path),
+        read=read_text,
         disk=files,
     )
 

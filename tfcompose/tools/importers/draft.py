@@ -79,6 +79,8 @@ class Draft:
     made: dict[str, str] = field(default_factory=dict)
     #: Those of them that the robot file names, by their paths from its folder.
     neighbours: dict[str, str] = field(default_factory=dict)
+    #: Those of ``made`` that are among them.
+    used: set[str] = field(default_factory=set)
 
     def note(self, at: Entry, *texts: str) -> None:
         """Put comments above an entry, each once."""
@@ -112,7 +114,8 @@ class Draft:
 
     def bring(self, path: str) -> str:
         """Put a file that the source makes beside the robot file; return its path from there."""
-        base, ending = posixpath.splitext(posixpath.basename(path.rpartition("#")[0]))
+        self.used.add(path)
+        base, ending = posixpath.splitext(posixpath.basename(path.rpartition("#")[0] or path))
         for number in itertools.count(1):
             name = f"{self.robot}_params/{base}{f'_{number}' if number > 1 else ''}{ending}"
             if self.neighbours.setdefault(name, self.made[path]) == self.made[path]:

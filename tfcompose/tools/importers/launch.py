@@ -141,7 +141,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     if answer["stopped"]:
         at = launch.span(answer["line"])
         if not any(
-            one["kind"] not in {"package", "todo", "argument"} for one in answer["records"]
+            one["kind"] not in {"package", "todo", "argument", "file"} for one in answer["records"]
         ):
             raise RejectedError([finding("TF002", answer["stopped"], at), *draft.found])
         draft.todo(f"the launch file is not read to its end: {answer['stopped']}", at)
@@ -283,6 +283,7 @@ _RECORDS: dict[str, Any] = {
     "lifecycle": _AT | {"node": (str, int), "state": str},
     "required": _AT | {"node": (str, int)},
     "package": _AT | {"name": str},
+    "file": _AT | {"path": str},
     "skipped": _AT | {"text": str},
     "todo": _AT | {"text": str},
 }
@@ -373,6 +374,7 @@ class _LaunchImport:
         self._after: list[tuple[str, dict[str, str]]] = []
         self._delays: list[tuple[str, float]] = []
         self._missing: dict[str, Span] = {}
+        self._saved: dict[str, Span] = {}
         #: What components are loaded into: the ids of actions, or the full names of nodes.
         self._loading = {
             record["container"] for record in records if record["kind"] == "component"
@@ -400,6 +402,8 @@ class _LaunchImport:
         }
         if kind in several:
             several[kind](record, span)
+        elif kind == "file":
+            self._saved[record["path"]] = self._span(record["at"])
         elif kind == "package":
             self._missing.setdefault(record["name"], span)
         elif kind == "skipped":
@@ -431,6 +435,9 @@ class _LaunchImport:
         one_namespace(self.draft)
         for package, span in self._missing.items():
             self.draft.todo(f"package {package} not found", span, advice=_ADVICE)
+        for file, span in self._saved.items():
+            if file not in self.draft.used:
+                self.draft.todo(f"open for writing {file}: not done", span)
 
     def _span(self, at: Any) -> Span:
         file, line = (at[0], at[1]) if at else ("", 1)

@@ -31,6 +31,7 @@ from tfcompose.tools.importers.launch_records import (
     jsonable,
     with_package,
 )
+from tfcompose.tools.importers.launch_writes import SavedFiles
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,12 +134,15 @@ class Packages:
 
 def _watch(  # noqa: C901 (one hook after another)
     recording: Recording, null: int, readable: Readable | None
-) -> None:
+) -> SavedFiles:
     """Refuse and name what a launch file may not do; pass over what is often done and needless.
+
+    What it writes is kept.
 
     With ``readable`` paths it may do nothing else but read these.
     """
     noted: set[str] = set()
+    saved = SavedFiles(recording)
 
     def note(what: str) -> None:
         if what not in noted:
@@ -190,42 +194,23 @@ def _watch(  # noqa: C901 (one hook after another)
         note(f"os.system({command!r})")
         return 0
 
-    def folder(path: Any, *_args: Any, **_more: Any) -> None:
-        note(f"the folder {path} would be made")
-
-    def temporary(suffix: str = "", prefix: str = "tmp", dir: Any = None) -> str:  # noqa: A002 (as it is called)
-        count = len(made)
-        made.append(f"{dir or tempfile.gettempdir()}/{prefix}{count}{suffix}")
-        recording.todo(
-            recording.here(),
-            f"the temporary file {made[-1]}: its name is a new one at each launch",
-        )
-        return made[-1]
-
-    made: list[str] = []
-
     def opened(file: Any, mode: str = "r", *args: Any, **more: Any) -> Any:
         path = with_package(os.fspath(file)) if isinstance(file, (str, os.PathLike)) else ""
         if path == os.devnull:
             return plain_open(os.dup(null), mode, *args, **more)
+        kept = saved.open(str(path), mode) if path else None
+        if kept is not None:
+            return kept
         if str(path).startswith(PACKAGE):
             return io.StringIO(launch_records.file_text(str(path)))
         return plain_open(file, mode, *args, **more)
 
-    def read_text(self: Path, *args: Any, **more: Any) -> str:
-        path = with_package(str(self))
-        return (
-            launch_records.file_text(path)
-            if path.startswith(PACKAGE)
-            else plain_read(self, *args, **more)
-        )
-
-    plain_open, plain_read = builtins.open, Path.read_text
+    plain_open = builtins.open
     hooks: list[tuple[Any, str, Any]] = [
         (os, "system", system),
-        (os, "makedirs", folder),
-        (os, "mkdir", folder),
-        (Path, "mkdir", folder),
+        (os, "makedirs", saved.folder),
+        (os, "mkdir", saved.folder),
+        (Path, "mkdir", saved.folder),
         (subprocess, "run", run),
         (subprocess, "call", lambda *a, **k: run(*a, **k).returncode),
         (subprocess, "check_call", lambda *a, **k: run(*a, **k).returncode),
@@ -233,13 +218,15 @@ def _watch(  # noqa: C901 (one hook after another)
         (subprocess, "getoutput", lambda words, **k: run(words, text=True, **k).stdout),
         (os, "popen", lambda words, *_a, **_k: io.StringIO(run(words, text=True).stdout)),
         (builtins, "open", opened),
-        (Path, "read_text", read_text),
-        (tempfile, "mktemp", temporary),
+        (io, "open", opened),
+        (tempfile, "mktemp", saved.temporary),
+        (tempfile, "NamedTemporaryFile", saved.named),
     ]
     for owner, name, hook in hooks:
         setattr(owner, name, hook)
     if readable is not None:
         sys.addaudithook(audit)
+    return saved
 
 
 def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dict[str, Any]:
@@ -250,11 +237,12 @@ def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dic
     packages = Packages(request["packages"], request["prefixes"])
     stopped, line = "", 0
     recording: Recording | None = None
+    saved: SavedFiles | None = None
     try:
         recording, read = _reader(request, packages)
         packages.recording = recording
         sys.dont_write_bytecode = True
-        _watch(recording, null, readable)
+        saved = _watch(recording, null, readable)
         read()
     except FailedError as error:
         stopped, line = error.reason, error.line
@@ -265,6 +253,8 @@ def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dic
         stopped = "it goes too deep"
     except BaseException as error:  # noqa: BLE001 (whatever a launch file raises is a finding)
         stopped = f"{type(error).__name__}: {error}"
+    if saved is not None:
+        saved.finish()
     records = recording.records[:MOST_RECORDS] if recording else []
     return {
         "records": jsonable(records),

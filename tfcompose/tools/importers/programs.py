@@ -11,6 +11,7 @@ import posixpath
 import re
 import shlex
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.param_files import matches
@@ -27,7 +28,14 @@ from tfcompose.tools.importers.static_transforms import (
     reader_of,
     static_transform,
 )
-from tfcompose.tools.importers.texts import Text, argument_of, concatenated, partition, parts_of
+from tfcompose.tools.importers.texts import (
+    MadeFile,
+    Text,
+    argument_of,
+    concatenated,
+    partition,
+    parts_of,
+)
 from tfcompose.tools.importers.yaml_text import Expression
 
 if TYPE_CHECKING:
@@ -420,6 +428,7 @@ def _hertz(value: float) -> Any:
 
 def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
+    program = replace(program, argv=tuple(_with_made(word, draft) for word in program.argv))
     source_name = program.name
     if not program.name and program.package and (name := _named_in_files(program.params, draft)):
         program = replace(program, name=name)
@@ -459,7 +468,7 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
     section = "containers" if program.loads else "processes"
     draft.process(name, keys, *(note for note in notes if note), section=section)
     for word in _texts((*program.argv, *program.env.values())):
-        if PACKAGE in word:
+        if PACKAGE in word and not _is_literal(word, at):
             todo.append(f"{word} is in a package that is not found here: write its path")
             advice = "--package NAME=FOLDER, or source the workspace's setup file"
     for one in (*todo, *left):
@@ -467,6 +476,26 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
     if program.description is not None:
         draft.todo("the parameter robot_description", at, (section, name), _FROM_TOPIC)
     return name
+
+
+def _is_literal(word: str, at: Span | None) -> bool:
+    """Whether the source has the word's addresses of packages itself, as the program reads them.
+
+    What the source looks up in a package that is not found has such an address too.
+    """
+    try:
+        source = Path(at.file).read_text("utf-8") if at else ""
+    except (OSError, UnicodeDecodeError):
+        return False
+    return all(address in source for address in re.findall(rf"{PACKAGE}\w+", word))
+
+
+def _with_made(word: str, draft: Draft) -> str:
+    """Return a word of a command line, with the path of a file that the source makes as ours."""
+    made = next((path for path in draft.made if word.endswith(path)), None)
+    if made is None:
+        return word
+    return Text.of((word.removesuffix(made), MadeFile(draft.bring(made))))
 
 
 def _keeps_its_name(program: Program, keys: Mapping[str, Any]) -> bool:

@@ -186,7 +186,9 @@ def _in_order(words: list[str], reader: Reader) -> StaticTransform:
 def _of(
     parent: str, child: str, xyz: Vector, rotation: tuple[float, ...], order: str
 ) -> StaticTransform:
-    parent, child = parent.removeprefix("/"), child.removeprefix("/")  # tf2 strips it
+    if parent.startswith("/") or child.startswith("/"):
+        order += "; without slashes in front of names, as tf2 has them"
+        parent, child = parent.removeprefix("/"), child.removeprefix("/")
     if not parent or not child:
         raise ArgumentsRefusedError(f"the {'child' if parent else 'parent'} frame has no name")
     if parent == child:

@@ -27,7 +27,14 @@ class FileText:
     args: Mapping[str, str] = field(default_factory=dict)
 
 
-Part = str | Argument | FileText
+@dataclass(frozen=True, slots=True)
+class MadeFile:
+    """The path of a file that is brought along, seen from the robot file."""
+
+    file: str
+
+
+Part = str | Argument | FileText | MadeFile
 
 
 class Text(str):
@@ -60,7 +67,7 @@ def _value(part: Part) -> str:
     match part:
         case Argument(value=value):
             return value
-        case FileText(file=file):
+        case FileText(file=file) | MadeFile(file=file):
             return file
     return part
 

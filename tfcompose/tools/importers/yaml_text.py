@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.yaml_text import Bare, entry
-from tfcompose.tools.importers.texts import Argument, FileText, Text, parts_of, texts_in
+from tfcompose.tools.importers.texts import Argument, FileText, MadeFile, Text, parts_of, texts_in
 
 if TYPE_CHECKING:
     from tfcompose.tools.importers.texts import Part
@@ -53,4 +53,6 @@ def _escaped_part(part: Part) -> str:
             return f"${{args.{name}}}"
         case FileText(file=file):
             return file.replace("${", "${dollar}{")
+        case MadeFile(file=file):
+            return f"${{file({file})}}"
     return part.replace("${", "${dollar}{")

@@ -1,0 +1,125 @@
+"""Files that a launch file writes when it is started: texts, which the import brings along.
+
+Nothing reaches the disk.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import tempfile
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.tools.importers.launch_records import Recording
+
+#: So much one file may hold, in characters or bytes.
+MOST = 1_000_000
+_READABLE = frozenset("rbt")
+
+
+class SavedFiles:
+    """What a launch file has written, by path.
+
+    It reads its files back as others. ``finish`` hands them to the recording, and says what else
+    it would have made: folders without such a file, and temporary names without one.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self.texts: dict[str, str] = {}
+        self._recording = recording
+        self._folders: dict[str, tuple[str, int]] = {}
+        self._temporary: dict[str, tuple[str, int]] = {}
+
+    def open(self, path: str, mode: str) -> Any | None:
+        """Return a file as ``open`` does, or None where it is to be opened on the disk."""
+        path = os.path.abspath(path)  # noqa: PTH100 (links stay)
+        kind = _Bytes if "b" in mode else _Text
+        if set(mode) <= _READABLE:
+            return kind(path, self.texts[path], lambda _: None) if path in self.texts else None
+        if "+" in mode and "w" not in mode:
+            return None
+        before = self.texts.get(path, "") if "a" in mode else ""
+        if path not in self.texts:
+            self.texts[path] = ""
+            self._recording.record("file", self._recording.here(), path=path)
+        file = kind(path, before, lambda text: self.texts.update({path: text[:MOST]}))
+        file.seek(0, io.SEEK_END)
+        return file
+
+    def named(
+        self,
+        mode: str = "w+b",
+        *_: Any,
+        suffix: str | None = None,
+        prefix: str | None = None,
+        dir: str | None = None,  # noqa: A002 (as tempfile has it)
+        **_more: Any,
+    ) -> Any:
+        """Return a file with a name, as tempfile's NamedTemporaryFile does."""
+        return self.open(self._name(suffix, prefix, dir), mode.replace("+", ""))
+
+    def temporary(
+        self,
+        suffix: str = "",
+        prefix: str = "tmp",
+        dir: str | None = None,  # noqa: A002 (as tempfile has it)
+    ) -> str:
+        """Return a name, as tempfile's mktemp does."""
+        path = self._name(suffix, prefix, dir)
+        self._temporary[path] = self._recording.here()
+        return path
+
+    def _name(self, suffix: str | None, prefix: str | None, folder: str | None) -> str:
+        number = len(self.texts) + len(self._temporary)
+        return f"{folder or tempfile.gettempdir()}/{prefix or 'tmp'}{number}{suffix or ''}"
+
+    def folder(self, path: Any, *_args: Any, **_more: Any) -> None:
+        """Note that a folder would be made."""
+        name = os.path.abspath(os.fsdecode(path))  # noqa: PTH100 (links stay)
+        self._folders.setdefault(name, self._recording.here())
+
+    def finish(self) -> None:
+        """Hand what was written to the recording."""
+        self._recording.files |= self.texts
+        for path, at in self._folders.items():
+            if not any(PurePath(file).is_relative_to(path) for file in self.texts):
+                self._recording.todo(at, f"the folder {path} would be made: not done")
+        for path, at in self._temporary.items():
+            if path not in self.texts:
+                self._recording.todo(
+                    at, f"the temporary file {path}: its name is a new one at each launch"
+                )
+
+
+class _Text(io.StringIO):
+    def __init__(self, path: str, text: str, keep: Callable[[str], object]) -> None:
+        super().__init__(text)
+        self.name = path
+        self._keep = keep
+
+    def flush(self) -> None:
+        self._keep(self.getvalue())
+
+    def close(self) -> None:
+        if not self.closed:
+            self.flush()
+        super().close()
+
+
+class _Bytes(io.BytesIO):
+    def __init__(self, path: str, text: str, keep: Callable[[str], object]) -> None:
+        super().__init__(text.encode())
+        self.name = path
+        self._keep = keep
+
+    def flush(self) -> None:
+        self._keep(self.getvalue().decode(errors="replace"))
+
+    def close(self) -> None:
+        if not self.closed:
+            self.flush()
+        super().close()

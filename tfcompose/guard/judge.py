@@ -90,11 +90,22 @@ class Judge:
 
     def message(self, message: Message, now: float) -> list[GuardEvent]:
         """Take a message and return which edges it brings to life; ``tick`` reports violations."""
+        return self.arrived(self.take(message, now), message, now)
+
+    def take(self, message: Message, now: float) -> JudgedMessage:
+        """Take a message and return the verdict on it, with which it can be passed on.
+
+        Give both to ``arrived`` afterwards.
+        """
         self._senders.heard(message, now)
         if message.poses:
             self._sent.take(message)
         judged = self.ledger.take(message, now)
         self.admitted = judged.admitted
+        return judged
+
+    def arrived(self, judged: JudgedMessage, message: Message, now: float) -> list[GuardEvent]:
+        """Judge when a message that was taken came; return which edges it brings to life."""
         if not judged.children:
             return []
         return self.live.arrived(judged.children, now, self._judge_stamps(judged, message, now))

@@ -58,14 +58,16 @@ from tfcompose.tf.ros.node import WaitSet, middleware, open_node
 from tfcompose.tf.ros.tf_codec import number_of_transforms
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from typing import Any
 
     from rclpy.node import Node
 
     from tfcompose.foundation.signals import Stop
+    from tfcompose.guard.ledger import JudgedMessage
     from tfcompose.model.messages import GuardEvent
     from tfcompose.model.plan import Plan, PlanProcess
+    from tfcompose.tf.live.publishers import Message
     from tfcompose.tf.live.topics import TFData
     from tfcompose.tf.process import Own
 
@@ -73,6 +75,8 @@ if TYPE_CHECKING:
 
 
 CHECK_EVERY_S = 0.1
+#: A check waits so much longer while messages come that are passed on, in seconds.
+LATE_S = 0.05
 #: How often a strict guard says what it held back, in seconds.
 REPORT_EVERY_S = 10.0
 
@@ -136,7 +140,8 @@ class TopicWatch:
     @property
     def wait_s(self) -> float:
         """How long the next step can wait at most, in seconds."""
-        return WAIT_S if self._flood.is_reading else CHECK_EVERY_S
+        due_s = max(0.0, self._due - time.monotonic())
+        return min(due_s, WAIT_S) if self._flood.is_reading else due_s
 
     def close(self) -> None:
         """End what must end before the node does."""
@@ -147,15 +152,17 @@ class TopicWatch:
         now = time.monotonic()
         if self._clock:
             self.judge.clock(self._clock.now_ns(), now)
-        strangers = self._take(self.data.take_fenced(), now)  # first: it is passed on
+        fenced = list(self.data.take_fenced())
+        strangers = self._take(fenced, now)  # first: it is passed on
         public = list(self.data.take_public())
         if self._by_partition:
             self._graph.hear_public(one.received.gid for one in public if one.received.gid)
         strangers |= self._take(public, now)
         declared = self._flood.read(now)  # after the others, which wait for nothing
         if declared is not None:
-            self._read(declared, now)
-        if now >= self._due:
+            self._judge(self._read(declared, now), now)
+        # What is under way waits for a check no longer than it must.
+        if now >= self._due + (LATE_S if fenced else 0.0):
             self._due = now + CHECK_EVERY_S
             if not strangers:  # else they were asked for
                 self._ask_graph(now)
@@ -182,11 +189,15 @@ class TopicWatch:
         self._known |= dict.fromkeys(strangers)
         if strangers:  # who sends once and goes is in the graph for a moment only
             self._ask_graph(now)
-        for one in taken:
-            self._take_one(one, now)
+        self._judge([message for one in taken for message in self._take_one(one, now)], now)
         return bool(strangers)
 
-    def _take_one(self, data: TFData, now: float) -> None:
+    def _judge(self, read: Iterable[tuple[JudgedMessage, Message]], now: float) -> None:
+        """Judge when messages came, after all of them are passed on."""
+        for judged, message in read:
+            self._pass_on(self.judge.arrived(judged, message, now))
+
+    def _take_one(self, data: TFData, now: float) -> Iterator[tuple[JudgedMessage, Message]]:
         """Take a message; long or unfamiliar ones from a flooding publisher are read in parts."""
         received, judge = data.received, self.judge
         number = number_of_transforms(received.data)
@@ -195,9 +206,10 @@ class TopicWatch:
             if not self._decoder.knows(received.data):
                 self._flood.add(data)
                 return
-        self._read(data, now)
+        yield from self._read(data, now)
 
-    def _read(self, data: TFData, now: float) -> None:
+    def _read(self, data: TFData, now: float) -> Iterator[tuple[JudgedMessage, Message]]:
+        """Read a message and pass it on; yield what is to be judged of it afterwards."""
         received = data.received
         try:
             message = self._reader.read(received, static=data.static)
@@ -206,11 +218,10 @@ class TopicWatch:
                 self._malformed[received.gid] = None
                 say(f"dropped a TF message: {error} (reported once for each publisher)")
             return
-        self._pass_on(self.judge.message(message, now))
+        judged = self.judge.take(message, now)
         if self.relay:
-            self.relay.pass_on(
-                data, message, self.judge.admitted, self.judge.name_of(received.gid)
-            )
+            self.relay.pass_on(data, message, judged.admitted, self.judge.name_of(received.gid))
+        yield judged, message
 
     def _ask_graph(self, now: float) -> None:
         """Take who publishes now; what waited for a name may pass."""

@@ -132,8 +132,17 @@ def test_an_owner_that_falls_silent_is_named_within_a_second_and_once(
     watch: Callable[..., History], hertz: int
 ) -> None:
     history = watch(edge("map odom", "slam", hertz)).steadily(3, hertz, "odom").run(1 - 1 / hertz)
-    expect(history.only(), "TF804", "slam (/slam)", "map → odom")
+    expect(history.only(), "TF804", "slam (/slam)", "map → odom", " ms")
     assert len(history.run(60).found()) == 1
+
+
+def test_what_an_owner_that_was_stopped_on_purpose_still_sends_does_not_count(
+    watch: Callable[..., History],
+) -> None:
+    history = watch(edge("map odom", "slam", 10)).steadily(2, 10, "odom")
+    history.live.absent("slam")
+    before = list(history.events)
+    assert history.run(5, [(0.1, "odom"), (0.2, "odom")]).events == before
 
 
 def test_an_owner_that_was_never_heard_is_not_silent(watch: Callable[..., History]) -> None:

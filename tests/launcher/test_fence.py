@@ -250,6 +250,7 @@ def test_an_owner_whose_command_names_a_profile_by_itself_is_not_started(
     drive = replace(SLAM, name="drive", argv=argv)
     _, (found,) = inspect(tmp_path, drive, GUARD, fence="partition")
     expect(found, "TF902", "drive", "fence: remap", *names)
+    assert ("/opt/my.xml}" in found.help) is ("/opt/my.xml" in names)
     assert inspect(tmp_path, replace(drive, owns=()), GUARD, fence="partition")[1] == [], (
         "who may send no TF at all"
     )

@@ -180,3 +180,10 @@ def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:
     assert history.state.given_up == ("nav", "camera")
     history.feed(TimeUp(), Exited("static", 0))
     assert [one.because[0].split()[0] for one in history.all(Ended)] == ["camera"]
+
+
+def test_a_process_that_was_stopped_on_purpose_does_not_fail_with_what_it_waits_for() -> None:
+    nav = optional("nav", after={"camera": "done"})
+    history = begin(STATIC, nav, optional()).feed(ProcessRequest("stop", "nav"))
+    history.feed(Exited("camera", 3))
+    assert history.state.given_up == ("camera",)

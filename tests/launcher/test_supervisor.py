@@ -5,6 +5,7 @@ import shutil
 import signal
 import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from signal import SIGHUP, SIGINT, SIGKILL, SIGTERM
 from typing import Any
@@ -19,6 +20,7 @@ from tfcompose.foundation import findings
 from tfcompose.foundation.catalogue import Catalogue
 from tfcompose.launcher import supervisor
 from tfcompose.launcher.child import READ_SIZE
+from tfcompose.launcher.preflight import own_env
 from tfcompose.launcher.state import Times
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import (
@@ -319,6 +321,10 @@ def test_placeholders_environment_and_folder_are_those_of_the_plan(tmp_path: Pat
         1,
     ]
     assert logged(notices, "a") == [" ".join(map(str, expected))]
+    elsewhere = own_env(
+        replace(process, env={"B": "${build_dir}"}), tmp_path / "p", Path("/built")
+    )
+    assert elsewhere == {"B": "/built"}, "a plan may run from another folder than it was built in"
 
 
 def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(

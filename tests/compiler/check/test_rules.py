@@ -162,6 +162,23 @@ def test_the_nearest_known_name_is_the_advice(spec: str, wrong: str, right: str)
     assert any(wrong in words(one) and right in words_of(one.help) for one in found)
 
 
+def test_the_advice_for_a_chain_of_joints_that_follow_each_other_moves_the_last_as_before() -> (
+    None
+):
+    joint = "{{type: continuous, parent: base_link, child: {}{}}}"
+    joints = {
+        "a": "",
+        "b": ", mimic: {joint: a, multiplier: 2, offset: 0.5}",
+        "c": ", mimic: {joint: b, multiplier: -2, offset: 0.1}",
+    }
+    lines = [f"  {name}: {joint.format(name, more)}" for name, more in joints.items()]
+    links = "links: {base_link: {}, a: {}, b: {}, c: {}}\njoints:\n"
+    text = f"tfcompose: 1\nrobot: r\n{links}" + "\n".join(lines)
+    found = compile_robot(text, "r.yaml", library()).found
+    (chain,) = [one for one in found if one.code == "TF708"]
+    assert "{joint: a, multiplier: -4, offset: -0.9}" in chain.help
+
+
 def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on() -> None:
     @rule("TF201")
     def two_parents(robot: Robot) -> Iterator[Finding]:

@@ -31,11 +31,13 @@ links:
   b:
     collision: {sphere: {radius: 0.1}}
     inertial: {mass: 2, inertia: {ixx: 1, iyy: 2, izz: 2, ixy: 0.1}, rpy: [0.1, 0, 0]}
+  c: {}
 joints:
   j: {type: revolute, parent: base_link, child: a, rpy: [0.1, 0.2, 0.3], limit: {lower: -1, upper: 1, effort: 1},
       dynamics: {damping: 1}, safety_controller: {k_velocity: 1}, calibration: {rising: 0.5}}
   k: {type: prismatic, parent: a, child: b, mimic: {joint: j, offset: 1}, axis: [0, 1, 0],
       limit: {lower: 0, upper: 1}}
+  turns: {type: continuous, parent: b, child: c, limit: {effort: 2, velocity: 3}}
 """  # noqa: E501 (a text as its reader has it)
 #: What yourdfpy takes an axis for that is not there.
 AXIS_OF_ITSELF = '    <axis xyz="1 0 0"/>\n'

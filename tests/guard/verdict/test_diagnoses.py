@@ -27,7 +27,8 @@ from tfcompose.guard.verdict.doctor import diagnose, examine
 from tfcompose.guard.verdict.setup import settings_apart
 from tfcompose.guard.verdict.stamps import other_clock
 from tfcompose.model.plan import EdgePattern, GuardPolicy, PlanProcess
-from tfcompose.tf.live.state import RosProcess, StampedData, TopicState, TreeState
+from tfcompose.tf.live.publishers import Publisher
+from tfcompose.tf.live.state import NAMELESS, RosProcess, StampedData, TopicState, TreeState
 from tfcompose.tf.ros.environment import RANGE
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
@@ -525,3 +526,19 @@ def test_joint_states_of_a_neighbour_robot_are_not_this_ones() -> None:
         heard,
     )  # nobody below /robot1 publishes TF: they are for this tree
     assert "TF842" in codes(history.observed(graph=alone))
+
+
+def test_two_publishers_of_one_node_are_each_reported_with_their_edges() -> None:
+    tree = TreeHistory().knows(b"d", b"e").fixed("base_link laser")
+    for edge, gid in (("odom base_link", b"d"), ("base_link arm", b"e")):
+        tree.moving(edge, gid, stamp=late(-0.5))
+    found = [one for one in diagnose(tree.observed()) if one.code == "TF835"]
+    assert len(found) == 2
+
+
+@pytest.mark.parametrize("node", ["", "/flood"])
+def test_a_flood_is_reported_also_of_a_publisher_that_has_no_name(node: str) -> None:
+    state = sound_tree().observed(beyond={b"f": 7})
+    state = replace(state, publishers=(*state.publishers, Publisher(b"f", node, static=False)))
+    (found,) = [one for one in diagnose(state) if one.code == "TF853"]
+    assert found.message.startswith(node or NAMELESS)

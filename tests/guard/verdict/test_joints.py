@@ -1,10 +1,14 @@
 """Who sends which joints, judged: two senders of a joint, and joints that nobody has."""
 
+from dataclasses import replace
+
 import pytest
 
-from tests.support.tree_history import SECOND_NS, sound_tree
+from tests.support.tree_history import SECOND_NS, sound_plan, sound_tree
+from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.joints import sent_twice, unknown_joints
+from tfcompose.model.plan import Joint, PlanEdge, SourceLine
 from tfcompose.tf.live.sent_joints import SentJoints
 from tfcompose.tf.live.state import MovingJoint, TopicState
 
@@ -39,6 +43,14 @@ def sender(node: str, *joints: str, first_s: float = 0.0, last_s: float = 10.0) 
             id="one that was started again",
         ),
         pytest.param(
+            [
+                sender("/wheels", "arm", first_s=start, last_s=start + 3.0)
+                for start in (0.0, 3.1, 6.2)
+            ],
+            [],
+            id="one that was started again twice",
+        ),
+        pytest.param(
             [sender("/wheels", "arm"), sender("", "arm")], [], id="one without a name yet"
         ),
     ],
@@ -55,6 +67,28 @@ def test_a_joint_that_the_robot_lacks_is_named_with_the_nearest() -> None:
     assert (found.code, "/rogue" in found.message) == ("TF861", True)
     assert "arm_joint" in found.help
     assert not list(unknown_joints([sender("/rogue", "anything")], set()))
+
+
+def test_a_joint_that_follows_another_needs_no_state_also_where_the_plan_describes_it() -> None:
+    joint = Joint("arm", "revolute", (0.0, 0.0, 1.0))
+    edge = PlanEdge(
+        "base_link",
+        "arm",
+        "joint",
+        "drive",
+        "/drive",
+        Pose(),
+        None,
+        SourceLine("r.yaml", 1),
+        joint,
+    )
+    heard = TopicState(TOPIC, "sensor_msgs/msg/JointState", ("/wheels",), ("/drive",))
+    for mimic, expected in ((None, True), ("wheel", False)):
+        plan = sound_plan(replace(edge, joint=replace(joint, mimic=mimic)))
+        state = sound_tree().observed(
+            graph=(heard,), plan=plan, sent_joints=(sender("/wheels", "wheel"),)
+        )
+        assert ("TF844" in {one.code for one in diagnose(state)}) is expected
 
 
 def test_doctor_judges_the_topic_of_this_robot_alone() -> None:

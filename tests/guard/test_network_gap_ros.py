@@ -82,7 +82,9 @@ def wrong(computers: Computers) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize(("where", "then"), [("socket", "same"), ("path", "restarted")])
+@pytest.mark.parametrize(
+    ("where", "then"), [("socket", "same"), ("path", "restarted"), ("socket", "restarted")]
+)
 def test_after_a_gap_each_computer_sees_all_edges_of_the_other_one_again(
     computers: Computers, where: str, then: str
 ) -> None:

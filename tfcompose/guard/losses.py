@@ -66,8 +66,8 @@ def datagrams_lost(lost: int, limit: int | None) -> Finding:
     )
     note = Note("meanwhile no owner is called silent or slow")
     if limit is None or limit < WANTED:
-        held = f", which is {limit} here" if limit is not None else ""
-        advice = f"let its sockets hold more{held}: sudo sysctl -w {LIMIT}={WANTED}"
+        now = f" than the {limit:,} bytes of now" if limit is not None else ""
+        advice = f"let a socket hold more{now}: sudo sysctl -w {LIMIT}={WANTED}"
     else:
         advice = "give the guard more of a processor, or let publishers send at different moments"
     return finding("TF862", message, None, notes=[note], help=advice)

@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.signals import Stop
 from tfcompose.model.plan.file import read_plan
-from tfcompose.model.variables import GO, HOLD_FD
+from tfcompose.model.variables import GO, HOLD_FD, JOINS, MEMORY_FD
 from tfcompose.tf.ros.environment import RosError, child_environment, missing_ros
+from tfcompose.tf.ros.network import FirstNetwork
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -71,6 +72,11 @@ class Own:
         return self.plan.edges_of(self.process.name)
 
     @property
+    def is_of_several_computers(self) -> bool:
+        """Whether a process of its robot names a computer."""
+        return any(one.host for one in self.plan.processes)
+
+    @property
     def description(self) -> Path:
         """The file that becomes ``robot_description``; it is beside the plan."""
         return self.file.parent / (self.process.description or self.plan.description)
@@ -92,7 +98,8 @@ def start(argv: Sequence[str], kind: str, role: Callable[[Own, Stop], None]) -> 
     ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. ``role`` is what the
     process does. It imports ROS, which takes a third of a second, when it is called: signals are
     handled by then, and whoever is interrupted ends without a traceback. Before it joins ROS it
-    waits for ``wait_for_go``.
+    waits for ``wait_for_go``. Of a robot on several computers, one that began without a network
+    leaves ROS when there is one, and begins anew in the same process.
 
     Returns:
         0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
@@ -108,10 +115,17 @@ def start(argv: Sequence[str], kind: str, role: Callable[[Own, Stop], None]) -> 
         os.environ.update(child_environment(os.environ, own.plan.ros, own=True))
         if stop.requested:
             return 0
+        network = FirstNetwork(stop)
         try:
-            role(own, stop)
+            with network if own.is_of_several_computers else contextlib.nullcontext():
+                role(own, stop)
         except RosError as error:
             return _fail(error, 1)
+    if network.came:
+        say("this computer has a network now: joining ROS again")
+        os.environ[JOINS] = "1"
+        os.environ.pop(MEMORY_FD, None)
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])  # noqa: S606 (what it began as)
     return 0
 
 

@@ -1,0 +1,69 @@
+"""Whether this computer has a network, and the wait for one.
+
+DDS reads a computer's addresses once, when a process joins. One that joins without a network, as
+at boot before Wi-Fi is there, or while a cable is out, is not heard on another computer, and hears
+nobody there, for good.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import struct
+from contextlib import suppress
+from threading import Event, Thread
+from typing import TYPE_CHECKING
+
+from tfcompose.tf.ros.environment import RANGE
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+    from tfcompose.foundation.signals import Stop
+
+#: How often it is checked whether there is one, in seconds.
+CHECK_EVERY_S = 0.5
+_FLAGS, _ADDRESS = 0x8913, 0x8915  # SIOCGIFFLAGS and SIOCGIFADDR of linux/sockios.h
+_LOOPBACK, _RUNNING = 0x8, 0x40  # IFF_LOOPBACK and IFF_RUNNING of linux/if.h
+_REQUEST = struct.Struct("16sH22x")  # ifreq: a name, and flags
+
+
+def has_network() -> bool:
+    """Return whether an interface beside the loopback runs and has an address of IPv4."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
+        for _, name in socket.if_nameindex():
+            request = _REQUEST.pack(name.encode(), 0)
+            with suppress(OSError):  # it has no address, or is gone
+                flags = _REQUEST.unpack(fcntl.ioctl(opened, _FLAGS, request))[1]
+                fcntl.ioctl(opened, _ADDRESS, request)
+                if flags & (_LOOPBACK | _RUNNING) == _RUNNING:
+                    return True
+    return False
+
+
+class FirstNetwork:
+    """Requests ``stop`` once there is a network, where there is none as the block begins.
+
+    ``came`` says that this was so. Where only this computer is heard, nothing is awaited.
+    """
+
+    def __init__(self, stop: Stop) -> None:
+        self.came = False
+        self._stop = stop
+        self._ended = Event()
+
+    def __enter__(self) -> Self:
+        if os.environ.get(RANGE) not in {"LOCALHOST", "OFF"} and not has_network():
+            Thread(target=self._wait, name="network", daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+
+    def _wait(self) -> None:
+        while not self._ended.wait(CHECK_EVERY_S):
+            if has_network():
+                self.came = not self._stop.requested
+                self._stop.request()
+                return

@@ -23,7 +23,7 @@ from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.launcher.child import BURST, PER_SECOND
 from tfcompose.launcher.control import ask, connect
-from tfcompose.launcher.procfs import end, leftovers
+from tfcompose.launcher.leftovers import end, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDir
 from tfcompose.launcher.supervisor import LONGEST_SLEEP_S
 from tfcompose.model.messages import (

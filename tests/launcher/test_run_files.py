@@ -15,7 +15,7 @@ from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.launcher import runtime_dir
 from tfcompose.launcher.control import ask, connect
-from tfcompose.launcher.procfs import end, leftovers
+from tfcompose.launcher.leftovers import end, leftovers
 from tfcompose.launcher.run_files import RunFiles
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir, goes_with_logout, user_name
 from tfcompose.launcher.supervisor import FILES_CHECK_S

@@ -23,8 +23,8 @@ from tfcompose.cli.terminal import FAILED, can_redraw, coloured, warn
 from tfcompose.foundation.text import counted
 from tfcompose.launcher.control import connect
 from tfcompose.launcher.output import Follower, NonBlockingOutput, runs_of
-from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.supervisor import ENDING, Signals
+from tfcompose.launcher.usage import UsageMeter
 from tfcompose.model.messages import (
     Ended,
     EventsRequest,

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from tfcompose.cli.terminal import warn
+from tfcompose.foundation.procfs import PROC
 
 YAML_ENDINGS = (".yaml", ".yml")
 #: What a robot file has at the begin of a line: its first key, or, with that misspelt, two others
@@ -21,7 +22,7 @@ _ROBOT = re.compile(
 #: After this time a search for robot files says what it does, in seconds.
 SAY_AFTER_S = 5.0
 #: What the kernel shows as files: reading some waits, or does something.
-_OF_KERNEL = frozenset({"/proc", "/sys", "/dev"})
+_OF_KERNEL = frozenset({PROC, "/sys", "/dev"})
 
 
 def robots_in(name: str) -> list[str]:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, TypeVar
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, wait_for_data, warn
+from tfcompose.foundation import procfs
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.text import listed
 from tfcompose.launcher.control import RequestRefusedError, ask, connect
-from tfcompose.launcher.procfs import environment_of, leftovers
+from tfcompose.launcher.leftovers import leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
 from tfcompose.model.messages import (
     Done,
@@ -266,7 +267,7 @@ def hidden_run(place: RuntimeDir) -> str | None:
     if not led or led[0].launcher is None:
         return None
     with contextlib.suppress(OSError):
-        folder = environment_of(led[0].launcher).get("XDG_RUNTIME_DIR")
+        folder = procfs.environ(led[0].launcher).get("XDG_RUNTIME_DIR")
         where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
         return (
             f"{place.name} runs already: pid {led[0].launcher}, with {where}; set it for ps and"

@@ -13,6 +13,7 @@ import stat
 from pathlib import Path
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.foundation.procfs import PROC
 
 #: Of a file of text: robot, description, plan.
 MOST_BYTES = 16_000_000
@@ -83,7 +84,7 @@ def _bytes_of(descriptor: int, name: str, most: int) -> bytes | None:
     kind = os.fstat(descriptor).st_mode
     if stat.S_ISDIR(kind):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), name)
-    if stat.S_ISFIFO(kind) and not name.startswith((*_OPEN_ALREADY, "/proc/")):
+    if stat.S_ISFIFO(kind) and not name.startswith((*_OPEN_ALREADY, f"{PROC}/")):
         raise OSError(0, "it is a pipe, not a file", name)
     os.set_blocking(descriptor, stat.S_ISFIFO(kind) or name.startswith(_OPEN_ALREADY))
     with open(descriptor, "rb", closefd=False) as stream:

@@ -19,6 +19,8 @@ import signal
 import struct
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from tfcompose.foundation.procfs import threads
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -170,7 +172,7 @@ def confine(readable: Readable | None) -> list[str]:
     Raises:
         RuntimeError: if there are other threads, which Landlock would not confine.
     """
-    if os.stat("/proc/self/task").st_nlink > 3:  # noqa: PTH116, PLR2004 (., .., and this one)
+    if threads() > 1:
         raise RuntimeError("a process is confined before it starts threads")
     libc = ctypes.CDLL(None, use_errno=True)
     libc.syscall.restype = ctypes.c_long

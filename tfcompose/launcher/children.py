@@ -25,7 +25,7 @@ from tfcompose.launcher.child import (
     spawn,
 )
 from tfcompose.launcher.events import Exited, LogMatched, Started, StartFailed
-from tfcompose.launcher.procfs import (
+from tfcompose.launcher.leftovers import (
     descendants,
     end,
     launcher_mark,

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 
-from tfcompose.launcher.procfs import is_suspended
+from tfcompose.foundation import procfs
 from tfcompose.model.messages import REQUESTS, UNREADABLE, EventsRequest, Refusal, line_of
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def _at(place: RuntimeDir) -> Iterator[str]:
     """Give the socket's address: a short one, because Linux takes only 107 bytes."""
     folder = os.open(place.folder, os.O_DIRECTORY | os.O_RDONLY)
     try:
-        yield f"/proc/self/fd/{folder}/{place.socket.name}"
+        yield f"{procfs.descriptor(folder)}/{place.socket.name}"
     finally:
         os.close(folder)
 
@@ -99,11 +99,19 @@ def connect(place: RuntimeDir) -> socket.socket:
     return connection
 
 
+def _is_suspended(pid: int) -> bool:
+    """Return whether the process was stopped, as by Ctrl-Z, and waits to be continued."""
+    try:
+        return procfs.stat(pid).state == "T"
+    except OSError:
+        return False
+
+
 def _ensure_it_runs(place: RuntimeDir) -> None:
     holder = place.holder()
     if holder is None:
         return
-    if is_suspended(holder.pid):
+    if _is_suspended(holder.pid):
         raise ConnectionError(
             f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} lets it go on"
         )

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, finding
+from tfcompose.foundation.procfs import OOM_SCORE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -109,7 +110,7 @@ def _cpus_with(schedule: Schedule) -> set[int]:
 
 # Who ends first when memory runs out.
 
-_SCORE = Path("/proc/self/oom_score_adj")
+_SCORE = Path(OOM_SCORE)
 
 
 def _apply_score(score: int) -> None:

@@ -29,6 +29,7 @@ from functools import partial
 from itertools import dropwhile, takewhile
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation import procfs
 from tfcompose.launcher.control import Control
 from tfcompose.model.messages import LogLine, notice_line
 
@@ -129,7 +130,7 @@ def _not_waiting(fd: int) -> tuple[int, bool]:
     if stat.S_ISREG(kind):
         return fd, True
     try:
-        return os.open(f"/proc/self/fd/{fd}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY), True
+        return os.open(procfs.descriptor(fd), os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY), True
     except OSError:
         return fd, False
 

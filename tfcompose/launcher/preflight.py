@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from tfcompose.foundation import procfs
 from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.hooks import run_hook
 from tfcompose.foundation.tool import installed
@@ -234,7 +235,7 @@ def _here() -> Path:
     try:
         return Path.cwd()
     except FileNotFoundError:
-        return Path(str(Path("/proc/self/cwd").readlink()).removesuffix(" (deleted)"))
+        return Path(procfs.working_dir())
 
 
 def filled_in(

@@ -58,7 +58,7 @@ def run(arguments: Namespace) -> int:
 
 def _stop_leftovers(robot: str | None) -> int:
     from tfcompose.cli.runs import chosen_run
-    from tfcompose.launcher.procfs import end, leftovers
+    from tfcompose.launcher.leftovers import end, leftovers
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
     place = chosen_run(robot, "down --leftovers", among=lambda: runtime_dirs(os.environ))

@@ -46,7 +46,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where a robot does not answer, or as --fail-on says."""
     from tfcompose.cli.process_table import HEAD, TABLE, row, state_of, uptime
-    from tfcompose.launcher.procfs import usage_of
+    from tfcompose.launcher.usage import usage_of
 
     robots, code = _robots(arguments.robot)
     used = usage_of(

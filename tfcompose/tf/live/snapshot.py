@@ -27,7 +27,7 @@ from tfcompose.tf.ros.environment import RMW
 from tfcompose.tf.ros.graph import ends, nodes, topics, volatile_readers
 from tfcompose.tf.ros.joint_codec import JOINT_STATE_TYPE
 from tfcompose.tf.ros.node import LATCHED, TextSubscription, middleware
-from tfcompose.tf.ros.processes import ros_processes, settings_in
+from tfcompose.tf.ros.processes import ros_processes, ros_variables
 from tfcompose.tf.ros.sensor_data import (
     HEADED,
     HeaderSubscription,
@@ -346,5 +346,4 @@ def _robots_inside(view: _TopicPair, graph: dict[str, TopicState]) -> tuple[str,
 
 def own_settings() -> dict[str, str]:
     """Return this environment's ROS variables and the middleware in use."""
-    own = settings_in(b"\0".join(f"{name}={value}".encode() for name, value in os.environ.items()))
-    return {**own, RMW: middleware()}
+    return {**ros_variables(os.environ), RMW: middleware()}

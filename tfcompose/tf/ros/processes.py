@@ -1,6 +1,4 @@
-"""Processes of this machine, read from /proc.
-
-Those that have ROS loaded, and whose a publisher's id is.
+"""Processes of this machine that have ROS loaded, and whose a publisher's id is.
 
 With Fast DDS an id begins with the vendor's number (01 0f), two bytes for the host, and the lower
 half of the process id (``GuidUtils``, Fast DDS 2.14). Two machines can have the same two bytes, so
@@ -12,16 +10,15 @@ from __future__ import annotations
 
 import os
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.foundation import procfs
 from tfcompose.foundation.text import masked
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
-_PROC = Path("/proc")
-_LIBRARY = b"librcl.so"
+_LIBRARY = "librcl.so"
 _PREFIXES = ("ROS_", "RMW_")
 #: Of a command line so much is shown.
 _SHOWN = 100
@@ -31,26 +28,21 @@ _WORD = 1 << 16
 
 def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
     """Yield pid, command and ROS variables of each other process with rcl loaded."""
-    for entry in sorted(_PROC.glob("[0-9]*"), key=lambda path: int(path.name)):
-        if entry.name == str(os.getpid()):
+    for pid in procfs.pids():
+        if pid == os.getpid():
             continue
         try:
-            if _LIBRARY not in (entry / "maps").read_bytes():
+            if not procfs.has_loaded(pid, _LIBRARY):
                 continue
-            environment = (entry / "environ").read_bytes()
-            command = (entry / "cmdline").read_bytes()
+            variables, command = ros_variables(procfs.environ(pid)), _shown(procfs.argv(pid))
         except OSError:  # another user's, or it has just ended
             continue
-        yield int(entry.name), _shown(command), settings_in(environment)
+        yield pid, command, variables
 
 
-def settings_in(environment: bytes) -> dict[str, str]:
-    """Return ROS's variables of an environment as /proc shows it.
-
-    NAME=VALUE, each ended by a NUL.
-    """
-    pairs = (word.decode(errors="replace").partition("=") for word in environment.split(b"\0"))
-    return {name: value for name, _, value in pairs if name.startswith(_PREFIXES)}
+def ros_variables(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return ROS's variables of an environment."""
+    return {name: value for name, value in environment.items() if name.startswith(_PREFIXES)}
 
 
 def origin(gid: bytes, own_gid: bytes) -> str:
@@ -122,10 +114,7 @@ def _is_known(gid: bytes, own_gid: bytes) -> bool:
 
 def _candidates(gid: bytes) -> range:
     """Return the pids whose lower half is that of the id."""
-    try:
-        most = int((_PROC / "sys/kernel/pid_max").read_text(encoding="ascii"))
-    except (OSError, ValueError):
-        most = _WORD
+    most = procfs.kernel_number("kernel.pid_max") or _WORD
     return range(int.from_bytes(gid[4:6], "little"), most + 1, _WORD)
 
 
@@ -136,47 +125,34 @@ def _environment(pid: int) -> dict[str, str]:
         PermissionError: if it is another user's.
     """
     try:
-        data = (_PROC / str(pid) / "environ").read_bytes()
+        return procfs.environ(pid)
     except PermissionError:
         raise
     except OSError:
         return {}
-    words = (word.decode(errors="replace").partition("=") for word in data.split(b"\0"))
-    return {name: value for name, _, value in words if name}
 
 
 def _parent(pid: int) -> int:
     """Return the number of the process's parent, 0 where it has just ended."""
     try:
-        fields = (_PROC / str(pid) / "stat").read_text(encoding="utf-8", errors="replace")
-        return int(fields.rpartition(")")[2].split()[1])
-    except (OSError, IndexError, ValueError):
+        return procfs.stat(pid).parent
+    except OSError:
         return 0
 
 
 def _command(pid: int) -> str:
-    """Return the process's command line, empty where there is none.
-
-    A thread of a process's own has none.
-    """
-    try:
-        return _shown((_PROC / str(pid) / "cmdline").read_bytes())
-    except OSError:
-        return ""
+    """Return the process's command line as it is shown, empty where there is none."""
+    return _shown(words_of(pid))
 
 
 def words_of(pid: int) -> list[str]:
     """Return the words of a process's command line, none where they cannot be had."""
     try:
-        data = (_PROC / str(pid) / "cmdline").read_bytes()
+        return procfs.argv(pid)
     except OSError:
         return []
-    return (
-        [word.decode(errors="replace") for word in data.rstrip(b"\0").split(b"\0")] if data else []
-    )
 
 
-def _shown(command: bytes) -> str:
-    line = " ".join(command.decode(errors="replace").replace("\0", " ").split())
-    line = masked(line, "?")
+def _shown(words: list[str]) -> str:
+    line = masked(" ".join(" ".join(words).split()), "?")
     return line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…"

@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import os
 import socket
+import stat
 import struct
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from tfcompose.foundation import procfs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 #: So many bytes each socket is to hold; the kernel grants at most ``LIMIT``.
 WANTED = 16 * 1024 * 1024
-#: The kernel's limit, a file below /proc/sys.
+#: The kernel's limit, as sysctl names it.
 LIMIT = "net.core.rmem_max"
 _MEMORY = struct.Struct("=9I")  # SK_MEMINFO_VARS of linux/sock_diag.h: the last one counts drops
 _SO_MEMINFO = 55  # asm-generic/socket.h
@@ -36,10 +38,7 @@ def widen_buffers() -> None:
 
 def buffer_limit() -> int | None:
     """Return how many bytes the kernel grants a socket, None where it does not say."""
-    try:
-        return int(Path("/proc/sys", *LIMIT.split(".")).read_text("ascii"))
-    except (OSError, ValueError):
-        return None
+    return procfs.kernel_number(LIMIT)
 
 
 class LostDatagrams:
@@ -66,10 +65,10 @@ def _drops() -> dict[int, int]:
 
 def _udp_sockets() -> Iterator[socket.socket]:
     """Yield this process's sockets of UDP, each as a copy that is open meanwhile."""
-    for entry in Path("/proc/self/fd").iterdir():
+    for descriptor in procfs.descriptors():
         with suppress(OSError):  # closed meanwhile
-            if not entry.is_socket():
+            if not stat.S_ISSOCK(os.fstat(descriptor).st_mode):
                 continue
-            with socket.socket(fileno=os.dup(int(entry.name))) as one:
+            with socket.socket(fileno=os.dup(descriptor)) as one:
                 if one.family in _INTERNET and one.type == socket.SOCK_DGRAM:
                     yield one

@@ -13,8 +13,8 @@ from tfcompose.cli.terminal import INTERRUPTED, reject, warn
 from tfcompose.foundation.findings import finding
 from tfcompose.foundation.signals import Stop
 from tfcompose.launcher.control import RequestRefusedError, ask
-from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of
+from tfcompose.launcher.usage import UsageMeter
 from tfcompose.model.messages import RobotStatus, StatusRequest
 from tfcompose.model.plan.topics import parts_of
 from tfcompose.tf.live.edges import SETTLE_S, TreeObserver

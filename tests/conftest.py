@@ -21,7 +21,15 @@ from tests.support.skips import ACCEPTED, unexpected
 from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.program import HERE
-from tfcompose.model.plan import Clock, Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.plan import (
+    Clock,
+    Plan,
+    PlanEdge,
+    PlanJoint,
+    PlanProcess,
+    RosSettings,
+    SourceLine,
+)
 from tfcompose.model.plan.file import write_plan
 from tfcompose.tf.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES, missing_ros
 
@@ -219,7 +227,7 @@ def edge() -> Callable[..., PlanEdge]:
     """Make a plan's edge from "parent child", owner and kind."""
 
     def make(
-        names: str, owner: str = "static", pose: Pose | None = None, joint: Joint | None = None
+        names: str, owner: str = "static", pose: Pose | None = None, joint: PlanJoint | None = None
     ) -> PlanEdge:
         parent, child = names.split()
         kind = "joint" if joint else "static" if owner == "static" else "dynamic"

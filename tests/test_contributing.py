@@ -21,7 +21,7 @@ from tfcompose.model.messages import GUARD_EVENTS, Clear, FindingShown, line_of
 from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.spec.language import validate
 from tfcompose.spec.load import load
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 
 TEXT = GUIDE.read_text("utf-8")
 #: As many as the way of a mount's xyz may have.
@@ -79,7 +79,7 @@ def test_a_mounts_xyz_has_the_forms_of_the_way() -> None:
     (planned,) = [planned for planned in plan.edges if planned.child == edge.child]
     assert planned.pose.xyz == xyz
     pose = planned.pose
-    sent = encode([Transform(0, planned.parent, planned.child, pose.xyz, pose.quat_xyzw)])
+    sent = encode([SentTransform(0, planned.parent, planned.child, pose.xyz, pose.quat_xyzw)])
     assert struct.pack("<3d", *xyz) in sent
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from tests.support.house import ROOT, nodes_of
+from tests.support.house import PACKAGE, ROOT, nodes_of
 
 #: One worker parses all files, once.
 pytestmark = pytest.mark.xdist_group("sources")
@@ -267,3 +267,12 @@ def test_forbidden_words_are_found_in_every_form_of_name() -> None:
 def test_no_word_is_both_in_the_glossary_and_forbidden() -> None:
     terms = {word for term in GLOSSARY for word in re.findall(r"\w+", term)}
     assert not terms & (FORBIDDEN.keys() | FORMS.keys())
+
+
+def test_no_two_classes_of_the_product_have_one_name() -> None:
+    files: dict[str, list[str]] = {}
+    for file in sorted(PACKAGE.rglob("*.py")):
+        for node in nodes_of(file):
+            if isinstance(node, ast.ClassDef):
+                files.setdefault(node.name, []).append(file.relative_to(ROOT).as_posix())
+    assert {name: places for name, places in files.items() if len(places) > 1} == {}

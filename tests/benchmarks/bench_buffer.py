@@ -16,7 +16,7 @@ import numpy as np
 
 from tests.benchmarks.results import record
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
-from tfcompose.tf.ros.tf_codec import Decoder, Transform, encode
+from tfcompose.tf.ros.tf_codec import Decoder, SentTransform, encode
 from tfcompose.tf.tf2 import Buffer
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def intake() -> float:
     messages = [
         encode(
             [
-                Transform(
+                SentTransform(
                     START + step * S // HZ,
                     f"parent_of_link_{first + index}",
                     f"link_{first + index}",

@@ -27,7 +27,7 @@ import pytest
 from tests.benchmarks.results import record
 from tfcompose.foundation.geometry import Pose
 from tfcompose.launcher.program import HERE
-from tfcompose.model.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.model.plan import Plan, PlanEdge, PlanJoint, PlanProcess, RosSettings, SourceLine
 from tfcompose.model.plan.file import write_plan
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def plan_file(folder: Path, joints: int) -> Path:
             Pose((0.1, 0.0, 0.2)),
             None,
             SourceLine("r", 1),
-            Joint(f"joint_{n}", "revolute", (0.0, 0.0, 1.0)),
+            PlanJoint(f"joint_{n}", "revolute", (0.0, 0.0, 1.0)),
         )
         for n in range(joints)
     )

@@ -24,7 +24,7 @@ import psutil
 import pytest
 
 from tfcompose.tf.ros.node import TFPublisher, open_node
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -87,7 +87,7 @@ def named_s(output: Path, name: str) -> float:
         seconds_until(lambda: publisher.publisher.get_subscription_count() > 0)
 
         def is_named() -> bool:
-            stranger = Transform(
+            stranger = SentTransform(
                 time.time_ns(), "odom", "base_link", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
             )
             publisher.publish(encode([stranger]))

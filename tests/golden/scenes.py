@@ -109,7 +109,7 @@ from tfcompose.tools.fleet import command as fleet
 from tfcompose.tools.fleet.check import check_fleet
 from tfcompose.tools.fleet.observe import EdgeStatus, FleetRobotStatus, LinkState, problems_of
 from tfcompose.tools.fleet.spec import validate_fleet
-from tfcompose.tools.importers.draft import Draft
+from tfcompose.tools.importers.draft import ImportDraft
 from tfcompose.tools.importers.shell import add_script
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
@@ -864,7 +864,7 @@ def recordings() -> Iterator[Finding]:
 
 def imported() -> Iterator[Finding]:
     """A script of which a robot file cannot say all."""
-    draft = Draft("rover")
+    draft = ImportDraft("rover")
     lines = "sleep 3\nros2 run tf2_ros static_transform_publisher 0 0 0 base_link laser\n"
     add_script(draft, lines, "start.sh", Target())
     yield from draft.found

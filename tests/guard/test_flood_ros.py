@@ -8,15 +8,15 @@ from tfcompose.guard.flood import SLICE_S, FloodReader
 from tfcompose.tf.live.flood import BUSY_S
 from tfcompose.tf.live.topics import TFData
 from tfcompose.tf.ros.node import Received
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 
 LONG = encode(
     [
-        Transform(0, "map", f"rogue_{n}", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        SentTransform(0, "map", f"rogue_{n}", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         for n in range(20_000)
     ]
 )
-DECLARED = encode([Transform(0, "map", "odom", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+DECLARED = encode([SentTransform(0, "map", "odom", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
 
 
 def sent(data: bytes) -> TFData:

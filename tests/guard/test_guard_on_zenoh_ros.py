@@ -16,7 +16,7 @@ from tests.support.domains import Domain
 from tests.support.guard_on_zenoh import guard_on_zenoh
 from tests.support.waiting import until
 from tests.support.zenoh_peers import RosPeer, free_port, session
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 
 pytestmark = pytest.mark.ros
 
@@ -53,7 +53,9 @@ class Sending:
 
     def _run(self) -> None:
         while not self._ended.wait(0.02):
-            moving = Transform(time.time_ns(), *self._edge, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            moving = SentTransform(
+                time.time_ns(), *self._edge, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+            )
             self._peer.send("/tf", encode([moving]))
 
 

@@ -12,7 +12,7 @@ from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.tf.live.publishers import Message, Publisher
 from tfcompose.tf.live.topics import TFData
 from tfcompose.tf.ros.node import Received
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -97,7 +97,7 @@ def data_of(
     gid: bytes, edges: str, *, static: bool, fenced: bool = True, process: str = ""
 ) -> TFData:
     transforms = [
-        Transform(0, parent, child, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        SentTransform(0, parent, child, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         for parent, child in pairs(edges)
     ]
     return TFData(Received(encode(transforms), gid, 0, 0, 1, gid), static, fenced, process)

@@ -23,7 +23,7 @@ from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.ros.graph import writers
 from tfcompose.tf.ros.node import Received, TFPublisher, TFSubscription, open_node, wait
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 
 pytestmark = pytest.mark.ros
 
@@ -330,7 +330,7 @@ def heard_by(up: Started) -> dict[str, int]:
 
 def one(parent: str, child: str) -> bytes:
     return encode(
-        [Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]
+        [SentTransform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]
     )
 
 

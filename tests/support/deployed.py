@@ -16,7 +16,7 @@ from tfcompose.tools.deploy.rollout import Rollout, Share, target_of
 from tfcompose.tools.deploy.unit import Unit
 
 if TYPE_CHECKING:
-    from tfcompose.tools.deploy.connection import Host
+    from tfcompose.tools.deploy.connection import ConnectedHost
 
 ROBOT = """
 tfcompose: 1
@@ -109,7 +109,7 @@ def rollout_to(
     for host in hosts:
         probe = PROBE | (probes or {}).get(host.name, {})
         unit = Unit(f"rover.{host.name}", "rover", host.name, probe["base"], probe["executable"])
-        there: Host = host  # type: ignore[assignment]
+        there: ConnectedHost = host  # type: ignore[assignment]
         shares.append(Share(there, unit, probe))
     return Rollout(target, shares, lambda _: None)
 

@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from tfcompose.tf.ros.node import TFPublisher, open_node
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.typesupport import tf_message_type
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
@@ -29,7 +29,7 @@ class FakeNodes:
 
     def latched(self, node: Any, *transforms: tuple[str, str, Any, Any]) -> None:
         """Latch (parent, child, xyz, quaternion x y z w) as one message."""
-        data = encode([Transform(0, *each) for each in transforms])
+        data = encode([SentTransform(0, *each) for each in transforms])
         self.keep(TFPublisher(node, static=True)).publish(data)
 
     def moving(
@@ -77,7 +77,7 @@ class FakeNodes:
 def message(stamp_ns: int, edges: tuple[str, ...], x: float = 0.0, quat: Any = IDENTITY) -> bytes:
     pairs = [edge.split() for edge in edges]
     return encode(
-        [Transform(stamp_ns, parent, child, (x, 0.0, 0.0), quat) for parent, child in pairs]
+        [SentTransform(stamp_ns, parent, child, (x, 0.0, 0.0), quat) for parent, child in pairs]
     )
 
 
@@ -106,7 +106,7 @@ def sending(  # noqa: PLR0913 (all but three are named)
             sent += 1
             stamp_ns = time.time_ns() - int(late_s * 1e9)
             publisher.publish(
-                encode([Transform(stamp_ns, parent, child, (1.0, 0.0, 0.0), IDENTITY)])
+                encode([SentTransform(stamp_ns, parent, child, (1.0, 0.0, 0.0), IDENTITY)])
             )
             if bad:
                 publisher.publish(bad)

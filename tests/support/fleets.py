@@ -14,7 +14,7 @@ from typing_extensions import Self
 
 from tests.support.zenoh_peers import free_port, session
 from tfcompose.spec.load import load
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tools.fleet.share import EdgeSender
 from tfcompose.tools.fleet.spec import validate_fleet
 
@@ -60,13 +60,13 @@ class SimulatedRobot:
 
     def _run(self) -> None:
         beat = 0.0
-        fixed = Transform(0, "map", "odom", (self._x, 0.0, 0.0), _IDENTITY)
+        fixed = SentTransform(0, "map", "odom", (self._x, 0.0, 0.0), _IDENTITY)
         self.sender.on_message(encode([fixed]), True)  # noqa: FBT003 (as the listener calls)
         while not self._ended.wait(self._period_s):
             if time.monotonic() >= beat:
                 beat = time.monotonic() + 0.5
                 self.sender.beat()
-            moving = Transform(time.time_ns(), "odom", "base_link", (0.5, 0.0, 0.0), _IDENTITY)
+            moving = SentTransform(time.time_ns(), "odom", "base_link", (0.5, 0.0, 0.0), _IDENTITY)
             self.sender.on_message(encode([moving]), False)  # noqa: FBT003 (as the listener calls)
 
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from tfcompose.spec.language.bodies import ShapeSpec
     from tfcompose.spec.language.node_preset import ClaimSpec
     from tfcompose.spec.language.preset import (
-        Option,
         PresetDriver,
         PresetFrame,
+        PresetOption,
         PresetProcess,
         PresetSpec,
     )
@@ -149,7 +149,7 @@ def _shown(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, A
     return {key: value for key, value in fields.items() if value not in (None, "", {}, [], False)}
 
 
-def _option(option: Option) -> dict[str, Any]:
+def _option(option: PresetOption) -> dict[str, Any]:
     values = list(option.variants) if option.type == "choice" else list(option.values)
     fields = {
         "type": option.type,

@@ -55,7 +55,7 @@ from tfcompose.launcher.runtime_dir import (
     runtime_dir_of,
     user_name,
 )
-from tfcompose.launcher.supervisor import ENDING, Session, supervise
+from tfcompose.launcher.supervisor import ENDING, RunSession, supervise
 from tfcompose.model.messages import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
 from tfcompose.tf.ros.environment import (
     child_environment,
@@ -100,7 +100,7 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
         if hidden := hidden_run(place):
             fail(hidden)
         copy = copy_plan(plan, file, place, alone=True)
-        session = Session(copy, RunFiles(place, lock, copy), file.absolute().parent)
+        session = RunSession(copy, RunFiles(place, lock, copy), file.absolute().parent)
         warnings = warnings_before_start(place, plan, session.run_id)
         for one in warnings:
             warn(one)
@@ -137,7 +137,7 @@ def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
 def _run(
     plan: Plan,
     place: RuntimeDir,
-    session: Session,
+    session: RunSession,
     output: NonBlockingOutput,
     duration_s: float | None,
 ) -> int:
@@ -234,7 +234,7 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
 
 
 def _detach(
-    plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace
+    plan: Plan, place: RuntimeDir, lock: Lock, session: RunSession, arguments: Namespace
 ) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready.
 
@@ -254,7 +254,7 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
     plan: Plan,
     place: RuntimeDir,
     lock: Lock,
-    session: Session,
+    session: RunSession,
     duration_s: float | None,
     mask: Iterable[int] | None = None,
 ) -> int:
@@ -286,7 +286,7 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
     return pid
 
 
-def _launch(plan: Plan, place: RuntimeDir, session: Session, duration_s: float | None) -> int:
+def _launch(plan: Plan, place: RuntimeDir, session: RunSession, duration_s: float | None) -> int:
     """Run as a process without a terminal; Python's own errors go to a file next to the logs."""
     os.setsid()
     nowhere = errors = os.open(os.devnull, os.O_RDWR)

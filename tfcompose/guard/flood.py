@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
     from tfcompose.tf.live.topics import TFData
-    from tfcompose.tf.ros.tf_codec import Transform
+    from tfcompose.tf.ros.tf_codec import SentTransform
 
 #: At one time it reads for so long, in seconds, and as long as it has to read, the guard waits no
 #: longer than that.
@@ -36,8 +36,8 @@ class FloodReader:
         self.skipped = 0
         self._children = children
         self._data: TFData | None = None
-        self._rest: Iterator[Transform] = iter(())
-        self._found: list[Transform] = []
+        self._rest: Iterator[SentTransform] = iter(())
+        self._found: list[SentTransform] = []
         self._spent_s = self._since = 0.0
 
     @property

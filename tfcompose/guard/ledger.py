@@ -85,7 +85,7 @@ class SentEdge(NamedTuple):
 
 
 @dataclass(slots=True)
-class Entry:
+class OpenFault:
     """A fault of a publisher that is not over."""
 
     fault: Fault
@@ -106,7 +106,7 @@ class JudgedMessage:
     epoch: int = -1
     #: How long it holds at most, in monotonic seconds.
     until: float = 0.0
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[OpenFault, ...] = ()
     #: The planned edges that came with it, by their children.
     children: tuple[str, ...] = ()
     #: The edges that may pass; None: all.
@@ -120,7 +120,7 @@ class Ledger:
         self.epoch = 0
         self.planned: dict[str, PlanEdge] = {edge.child: edge for edge in plan.edges}
         self.frames = Frames(plan)
-        self.entries: dict[Key, Entry] = {}
+        self.entries: dict[Key, OpenFault] = {}
         #: Publishers of more undeclared edges than are judged.
         self.flooders: dict[bytes | None, Flood] = {}
         self._plan = plan
@@ -215,9 +215,9 @@ class Ledger:
                 arrived.setdefault(sent.gid, []).append(sent.child)
         return [tuple(children) for children in arrived.values()]
 
-    def note(self, fault: Fault, gid: bytes | None, now: float) -> Entry:
+    def note(self, fault: Fault, gid: bytes | None, now: float) -> OpenFault:
         """Note that the fault is observed now."""
-        entry = self.entries.setdefault(self._key(fault, gid), Entry(fault, gid, now, now))
+        entry = self.entries.setdefault(self._key(fault, gid), OpenFault(fault, gid, now, now))
         entry.gid, entry.last = gid, now
         if fault.nodes and not entry.fault.nodes:  # the publisher has got its name
             entry.fault, entry.reported = fault, False
@@ -360,7 +360,7 @@ class Ledger:
 
         With ``at_once`` they are that publisher's, whatever may still come to be known of them.
         """
-        grouped: dict[Group, list[Entry]] = {}
+        grouped: dict[Group, list[OpenFault]] = {}
         for entry in self.entries.values():
             if entry.reported:
                 continue
@@ -428,24 +428,24 @@ class Ledger:
         for hexed, known in memory.items():
             gid = bytes.fromhex(hexed) or None
             for fault in known:
-                entry = Entry(fault, gid, until, until, reported=True)
+                entry = OpenFault(fault, gid, until, until, reported=True)
                 self.entries[self._key(fault, gid)] = entry
 
-    def _group(self, entry: Entry) -> Group:
+    def _group(self, entry: OpenFault) -> Group:
         """Return with what a fault is reported: its code and node, or the robot it belongs to."""
         if run := self._senders.run(entry.gid):
             return (OTHER_ROBOT, run.name, "")
         return (entry.fault.code, entry.fault.who, self._senders.process(entry.gid))
 
-    def _by_group(self) -> dict[Group, dict[Ends, list[Entry]]]:
+    def _by_group(self) -> dict[Group, dict[Ends, list[OpenFault]]]:
         """Return the faults by their group, and then by their edge."""
-        by_group: dict[Group, dict[Ends, list[Entry]]] = {}
+        by_group: dict[Group, dict[Ends, list[OpenFault]]] = {}
         for entry in self.entries.values():
             edges = by_group.setdefault(self._group(entry), {})
             edges.setdefault(entry.fault.ends, []).append(entry)
         return by_group
 
-    def _is_ripe(self, entry: Entry, now: float) -> bool:
+    def _is_ripe(self, entry: OpenFault, now: float) -> bool:
         """Return whether nothing more comes to be known of a fault.
 
         Where ids do not say whose they are, whoever alternates with the owner may not be in the
@@ -467,8 +467,8 @@ class Ledger:
 
     def _event(
         self,
-        entries: Sequence[Entry],
-        edges: Mapping[Ends, Sequence[Entry]],
+        entries: Sequence[OpenFault],
+        edges: Mapping[Ends, Sequence[OpenFault]],
         now: float,
     ) -> FindingShown | Taken:
         """Return the event for faults of one group, whose ``edges`` these and others send."""
@@ -520,7 +520,7 @@ class Ledger:
         robot = group[1] if group[0] == OTHER_ROBOT else ""
         return faults.over_texts(self._ended.pop(group), robot)
 
-    def _compare(self, entry: Entry, edges: Mapping[Ends, Sequence[Entry]]) -> None:
+    def _compare(self, entry: OpenFault, edges: Mapping[Ends, Sequence[OpenFault]]) -> None:
         """Note whether an edge is over, or who was named does not send it any more, or others do.
 
         The entry has ended, or is of publishers that alternate; ``edges`` are its group's.
@@ -542,7 +542,7 @@ class Ledger:
             runs = self._left.setdefault(group, {}).setdefault(fault.ends, [])
             runs += filter(None, map(self._senders.where, ended))
 
-    def _has_ended(self, entry: Entry, now: float) -> bool:
+    def _has_ended(self, entry: OpenFault, now: float) -> bool:
         fault, silent_s = entry.fault, now - entry.last
         if fault.alternates and self._senders.is_sure(entry.gid):
             is_alone = len(self._gids_of(entry)) == 1
@@ -553,7 +553,7 @@ class Ledger:
 
     # Publishers.
 
-    def _publishers(self, entries: Sequence[Entry]) -> list[bytes | None]:
+    def _publishers(self, entries: Sequence[OpenFault]) -> list[bytes | None]:
         """Return who is there of the publishers of these entries: an id of each process.
 
         A process may have a publisher on each topic. Where it is not known by its pid, only
@@ -577,7 +577,7 @@ class Ledger:
     def _runs_of(self, publishers: Sequence[bytes | None]) -> list[str]:
         return [self._senders.where(gid) for gid in publishers]
 
-    def _gids_of(self, entry: Entry) -> list[bytes | None]:
+    def _gids_of(self, entry: OpenFault) -> list[bytes | None]:
         """Return the publishers of a fault: one, or all that alternate."""
         fault = entry.fault
         if not fault.alternates or not self._senders.is_sure(entry.gid):
@@ -591,8 +591,8 @@ class Ledger:
 
     def _is_known_robot(
         self,
-        edges: Mapping[Ends, Sequence[Entry]],
-        entries: Sequence[Entry],
+        edges: Mapping[Ends, Sequence[OpenFault]],
+        entries: Sequence[OpenFault],
         now: float,
     ) -> bool:
         """Return whether the robot of these ``edges`` was reported, and with ones as wrong."""
@@ -608,12 +608,12 @@ class Ledger:
     def _says_fate(self, fault: Fault) -> bool:
         return self._plan.guard.mode == "strict" and not fault.is_of_stamps
 
-    def _may_learn_fate(self, entry: Entry, now: float) -> bool:
+    def _may_learn_fate(self, entry: OpenFault, now: float) -> bool:
         """Return whether it may soon be known if listeners get what was sent."""
         is_open = self._says_fate(entry.fault) and self._senders.is_held_back(entry.gid) is None
         return is_open and now - entry.since < FATE_S
 
-    def _was_first(self, entry: Entry, now: float) -> bool:
+    def _was_first(self, entry: OpenFault, now: float) -> bool:
         """Return whether the publisher had the edge before the plan was started."""
         sender = self._senders.sender(entry.gid)
         return entry.fault.code in _TAKES and self._start.was_first(sender, now)

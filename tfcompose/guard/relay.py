@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.tf.live.publishers import Message
 from tfcompose.tf.process import say
 from tfcompose.tf.ros.node import TFPublisher
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -49,7 +49,7 @@ class _Latched:
 
     publisher: TFPublisher
     process: str
-    edges: dict[str, Transform] = field(default_factory=dict)
+    edges: dict[str, SentTransform] = field(default_factory=dict)
     data: bytes = b""
 
 
@@ -224,7 +224,7 @@ class Relay:
 
 def _admitted(
     data: bytes, message: Message, admitted: Collection[Edge] | None
-) -> Iterator[Transform]:
+) -> Iterator[SentTransform]:
     for transform, edge in zip(decode(data), message.edges, strict=True):
         if admitted is None or edge in admitted:
             yield transform
@@ -284,7 +284,7 @@ class Feedback:
         self._node = node
         self._own = own
         self._listeners = {process: _Listener(topics) for process, topics in private.items()}
-        self._fixed: dict[bytes, tuple[str, dict[str, Transform]]] = {}
+        self._fixed: dict[bytes, tuple[str, dict[str, SentTransform]]] = {}
 
     def update(self) -> None:
         """See who listens now, and latch for them what has changed."""
@@ -306,7 +306,7 @@ class Feedback:
             if one.moving and process != sender:
                 one.moving.publish(data)
 
-    def fixed(self, source: bytes, edges: Mapping[str, Transform], sender: str) -> None:
+    def fixed(self, source: bytes, edges: Mapping[str, SentTransform], sender: str) -> None:
         """Latch the fixed edges of one source, by their child, at the next update."""
         known = self._fixed.pop(source, (sender, {}))[1]  # the newest comes last
         self._fixed[source] = (sender, {**known, **edges})
@@ -324,8 +324,8 @@ class Feedback:
         """
         return [source for source, (process, _) in self._fixed.items() if process == sender]
 
-    def _rest(self, process: str) -> list[Transform]:
-        rest: dict[str, Transform] = {}
+    def _rest(self, process: str) -> list[SentTransform]:
+        rest: dict[str, SentTransform] = {}
         for sender, edges in self._fixed.values():
             if sender != process:
                 rest |= edges

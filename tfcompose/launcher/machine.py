@@ -39,7 +39,7 @@ from tfcompose.launcher.readiness import (
     report_progress,
     unmet,
 )
-from tfcompose.launcher.state import Stop, Transition, by_owner
+from tfcompose.launcher.state import StopReason, Transition, by_owner
 from tfcompose.launcher.stopping import (
     backoff_s,
     edge_taken,
@@ -272,7 +272,7 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
     policy = step.state.plan.guard.on_violation
     if found.severity == "error" and policy == "stop":
         step.report(found)
-        step.stop(Stop("failure", 1), found.label)
+        step.stop(StopReason("failure", 1), found.label)
     elif found.severity == "error" and policy == "stop-offender" and process:
         _stop_offender(step, found, process, "on_violation is stop-offender")
     else:

@@ -104,7 +104,7 @@ class Tracked:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class StopReason:
     """Why everything stops, and the exit code. ``signals`` counts those that requested it."""
 
     cause: Literal["signal", "time", "taken", "failure"]
@@ -142,7 +142,7 @@ class State:
     reminded: float | None = None
     all_started: bool = False
     all_ready: bool = False
-    stop: Stop | None = None
+    stop: StopReason | None = None
     because: tuple[str, ...] = ()
     finished: bool = False
     memory: dict[str, Any] = field(default_factory=dict)
@@ -280,9 +280,9 @@ class Transition:
         if self.state.stop is None:
             self.report(found)
             self.update(because=(found.message, *(note.message for note in found.notes)))
-            self.stop(Stop("failure", 1), found.label)
+            self.stop(StopReason("failure", 1), found.label)
 
-    def stop(self, stop: Stop, reason: str) -> None:
+    def stop(self, stop: StopReason, reason: str) -> None:
         """Begin to stop everything, unless that is under way."""
         if self.state.stop:
             return

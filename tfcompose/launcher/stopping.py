@@ -20,7 +20,7 @@ from tfcompose.launcher.failures import (
     never_published,
     signal_name,
 )
-from tfcompose.launcher.state import UNREAD, Stop, Tracked, by_owner
+from tfcompose.launcher.state import UNREAD, StopReason, Tracked, by_owner
 from tfcompose.model.messages import Absent, ComponentOrder, DownRequest, Replanned
 
 if TYPE_CHECKING:
@@ -301,11 +301,11 @@ def stop_if_requested(step: Transition, event: Event) -> None:
     """Begin to stop everything if that is what the event requests."""
     match event:
         case DownRequest():
-            step.stop(Stop("signal", 0, 1, step.now), "tfcompose down")
+            step.stop(StopReason("signal", 0, 1, step.now), "tfcompose down")
         case Signalled(number):
             _signalled(step, signal_name(number))
         case OutputLost():
-            step.stop(Stop("failure", UNREAD), "nobody reads the output any more")
+            step.stop(StopReason("failure", UNREAD), "nobody reads the output any more")
         case TimeUp():
             _time_up(step)
         case _:
@@ -315,7 +315,7 @@ def stop_if_requested(step: Transition, event: Event) -> None:
 def _signalled(step: Transition, name: str) -> None:
     stop = step.state.stop
     if stop is None:
-        step.stop(Stop("signal", 0, 1, step.now), name)
+        step.stop(StopReason("signal", 0, 1, step.now), name)
     elif stop.signals == 0 or step.now - stop.signalled >= step.state.times.same_signal_s:
         step.update(stop=replace(stop, signals=stop.signals + 1, signalled=step.now))
 
@@ -329,7 +329,7 @@ def _time_up(step: Transition) -> None:
         for owner, edges in by_owner(state.awaited):
             step.report(never_published(state.tracked[owner], edges))
     failed = not complete or bool(step.state.reported or state.given_up)
-    step.stop(Stop("time", 1 if failed else 0), "the time is up")
+    step.stop(StopReason("time", 1 if failed else 0), "the time is up")
 
 
 def edge_taken(step: Transition, found: Finding) -> None:
@@ -340,7 +340,7 @@ def edge_taken(step: Transition, found: Finding) -> None:
     stop = step.state.stop
     if stop is None or stop.cause == "taken":
         step.report(found)
-        step.stop(Stop("taken", 1), found.label)
+        step.stop(StopReason("taken", 1), found.label)
 
 
 # Which signal is due.

@@ -84,7 +84,7 @@ _PREPARED = ("static", "joints", "simulate")
 
 
 @dataclass(slots=True)
-class Session:
+class RunSession:
     """The plan's file, the run's files, and an output that does not wait.
 
     ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With files,
@@ -124,7 +124,7 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     base_env: Mapping[str, str] | None = None,
     environment: Environment = child_environment,
     times: Times | None = None,
-    session: Session | None = None,
+    session: RunSession | None = None,
 ) -> int:
     """Run the plan until it ends, and return the exit code.
 
@@ -148,7 +148,7 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     with contextlib.ExitStack() as stack:
         known = _Environments(base, environment)
         supervisor = _Supervisor(
-            state, commands, report, session or Session(plan_file), known, stack
+            state, commands, report, session or RunSession(plan_file), known, stack
         )
         return supervisor.run(duration_s)
 
@@ -159,7 +159,7 @@ class _Supervisor:
         state: State,
         commands: dict[str, ChildCommand],
         report: Callable[[Notice], None],
-        session: Session,
+        session: RunSession,
         known: _Environments,
         stack: contextlib.ExitStack,
     ) -> None:

@@ -19,7 +19,7 @@ from tfcompose.compiler.draw.arrange import Direction
 from tfcompose.compiler.draw.dot import dot
 from tfcompose.compiler.draw.graph import Kind, collapsed
 from tfcompose.compiler.draw.mermaid import mermaid
-from tfcompose.compiler.draw.picture import Box, Curve, Drawing, Text, draw
+from tfcompose.compiler.draw.picture import Box, Curve, Drawing, TextLine, draw
 from tfcompose.compiler.draw.png import png
 from tfcompose.compiler.draw.style import STYLES, width_of
 from tfcompose.compiler.draw.svg import svg
@@ -120,7 +120,7 @@ def overlaps(first: tuple[float, ...], second: tuple[float, ...]) -> bool:
     )
 
 
-def around(shape: Box | Text) -> tuple[float, float, float, float]:
+def around(shape: Box | TextLine) -> tuple[float, float, float, float]:
     if isinstance(shape, Box):
         return shape.x, shape.y, shape.x + shape.width, shape.y + shape.height
     left = shape.x - shape.width / 2 if shape.middle else shape.x
@@ -137,7 +137,7 @@ def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(
 
 
 def nothing_overlaps(drawing: Drawing, frames: int) -> None:
-    texts = [around(shape) for shape in drawing.shapes if isinstance(shape, Text)]
+    texts = [around(shape) for shape in drawing.shapes if isinstance(shape, TextLine)]
     boxes = [around(box) for box in boxes_of(drawing, "box", "root")]
     assert len(boxes) == frames
     for some in (texts, boxes):
@@ -229,7 +229,9 @@ def test_in_columns_no_edge_to_a_child_of_the_trunk_crosses_a_box(
 
 
 def test_the_title_of_a_collapsed_picture_counts_the_frames_of_the_robot() -> None:
-    texts = [shape.text for shape in draw(collapsed(broad(3))).shapes if isinstance(shape, Text)]
+    texts = [
+        shape.text for shape in draw(collapsed(broad(3))).shapes if isinstance(shape, TextLine)
+    ]
     assert "11 frames · 10 edges · 6 frames inside sensors not shown" in texts
     assert "static (9 edges)" in texts
 
@@ -265,7 +267,9 @@ def test_a_collapsed_sensor_is_its_mount_and_what_leads_to_other_frames() -> Non
 
 def _names(drawing: Drawing) -> list[str]:
     return [
-        shape.text for shape in drawing.shapes if isinstance(shape, Text) and shape.style == "name"
+        shape.text
+        for shape in drawing.shapes
+        if isinstance(shape, TextLine) and shape.style == "name"
     ]
 
 
@@ -387,7 +391,7 @@ def test_a_png_shows_boxes_and_characters_where_the_drawing_has_them() -> None:
         )
         assert corner == _rgb(STYLES[badge.style].fill[0])
     for text in (
-        shape for shape in drawing.shapes if isinstance(shape, Text) and shape.style == "name"
+        shape for shape in drawing.shapes if isinstance(shape, TextLine) and shape.style == "name"
     ):
         left, top, right, bottom = (round(2 * edge) for edge in around(text))
         dark = sum(image.crop((left, top, right, bottom)).convert("L").histogram()[:80])

@@ -21,7 +21,7 @@ from tests.support.adversary import (
     node,
     running,
 )
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 
 if TYPE_CHECKING:
     import subprocess
@@ -124,7 +124,9 @@ def test_a_name_that_is_no_text_hides_nothing_of_its_message(
     robot: Robot, rogue: Callable[..., subprocess.Popen[str]]
 ) -> None:
     after, rest = robot.lines(), ((OTHER_X, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-    data = encode([Transform(0, "odom", "bad_name", *rest), Transform(0, "map", "odom", *rest)])
+    data = encode(
+        [SentTransform(0, "odom", "bad_name", *rest), SentTransform(0, "map", "odom", *rest)]
+    )
     odd = data.replace(b"bad_name", b"b\xffd_name").hex()
     one = rogue(node("odd", OTHER_X, f"hex:{odd}"))
     robot.says("error[TF801]", "map → odom", "/odd", after=after)

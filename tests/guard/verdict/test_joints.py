@@ -8,7 +8,7 @@ from tests.support.tree_history import SECOND_NS, sound_plan, sound_tree
 from tfcompose.foundation.geometry import Pose
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.joints import sent_twice, unknown_joints
-from tfcompose.model.plan import Joint, PlanEdge, SourceLine
+from tfcompose.model.plan import PlanEdge, PlanJoint, SourceLine
 from tfcompose.tf.live.sent_joints import SentJoints
 from tfcompose.tf.live.state import MovingJoint, TopicState
 
@@ -70,7 +70,7 @@ def test_a_joint_that_the_robot_lacks_is_named_with_the_nearest() -> None:
 
 
 def test_a_joint_that_follows_another_needs_no_state_also_where_the_plan_describes_it() -> None:
-    joint = Joint("arm", "revolute", (0.0, 0.0, 1.0))
+    joint = PlanJoint("arm", "revolute", (0.0, 0.0, 1.0))
     edge = PlanEdge(
         "base_link",
         "arm",

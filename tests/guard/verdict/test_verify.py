@@ -27,9 +27,9 @@ from tfcompose.model.plan import (
     Driven,
     EdgePattern,
     GuardPolicy,
-    Joint,
     Plan,
     PlanEdge,
+    PlanJoint,
     PlanProcess,
     RosSettings,
 )
@@ -50,7 +50,7 @@ DRIVE, STATIC, CAMERA, JOINTS, OTHER = (
 
 @pytest.fixture
 def plan(edge: Callable[..., PlanEdge]) -> Plan:
-    wheel = Joint("wheel_joint", "continuous", (0.0, 0.0, 1.0))
+    wheel = PlanJoint("wheel_joint", "continuous", (0.0, 0.0, 1.0))
     edges = (
         replace(edge("odom base", "drive"), rate=10.0),
         edge("base laser", pose=LASER),

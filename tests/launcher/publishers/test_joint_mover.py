@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from tests.support.findings import words_of
 from tfcompose.foundation.geometry import Pose, angle_between, normalised
 from tfcompose.launcher.publishers.joint_mover import JointMover, PublishOptions
-from tfcompose.model.plan import Joint, JointType, PlanEdge, SourceLine
+from tfcompose.model.plan import JointType, PlanEdge, PlanJoint, SourceLine
 from tfcompose.tf.ros.joint_codec import encode_names, fill
-from tfcompose.tf.ros.tf_codec import Transform, decode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode
 
 Z = (0.0, 0.0, 1.0)
 SECOND_NS = 1_000_000_000
@@ -43,12 +43,12 @@ class Robot:
 
     def hear(
         self, positions: Mapping[str, float], stamp_ns: int = SECOND_NS
-    ) -> dict[str, Transform]:
+    ) -> dict[str, SentTransform]:
         data = encode_names(list(positions))
         fill(data, stamp_ns, list(positions.values()))
         return self.answer(bytes(data))
 
-    def answer(self, data: bytes) -> dict[str, Transform]:
+    def answer(self, data: bytes) -> dict[str, SentTransform]:
         answer = self.mover.tf_message(data, 1000)
         return (
             {transform.child: transform for transform in decode(answer)}
@@ -57,7 +57,7 @@ class Robot:
         )
 
 
-def joint_edge(joint: Joint, pose: Pose | None = None, child: str = "") -> PlanEdge:
+def joint_edge(joint: PlanJoint, pose: Pose | None = None, child: str = "") -> PlanEdge:
     source = SourceLine("rover.yaml", 1)
     return PlanEdge(
         "base",
@@ -73,10 +73,10 @@ def joint_edge(joint: Joint, pose: Pose | None = None, child: str = "") -> PlanE
 
 
 def slide(name: str, *mimic: object) -> PlanEdge:
-    return joint_edge(Joint(name, "prismatic", Z, *mimic))  # type: ignore[arg-type]
+    return joint_edge(PlanJoint(name, "prismatic", Z, *mimic))  # type: ignore[arg-type]
 
 
-def heights(found: dict[str, Transform]) -> dict[str, float]:
+def heights(found: dict[str, SentTransform]) -> dict[str, float]:
     return {name: transform.xyz[2] for name, transform in found.items()}
 
 
@@ -96,7 +96,7 @@ def test_a_joint_rotates_about_its_axis_or_slides_along_it_after_its_edges_pose(
 ) -> None:
     turning = kind == "revolute"
     axis = tuple(Rotation.from_quat(towards).apply([0, 0, 1]))
-    joint = Joint("j", kind, axis)
+    joint = PlanJoint("j", kind, axis)
     moved = Robot([joint_edge(joint, Pose(xyz, at))]).hear({"j": q})["j"]
     before = Rotation.from_quat(at)
     rotation = before * Rotation.from_rotvec([q * a for a in axis]) if turning else before
@@ -117,7 +117,7 @@ def test_all_joints_move_as_each_alone_does_whatever_the_order_of_the_names(
     kinds: list[JointType], random: Random
 ) -> None:
     edges = [
-        joint_edge(Joint(f"j{n}", kind, Z), Pose((float(n), 0.0, 0.0)))
+        joint_edge(PlanJoint(f"j{n}", kind, Z), Pose((float(n), 0.0, 0.0)))
         for n, kind in enumerate(kinds)
     ]
     names = [f"j{n}" for n in range(len(kinds))]
@@ -173,9 +173,9 @@ def test_a_joint_without_a_single_position_is_never_published_and_reported_once(
 ) -> None:
     robot = Robot(
         [
-            joint_edge(Joint("float", kind)),
+            joint_edge(PlanJoint("float", kind)),
             slide("left"),
-            joint_edge(Joint("f", "revolute", Z, "float")),
+            joint_edge(PlanJoint("f", "revolute", Z, "float")),
         ]
     )
     for stamp in (1, 2):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tfcompose.launcher.publishers.simulate import JointSource, circle, swept
-from tfcompose.model.plan import Joint, Simulation, Sweep
+from tfcompose.model.plan import PlanJoint, Simulation, Sweep
 
 
 @given(
@@ -60,11 +60,11 @@ def test_a_sweep_between_two_places_that_are_one_stays() -> None:
 def test_what_mimics_a_simulated_joint_follows_it_through_a_chain_in_any_order() -> None:
     axis = (0.0, 0.0, 1.0)
     joints = [
-        Joint("a_last", "prismatic", axis, "m_mid", 2.0, 0.1),
-        Joint("m_mid", "revolute", axis, "z_first", -1.0, 0.5),
-        Joint("z_first", "continuous", axis),
-        Joint("other", "revolute", axis, "nobody", 1.0, 0.0),
-        Joint("free", "floating", axis, "z_first", 1.0, 0.0),
+        PlanJoint("a_last", "prismatic", axis, "m_mid", 2.0, 0.1),
+        PlanJoint("m_mid", "revolute", axis, "z_first", -1.0, 0.5),
+        PlanJoint("z_first", "continuous", axis),
+        PlanJoint("other", "revolute", axis, "nobody", 1.0, 0.0),
+        PlanJoint("free", "floating", axis, "z_first", 1.0, 0.0),
     ]
     simulation = Simulation(
         "joints", 50.0, joints={"z_first": 0.25, "lift": 1.0}, sweep={"lift": Sweep(4.0, 0.0, 2.0)}

@@ -20,7 +20,7 @@ from std_msgs.msg import String
 from tests.support.waiting import until
 from tfcompose.foundation.geometry import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.foundation.signals import Stop
-from tfcompose.model.plan import Joint, PlanProcess, Simulation, Sweep
+from tfcompose.model.plan import PlanJoint, PlanProcess, Simulation, Sweep
 from tfcompose.tf.ros.graph import writers
 from tfcompose.tf.ros.node import (
     JOINT_STATES,
@@ -32,7 +32,7 @@ from tfcompose.tf.ros.node import (
     open_node,
     wait,
 )
-from tfcompose.tf.ros.tf_codec import Transform, decode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode
 
 pytestmark = pytest.mark.ros
 
@@ -46,7 +46,9 @@ class Listeners:
 
     node: Any
 
-    def tf(self, count: int, *, static: bool = False) -> list[tuple[Received, list[Transform]]]:
+    def tf(
+        self, count: int, *, static: bool = False
+    ) -> list[tuple[Received, list[SentTransform]]]:
         """Return the next messages, at least ``count`` of them."""
         return [
             (each, decode(each.data))
@@ -77,13 +79,19 @@ def rover(edge: Callable[..., Any], write: Callable[..., Any]) -> Any:
     axle = Pose((0.1, 0.2, 0.0), quat_from_rpy(0.3, 0.0, 0.0))
     moving = [
         edge(
-            "base finger", "joints", None, Joint("finger", "prismatic", Y, "follower", 0.01, 0.002)
+            "base finger",
+            "joints",
+            None,
+            PlanJoint("finger", "prismatic", Y, "follower", 0.01, 0.002),
         ),
         edge(
-            "base follower", "joints", None, Joint("follower", "continuous", Y, "left", -2.0, 0.5)
+            "base follower",
+            "joints",
+            None,
+            PlanJoint("follower", "continuous", Y, "left", -2.0, 0.5),
         ),
-        edge("base left", "joints", axle, Joint("left", "continuous", Y)),
-        edge("base right", "joints", axle, Joint("right", "revolute", Y)),
+        edge("base left", "joints", axle, PlanJoint("left", "continuous", Y)),
+        edge("base right", "joints", axle, PlanJoint("right", "revolute", Y)),
     ]
     return write(moving, PlanProcess("joints", "joints"))
 
@@ -408,7 +416,7 @@ def _repeat(
     subscription: Subscription,
     sends: Iterable[Callable[[], None]],
     stamp_ns: int | None = None,
-) -> Transform:
+) -> SentTransform:
     """Send until something comes on /tf, with that stamp: best effort may lose messages."""
     end = time.monotonic() + UNTIL_S
     for send in sends:
@@ -425,7 +433,7 @@ def _repeat(
 
 def _answer(
     listeners: Listeners, subscription: Subscription, message: Any, publisher: Any = None
-) -> dict[str, Transform]:
+) -> dict[str, SentTransform]:
     """Send a joint state until it is answered on /tf; return the answer by child frame."""
     sender = publisher or listeners.node.create_publisher(JointState, "/rover/joint_states", 10)
     end = time.monotonic() + UNTIL_S

@@ -10,9 +10,9 @@ from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.plan import (
     GuardPolicy,
-    Joint,
     Plan,
     PlanEdge,
+    PlanJoint,
     PlanProcess,
     Ready,
     RosSettings,
@@ -26,7 +26,9 @@ from tfcompose.model.plan.file import read_plan, write_plan
 AT = SourceLine("r.yaml", 1)
 EDGES = (
     PlanEdge("base", "a", "static", "static", "/s", Pose(), None, AT),
-    PlanEdge("base", "b", "joint", "joints", "/j", Pose(), 50.0, AT, Joint("b_joint", "revolute")),
+    PlanEdge(
+        "base", "b", "joint", "joints", "/j", Pose(), 50.0, AT, PlanJoint("b_joint", "revolute")
+    ),
 )
 PROCESSES = (
     PlanProcess("static", "static", owns=(("base", "a"),), stop=StopRule("SIGTERM", 2.0)),

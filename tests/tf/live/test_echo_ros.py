@@ -26,7 +26,7 @@ from tfcompose.tf.live.echo import echo as run_echo
 from tfcompose.tf.live.pose_query import PoseQuery
 from tfcompose.tf.ros.clock import SimClock
 from tfcompose.tf.ros.node import TFPublisher, open_node
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 
 pytestmark = pytest.mark.ros
 
@@ -158,7 +158,7 @@ class Talker:
         ]
 
     def say(self, parent: str, child: str, x: float, stamp_ns: int = 0, w: float = 1.0) -> None:
-        data = encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), (0.0, 0.0, 0.0, w))])
+        data = encode([SentTransform(stamp_ns, parent, child, (x, 0.0, 0.0), (0.0, 0.0, 0.0, w))])
         self._publishers[stamp_ns == 0].publish(data)
 
     def is_heard(self) -> bool:

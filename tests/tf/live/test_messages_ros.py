@@ -9,12 +9,12 @@ from rclpy.serialization import deserialize_message, serialize_message
 from tfcompose.tf.live.publishers import MessageReader
 from tfcompose.tf.live.snapshot import joints_of
 from tfcompose.tf.ros.node import Received
-from tfcompose.tf.ros.tf_codec import MessageLayout, Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import MessageLayout, SentTransform, decode, encode
 
 NAMES = st.sampled_from(["a", "b", "odom", "base_link", "käse", "", "x" * 9])
 TRANSFORMS = st.lists(
     st.builds(
-        Transform,
+        SentTransform,
         st.integers(0, 2**31 * 10**9 - 1),
         NAMES,
         NAMES,
@@ -31,7 +31,9 @@ def received(data: bytes) -> Received:
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(TRANSFORMS, max_size=30))
-def test_every_message_is_read_as_a_plain_decoder_does(messages: list[list[Transform]]) -> None:
+def test_every_message_is_read_as_a_plain_decoder_does(
+    messages: list[list[SentTransform]],
+) -> None:
     reader = MessageReader()
     for transforms in messages * 2:
         data = encode(transforms)
@@ -44,7 +46,7 @@ def test_every_message_is_read_as_a_plain_decoder_does(messages: list[list[Trans
 @settings(max_examples=300, deadline=None)
 @given(TRANSFORMS, st.data())
 def test_what_is_no_message_is_refused_as_a_plain_decoder_does_also_after_good_ones(
-    transforms: list[Transform], data: st.DataObject
+    transforms: list[SentTransform], data: st.DataObject
 ) -> None:
     good = encode(transforms)
     at = data.draw(st.integers(0, len(good) - 1))
@@ -70,7 +72,7 @@ def test_what_is_no_message_is_refused_as_a_plain_decoder_does_also_after_good_o
 
 @pytest.mark.parametrize("name", [b"od\xffm\0", b"od\0m\0", b"\xed\xa0\x80m\0", b"odomX"])
 def test_names_of_any_bytes_are_those_that_rclpy_takes(name: bytes) -> None:
-    data = encode([Transform(0, "map", "odom", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+    data = encode([SentTransform(0, "map", "odom", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
     (one,) = decode(data.replace(b"odom\0", name))
     stamped = serialize_message(TransformStamped(child_frame_id="odom"))
     assert (
@@ -82,15 +84,15 @@ def test_names_of_any_bytes_are_those_that_rclpy_takes(name: bytes) -> None:
 
 
 def test_names_are_those_that_tf2_takes_and_can_be_shown() -> None:
-    data = encode([Transform(0, "/map", "od\x1bom", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+    data = encode([SentTransform(0, "/map", "od\x1bom", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
     assert MessageReader().read(received(data), static=True).edges == (("map", "od\\x1bom"),)
 
 
 def test_poses_are_read_of_the_first_message_that_holds_a_frame_to_be_compared() -> None:
     reader = MessageReader(frozenset({"odom"}))
-    other = encode([Transform(1, "map", "base_link", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))])
+    other = encode([SentTransform(1, "map", "base_link", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))])
     assert reader.read(received(other), static=True).poses == ()
-    data = encode([Transform(1, "map", "/odom", (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))])
+    data = encode([SentTransform(1, "map", "/odom", (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))])
     (pose,) = reader.read(received(data), static=True).poses
     assert pose == ((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))
     assert reader.read(received(data), static=True).poses == ()

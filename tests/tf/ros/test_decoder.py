@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.tf.ros.tf_codec import Decoder, Row, Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import Decoder, Row, SentTransform, decode, encode
 
 S = 1_000_000_000
 
@@ -17,7 +17,7 @@ names = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]
 numbers = st.floats(allow_nan=False, width=64)
 stamps = st.integers(-(2**31) * S, (2**31 - 1) * S)
 transforms = st.builds(
-    Transform, stamps, names, names, st.tuples(*[numbers] * 3), st.tuples(*[numbers] * 4)
+    SentTransform, stamps, names, names, st.tuples(*[numbers] * 3), st.tuples(*[numbers] * 4)
 )
 
 
@@ -29,14 +29,16 @@ def rows_of(data: bytes) -> list[Row]:
 
 @given(st.lists(transforms, max_size=6), st.lists(numbers, min_size=7, max_size=7), stamps)
 def test_a_second_message_of_the_same_layout_gives_its_own_numbers(
-    sent: list[Transform], moved: list[float], stamp_ns: int
+    sent: list[SentTransform], moved: list[float], stamp_ns: int
 ) -> None:
     decoder = Decoder()
     first = encode(sent)
     x, y, z, *quat = moved
     second = encode(
         [
-            Transform(stamp_ns, t.parent, t.child, (x, y, z), (quat[0], quat[1], quat[2], quat[3]))
+            SentTransform(
+                stamp_ns, t.parent, t.child, (x, y, z), (quat[0], quat[1], quat[2], quat[3])
+            )
             for t in sent
         ]
     )
@@ -46,7 +48,7 @@ def test_a_second_message_of_the_same_layout_gives_its_own_numbers(
 
 @given(transforms, transforms)
 def test_messages_of_one_length_and_different_names_are_distinguished(
-    a: Transform, b: Transform
+    a: SentTransform, b: SentTransform
 ) -> None:
     decoder = Decoder()
     swapped = [[a, b], [b, a], [a, a], [b, b], [a, b]]
@@ -59,9 +61,9 @@ def test_a_later_name_that_differs_is_not_taken_for_the_remembered_one(
     changed: tuple[str, str],
 ) -> None:
     decoder = Decoder()
-    first = Transform(S, "odom", "base", (1, 2, 3), (0, 0, 0, 1))
+    first = SentTransform(S, "odom", "base", (1, 2, 3), (0, 0, 0, 1))
     for parent, child in (("p", "cc"), changed):
-        data = encode([first, Transform(S, parent, child, (4, 5, 6), (0, 0, 0, 1))])
+        data = encode([first, SentTransform(S, parent, child, (4, 5, 6), (0, 0, 0, 1))])
         assert list(decoder.rows(data)) == rows_of(data)
 
 
@@ -69,8 +71,8 @@ def test_padding_may_hold_anything() -> None:
     decoder = Decoder()
     data = encode(
         [
-            Transform(S, "ab", "cde", (1, 2, 3), (0, 0, 0, 1)),
-            Transform(S, "ab", "c", (4, 5, 6), (0, 0, 0, 1)),
+            SentTransform(S, "ab", "cde", (1, 2, 3), (0, 0, 0, 1)),
+            SentTransform(S, "ab", "c", (4, 5, 6), (0, 0, 0, 1)),
         ]
     )
     expected = list(decoder.rows(data))
@@ -97,7 +99,7 @@ def test_random_bytes_are_refused_or_read_as_by_decode(noise: bytes) -> None:
 def test_truncations_and_huge_counts_are_refused_after_a_full_message() -> None:
     decoder = Decoder()
     data = encode(
-        [Transform(S, "odom", f"f{index}", (1, 2, 3), (0, 0, 0, 1)) for index in range(4)]
+        [SentTransform(S, "odom", f"f{index}", (1, 2, 3), (0, 0, 0, 1)) for index in range(4)]
     )
     decoder.rows(data)
     for end in range(len(data)):
@@ -120,7 +122,8 @@ def test_a_flood_of_new_layouts_takes_bounded_memory_and_time() -> None:
         begun = time.process_time()
         for _ in range(250):
             sent = [
-                Transform(S, "odom", str(rng.random()), (1, 2, 3), (0, 0, 0, 1)) for _ in range(10)
+                SentTransform(S, "odom", str(rng.random()), (1, 2, 3), (0, 0, 0, 1))
+                for _ in range(10)
             ]
             decoder.rows(encode(sent))
         return time.process_time() - begun
@@ -129,7 +132,9 @@ def test_a_flood_of_new_layouts_takes_bounded_memory_and_time() -> None:
     first, *_, last = (seconds() for _ in range(4))
     assert last < 4 * first
     for index in range(300):
-        decoder.rows(encode([Transform(S, "odom", f"{index}" * 50_000, (1, 2, 3), (0, 0, 0, 1))]))
+        decoder.rows(
+            encode([SentTransform(S, "odom", f"{index}" * 50_000, (1, 2, 3), (0, 0, 0, 1))])
+        )
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 30e6

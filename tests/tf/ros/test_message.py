@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.foundation.geometry import Pose
-from tfcompose.tf.ros.tf_codec import Template, Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, Template, decode, encode
 
 doubles = st.floats(allow_nan=False)
 names = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=20)
 transforms = st.builds(
-    Transform,
+    SentTransform,
     stamp_ns=st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1),
     parent=names,
     child=names,
@@ -21,7 +21,7 @@ transforms = st.builds(
 )
 messages = st.lists(transforms, max_size=5)
 
-ONE = Transform(3_000_000_007, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+ONE = SentTransform(3_000_000_007, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
 
 
 def test_a_message_has_the_layout_of_cdr() -> None:
@@ -41,7 +41,7 @@ def test_a_message_has_the_layout_of_cdr() -> None:
 
 
 @given(messages)
-def test_what_is_encoded_is_decoded(sent: list[Transform]) -> None:
+def test_what_is_encoded_is_decoded(sent: list[SentTransform]) -> None:
     assert decode(encode(sent)) == sent
 
 
@@ -65,7 +65,7 @@ def test_any_bytes_give_transforms_or_a_value_error(data: bytes) -> None:
 
 @given(messages, st.data())
 def test_a_damaged_message_gives_transforms_or_a_value_error(
-    sent: list[Transform], data: st.DataObject
+    sent: list[SentTransform], data: st.DataObject
 ) -> None:
     damaged = bytearray(encode(sent))
     for _ in range(data.draw(st.integers(1, 4))):
@@ -74,7 +74,7 @@ def test_a_damaged_message_gives_transforms_or_a_value_error(
 
 
 @given(st.lists(transforms, min_size=1, max_size=3), st.data())
-def test_a_truncated_message_is_refused(sent: list[Transform], data: st.DataObject) -> None:
+def test_a_truncated_message_is_refused(sent: list[SentTransform], data: st.DataObject) -> None:
     full = encode(sent)
     with pytest.raises(ValueError, match="message"):
         decode(full[: data.draw(st.integers(0, len(full) - 1))])
@@ -95,21 +95,23 @@ def test_a_name_that_is_longer_than_the_message_is_refused_as_such() -> None:
 
 def test_a_name_with_a_nul_is_not_encoded() -> None:
     with pytest.raises(ValueError, match="NUL"):
-        encode([Transform(0, "a\0b", "c", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+        encode([SentTransform(0, "a\0b", "c", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
 
 
 @given(st.lists(transforms, min_size=1, max_size=5))
-def test_a_template_gives_the_bytes_of_a_fresh_message(sent: list[Transform]) -> None:
+def test_a_template_gives_the_bytes_of_a_fresh_message(sent: list[SentTransform]) -> None:
     template = Template([(each.parent, each.child) for each in sent])
     template.set_stamp(sent[0].stamp_ns)
     for index, each in enumerate(sent):
         template.set_pose(index, Pose(each.xyz, each.quat_xyzw))
-    same_time = [Transform(sent[0].stamp_ns, t.parent, t.child, t.xyz, t.quat_xyzw) for t in sent]
+    same_time = [
+        SentTransform(sent[0].stamp_ns, t.parent, t.child, t.xyz, t.quat_xyzw) for t in sent
+    ]
     assert template.data == encode(same_time)
 
 
 def _read_or_refuse(data: bytes) -> None:
-    found: list[Transform] = []
+    found: list[SentTransform] = []
     with suppress(ValueError):
         found = decode(data)
-    assert all(isinstance(each, Transform) for each in found)
+    assert all(isinstance(each, SentTransform) for each in found)

@@ -19,11 +19,11 @@ from tfcompose.tf.ros.node import (
     open_node,
     wait,
 )
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
-ONE = Transform(1, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+ONE = SentTransform(1, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
 UNTIL_S = 60.0
 
 
@@ -32,7 +32,7 @@ def test_a_message_and_the_graph_name_the_same_publisher(node: Any) -> None:
         subscription = TFSubscription(node, static=True)
         publishers = [TFPublisher(each, static=True) for each in (first, second)]
         for number, publisher in enumerate(publishers):
-            publisher.publish(encode([Transform(number, "a", "b", ONE.xyz, ONE.quat_xyzw)]))
+            publisher.publish(encode([SentTransform(number, "a", "b", ONE.xyz, ONE.quat_xyzw)]))
         received = _take(node, subscription, 2)
         names = ["/rover/one", "/rover/two"]  # known a moment after the messages
         assert until(lambda: [writer.node for writer in writers(node, "/tf_static")] == names)
@@ -50,7 +50,7 @@ def test_take_returns_everything_in_order_and_then_nothing(node: Any) -> None:
     assert subscription.take() == []
     before = time.time_ns()
     for stamp in range(50):
-        publisher.publish(encode([Transform(stamp, "a", "b", ONE.xyz, ONE.quat_xyzw)]))
+        publisher.publish(encode([SentTransform(stamp, "a", "b", ONE.xyz, ONE.quat_xyzw)]))
     received = _take(node, subscription, 50)
     assert [decode(each.data)[0].stamp_ns for each in received] == list(range(50))
     assert [each.sequence for each in received] == list(

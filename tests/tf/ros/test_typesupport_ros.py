@@ -9,7 +9,7 @@ import pytest
 from tfcompose.tf.ros import typesupport
 from tfcompose.tf.ros.environment import RosError
 from tfcompose.tf.ros.node import TFPublisher, open_node
-from tfcompose.tf.ros.tf_codec import TF_MESSAGE_HASH, Transform, encode
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE_HASH, SentTransform, encode
 
 pytestmark = pytest.mark.ros
 
@@ -123,7 +123,9 @@ print(dict(node.get_topic_names_and_types())["/tf"], info.topic_type, info.topic
 def test_another_process_sees_the_type_and_its_hash(python: Callable[[str], str]) -> None:
     with open_node("talks", "/rover") as node:
         publisher = TFPublisher(node, static=False)
-        publisher.publish(encode([Transform(0, "a", "b", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+        publisher.publish(
+            encode([SentTransform(0, "a", "b", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+        )
         observed = python(SEES)
     assert "['tf2_msgs/msg/TFMessage'] tf2_msgs/msg/TFMessage" in observed
     assert TF_MESSAGE_HASH in observed

@@ -25,7 +25,7 @@ from tfcompose.model.plan import Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import MessageReader, Publisher
 from tfcompose.tf.ros.environment import RosError
 from tfcompose.tf.ros.node import Received
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.zenoh_graph import (
     Attachment,
     TokenOfPublisher,
@@ -49,7 +49,7 @@ def tf(*edges: str) -> bytes:
     pairs = (one.split() for one in edges)
     return encode(
         [
-            Transform(time.time_ns(), parent, child, (0.0, 0.0, 0.0), IDENTITY)
+            SentTransform(time.time_ns(), parent, child, (0.0, 0.0, 0.0), IDENTITY)
             for parent, child in pairs
         ]
     )

@@ -11,7 +11,7 @@ from pytransform3d.transformations import transform_from_pq
 from scipy.spatial.transform import Rotation, Slerp
 
 from tfcompose.foundation.geometry import Pose, Quaternion, angle_between, normalised
-from tfcompose.tf.ros.tf_codec import Decoder, Transform, encode
+from tfcompose.tf.ros.tf_codec import Decoder, SentTransform, encode
 from tfcompose.tf.tf2 import Buffer, TransformException
 
 S = 1_000_000_000
@@ -205,7 +205,7 @@ def test_whatever_bytes_come_the_buffer_goes_on_answering(data: st.DataObject) -
     Messages with broken content are taken or refused.
     """
     buffer, decoder = Buffer(), Decoder()
-    sound = encode([Transform(S, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))] * 3)
+    sound = encode([SentTransform(S, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))] * 3)
     for _ in range(6):
         damaged = bytearray(sound)
         for _ in range(data.draw(st.integers(0, 5))):

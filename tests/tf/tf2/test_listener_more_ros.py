@@ -16,7 +16,7 @@ from tests.support import processes
 from tests.support.waiting import none_but, until
 from tfcompose.foundation.geometry import Pose
 from tfcompose.tf.ros.node import TFPublisher, open_node
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.tf2 import Buffer, TransformListener
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
@@ -33,7 +33,7 @@ def other(domain: object) -> Iterator[Any]:
 
 
 def one(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link") -> bytes:
-    return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
+    return encode([SentTransform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
 
 
 def test_an_executor_spins_until_the_transform_is_there(node: Any, other: Any) -> None:

@@ -25,7 +25,7 @@ from tfcompose.foundation.geometry import Pose
 from tfcompose.model.plan import PlanEdge, PlanProcess, Simulation
 from tfcompose.tf.ros.graph import writers
 from tfcompose.tf.ros.node import TFPublisher, open_node
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.tf2 import Buffer, LookupException, TransformException, TransformListener
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
@@ -179,7 +179,7 @@ def executor(node: Any) -> Iterator[Callable[[float], None]]:
 
 
 def one(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link") -> bytes:
-    return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
+    return encode([SentTransform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
 
 
 def test_a_node_that_is_handed_over_is_fed_by_its_executor(

@@ -16,7 +16,7 @@ from tests.support import processes
 from tests.support.fleets import Link, RobotProcesses, SimulatedRobot, fleet_of, fleet_text
 from tests.support.waiting import TIMEOUT_S, until
 from tests.support.zenoh_peers import free_port, session
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 from tfcompose.tf.tf2.exceptions import TransformException
 from tfcompose.tools.fleet.observe import FleetObserver, StaleError
 from tfcompose.tools.fleet.share import SharedEdges
@@ -183,7 +183,10 @@ def test_a_router_that_is_not_there_is_named_and_found_when_it_comes(
 
 def tf(*edges: tuple[str, str], stamp_ns: int = 0) -> bytes:
     return encode(
-        [Transform(stamp_ns, parent, child, (1.0, 2.0, 3.0), IDENTITY) for parent, child in edges]
+        [
+            SentTransform(stamp_ns, parent, child, (1.0, 2.0, 3.0), IDENTITY)
+            for parent, child in edges
+        ]
     )
 
 
@@ -193,7 +196,7 @@ def test_only_shared_edges_leave_with_their_names_in_the_fleet_once_in_each_peri
     period_ns = 200_000_000
     sent = edges.take(message, static=False, now_ns=10 * period_ns)
     assert sent is not None
-    assert decode(sent) == [Transform(7, "r1/odom", "r1/base_link", (1.0, 2.0, 3.0), IDENTITY)]
+    assert decode(sent) == [SentTransform(7, "r1/odom", "r1/base_link", (1.0, 2.0, 3.0), IDENTITY)]
     assert edges.take(message, static=False, now_ns=11 * period_ns - 1) is None
     assert edges.take(message, static=False, now_ns=11 * period_ns) is not None
     assert edges.take(tf(("base_link", "laser")), static=False, now_ns=0) is None

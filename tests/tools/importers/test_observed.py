@@ -12,12 +12,12 @@ from tfcompose.cli import main
 from tfcompose.spec.load import load
 from tfcompose.tf.live.publishers import Publisher
 from tfcompose.tf.live.state import NO_NODE
-from tfcompose.tools.importers.draft import Draft
+from tfcompose.tools.importers.draft import ImportDraft
 from tfcompose.tools.importers.observed import Observed, round_rate, started_by
 
 
-def drafted(history: TreeHistory, where: str = "", words: tuple[str, ...] = ()) -> Draft:
-    draft = Draft("rover")
+def drafted(history: TreeHistory, where: str = "", words: tuple[str, ...] = ()) -> ImportDraft:
+    draft = ImportDraft("rover")
     Observed(draft, lambda _: where, lambda _: words).add(history.observer.edges(END_NS))
     return draft
 
@@ -57,7 +57,7 @@ def test_which_model_a_calibrated_camera_is_stays_a_question_where_several_fit()
     history = TreeHistory().knows(b"s", b"e")
     for child, (parent, xyz, quat_xyzw, gid) in CAMERA.items():
         history.takes((parent, child, 0, 0, *xyz, *quat_xyzw), gid, BEGUN_NS, static=True)
-    draft = Draft("rover")
+    draft = ImportDraft("rover")
     observed = Observed(draft, lambda _: "", lambda _: ())
     observed.add(history.observer.edges(END_NS))
     observed.recognise(PRESETS)

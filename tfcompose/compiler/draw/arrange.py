@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.compiler.draw.graph import Forest, Graph
-    from tfcompose.compiler.draw.layout import Area, Place
+    from tfcompose.compiler.draw.layout import Area, FrameBox
 
 Direction = Literal["auto", "right", "down", "columns"]
 
@@ -140,7 +140,7 @@ def _filled(blocks: Sequence[_Block], height: float) -> list[list[_Block]]:
 def _placed(
     forest: Forest, flat: Layout, stem: Sequence[str], columns: Sequence[Sequence[_Block]]
 ) -> Layout:
-    places: dict[str, Place] = {}
+    places: dict[str, FrameBox] = {}
     areas: list[Area] = []
     middle = max(flat.places[frame].height for frame in stem) / 2
     for frame in stem:

@@ -40,7 +40,7 @@ PAD = 8.0  # between a text and its box, and between a group and its frames
 
 
 @dataclass(slots=True)
-class Place:
+class FrameBox:
     """A frame's box: left edge, middle of its height, width and height, in px.
 
     From the top left corner.
@@ -92,7 +92,7 @@ class Trunk:
 class Layout:
     """All positions, the groups' areas (outer first), the total size, and the direction."""
 
-    places: dict[str, Place]
+    places: dict[str, FrameBox]
     areas: tuple[Area, ...]
     width: float
     height: float
@@ -109,21 +109,21 @@ def layout(graph: Graph, forest: Forest, *, is_down: bool) -> Layout:
     return Layout(places, areas, width, height, is_down)
 
 
-def _box(forest: Forest, frame: str) -> Place:
+def _box(forest: Forest, frame: str) -> FrameBox:
     arrow = forest.up.get(frame)
     width = width_of(shortened(frame), NAME_SIZE) + 2 * PAD
     if arrow is None:
-        return Place(0.0, 0.0, width, BOX_HEIGHT)
+        return FrameBox(0.0, 0.0, width, BOX_HEIGHT)
     if arrow.detail:
         width += BETWEEN + width_of(shortened(arrow.detail), MORE_SIZE)
     if not arrow.pose:
-        return Place(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT)
+        return FrameBox(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT)
     width = max(width, width_of(shortened(arrow.pose), MORE_SIZE) + 2 * PAD)
-    return Place(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT + POSE_HEIGHT)
+    return FrameBox(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT + POSE_HEIGHT)
 
 
 def _rows(
-    forest: Forest, places: dict[str, Place], *, is_down: bool
+    forest: Forest, places: dict[str, FrameBox], *, is_down: bool
 ) -> tuple[dict[str, tuple[float, float]], float]:
     """Give each frame its y; return each group's top and bottom, and the height.
 
@@ -161,7 +161,7 @@ def _rows(
     return bands, max(0.0, y - ROW_GAP)
 
 
-def _columns(forest: Forest, places: dict[str, Place]) -> None:
+def _columns(forest: Forest, places: dict[str, FrameBox]) -> None:
     for frame in forest.order:
         place, children = places[frame], forest.children[frame]
         if frame not in forest.up and forest.enters(frame):
@@ -175,7 +175,7 @@ def _columns(forest: Forest, places: dict[str, Place]) -> None:
             places[child].x = round(place.right) + gap
 
 
-def _indented(forest: Forest, places: dict[str, Place]) -> None:
+def _indented(forest: Forest, places: dict[str, FrameBox]) -> None:
     for frame in forest.order:
         place = places[frame]
         if frame not in forest.up and forest.enters(frame):
@@ -185,7 +185,10 @@ def _indented(forest: Forest, places: dict[str, Place]) -> None:
 
 
 def _areas(
-    graph: Graph, forest: Forest, places: dict[str, Place], bands: dict[str, tuple[float, float]]
+    graph: Graph,
+    forest: Forest,
+    places: dict[str, FrameBox],
+    bands: dict[str, tuple[float, float]],
 ) -> tuple[tuple[Area, ...], float]:
     """Return the areas, outer ones first, and the total width.
 
@@ -213,7 +216,7 @@ def _areas(
 
 
 def _own(
-    forest: Forest, places: dict[str, Place], begin: str, below: Sequence[str], label: float
+    forest: Forest, places: dict[str, FrameBox], begin: str, below: Sequence[str], label: float
 ) -> tuple[float, float] | None:
     """Return the right and lower edge around a group's frames, None if others are in the way.
 

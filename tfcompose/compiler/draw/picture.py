@@ -24,7 +24,7 @@ from tfcompose.foundation.text import counted
 
 if TYPE_CHECKING:
     from tfcompose.compiler.draw.graph import Arrow, Forest, Graph
-    from tfcompose.compiler.draw.layout import Area, Layout, Place
+    from tfcompose.compiler.draw.layout import Area, FrameBox, Layout
 
 Point = tuple[float, float]
 
@@ -108,7 +108,7 @@ def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
 
 
 @dataclass(slots=True)
-class Text:
+class TextLine:
     """A line of text: start or middle of its base line, and the width it may take."""
 
     x: float
@@ -119,7 +119,7 @@ class Text:
     middle: bool = False
 
 
-Shape = Union[Box, Curve, Text]  # noqa: UP007 (evaluated when it is loaded, by Python 3.10 too)
+Shape = Union[Box, Curve, TextLine]  # noqa: UP007 (evaluated when it is loaded, by Python 3.10 too)
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +223,7 @@ class _Pen:
         about = f"{arrow.parent} → {arrow.child}: {', '.join(_facts(arrow))}"
         return Curve(points, f"edge{colour_of(self.owners[arrow.owner])} {kind}", about)
 
-    def _frame(self, frame: str, place: Place, arrow: Arrow | None) -> list[Shape]:
+    def _frame(self, frame: str, place: FrameBox, arrow: Arrow | None) -> list[Shape]:
         x, y = place.x + self.left, place.y + self.top
         if arrow is None:
             box = Box(
@@ -257,7 +257,7 @@ class _Pen:
                 radius=CORNER,
                 style=f"badge{colour}",
             ),
-            Text(
+            TextLine(
                 x + BADGE_WIDTH / 2,
                 y + 3.6,
                 number,
@@ -276,8 +276,8 @@ class _Pen:
         return shapes
 
 
-def _text(text: str, style: str, x: float, y: float) -> Text:
-    return Text(x, y, text, style, _width(text, style))
+def _text(text: str, style: str, x: float, y: float) -> TextLine:
+    return TextLine(x, y, text, style, _width(text, style))
 
 
 def _width(text: str, style: str) -> float:
@@ -309,8 +309,8 @@ def _legend(
     totals_width = width_of(totals, STYLES["label"].size)
     base = margin + 14.0
     shapes: list[Shape] = [
-        Text(margin, base, title, "title", title_width),
-        Text(margin + title_width + 12.0, base, totals, "label", totals_width),
+        TextLine(margin, base, title, "title", title_width),
+        TextLine(margin + title_width + 12.0, base, totals, "label", totals_width),
     ]
     width = max(width, MIN_WIDTH, title_width + 12.0 + totals_width)
     y = base + LEGEND_LINE
@@ -360,7 +360,7 @@ def _wrapped(
             x, y = margin, y + LEGEND_LINE
         width = max(width, item_width)
         shapes += _symbol(item, x, y)
-        shapes.append(Text(x + item_width - text_width, y, item.text, "label", text_width))
+        shapes.append(TextLine(x + item_width - text_width, y, item.text, "label", text_width))
         x += item_width + ITEM_GAP
     return shapes, y + (LEGEND_LINE if items else 0.0), width
 
@@ -370,7 +370,7 @@ def _symbol(item: _Item, x: float, y: float) -> list[Shape]:
         return [Curve(_level((x, y - 3.8), (x + SAMPLE_WIDTH, y - 3.8)), f"sample {item.kind}")]
     colour, text = colour_of(item.owner), str(item.owner + 1)
     middle = x + BADGE_WIDTH / 2
-    number = Text(
+    number = TextLine(
         middle, y - 0.2, text, f"number{colour}", width_of(text, 10.0, bold=True), middle=True
     )
     return [Box(x, y - 11.8, BADGE_WIDTH, height=16.0, radius=4.0, style=f"badge{colour}"), number]

@@ -11,7 +11,7 @@ from tfcompose.foundation.text import visible
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.compiler.draw.picture import Drawing, Shape, Text
+    from tfcompose.compiler.draw.picture import Drawing, Shape, TextLine
     from tfcompose.compiler.draw.style import Style
 
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
@@ -88,7 +88,7 @@ def _curve(curve: Curve) -> str:
     return f'<path class="{curve.style}" d="{way}"><title>{_text(curve.about)}</title></path>\n'
 
 
-def _line(text: Text) -> str:
+def _line(text: TextLine) -> str:
     """Return a text with its length, so that it fits its box in any font."""
     where = f'class="{text.style}" x="{text.x:g}" y="{text.y:g}"'
     if text.middle:

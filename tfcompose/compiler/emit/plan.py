@@ -13,7 +13,7 @@ from tfcompose.compiler.emit.argv import argv_of, component_params, file_params
 from tfcompose.foundation.numbers import clean
 from tfcompose.model.fields import narrowed
 from tfcompose.model.files import AS_IN_SOURCE, Target
-from tfcompose.model.plan import DESCRIPTION, Driven, Joint, Plan, SourceLine
+from tfcompose.model.plan import DESCRIPTION, Driven, Plan, PlanJoint, SourceLine
 from tfcompose.model.robot import JOINTS, STATIC
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
             moving.name.removeprefix(prefix),
             moving.mimic and moving.mimic.removeprefix(prefix),
         )
-        joint = narrowed(Joint, moving, name=name, mimic=mimic)
+        joint = narrowed(PlanJoint, moving, name=name, mimic=mimic)
     return edge.planned(
         node=node, pose=clean(edge.pose), source=SourceLine(file, edge.at.line), joint=joint
     )

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.model.plan import ProcessKind, StartCondition
-    from tfcompose.spec.language.process import ContainerSpec, Started
+    from tfcompose.spec.language.process import ContainerSpec, StartedSpec
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path
 
@@ -61,7 +61,7 @@ def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Pr
     )
 
 
-def component_process(process: Process, declared: Started, spec: RobotSpec) -> Process:
+def component_process(process: Process, declared: StartedSpec, spec: RobotSpec) -> Process:
     """Return the process as a component of the container that it names.
 
     It runs where, and is as needed as, that is.

@@ -23,7 +23,7 @@ from tfcompose.spec.load import load
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable, Mapping
 
-    from tfcompose.spec.language.preset import Option, PresetFrame
+    from tfcompose.spec.language.preset import PresetFrame, PresetOption
     from tfcompose.spec.language.process import NamedNode
     from tfcompose.spec.language.robot import RobotSpec, SensorSpec
     from tfcompose.spec.load import Path, Source
@@ -202,7 +202,7 @@ def _as_text(value: Any) -> Any:
     return f"{value:g}" if isinstance(value, (int, float)) else value
 
 
-def _refusal(option: Option, key: str, value: Any, place: Span) -> Finding | None:
+def _refusal(option: PresetOption, key: str, value: Any, place: Span) -> Finding | None:
     if option.type == "bool" and not isinstance(value, bool):
         return finding("TF603", f"the option {key} is {value!r}", place, help="true or false")
     if option.type == "text" and not isinstance(value, str):

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
         ContainerSpec,
         ProcessSpec,
         Simulate,
-        Started,
+        StartedSpec,
     )
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path
@@ -232,7 +232,7 @@ def check_launch_nodes(draft: Draft) -> Iterator[Finding]:
 _FIELDS = frozenset(one.name for one in fields(Process) if one.init)
 
 
-def how(declared: Started | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:
+def how(declared: StartedSpec | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:
     """Return the fields of a process that runs in this way, by the keys that have their names."""
     stated: dict[str, Any] = {}
     for key in _FIELDS & keys_of(way):
@@ -407,7 +407,7 @@ def _idle_of_containers(spec: RobotSpec) -> Iterator[Finding]:
             yield finding("TF851", message, spec.at_key(("containers", name, key)), help=advice)
 
 
-def _idle_rate(path: Path, name: str, process: Started, spec: RobotSpec) -> Iterator[Finding]:
+def _idle_rate(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding about a rate: only ``joints`` has one."""
     if process.rate is None or path == ("processes", JOINTS):
         return
@@ -420,7 +420,7 @@ def _idle_rate(path: Path, name: str, process: Started, spec: RobotSpec) -> Iter
     yield finding("TF101", message, spec.at_key((*path, "rate")), help=advice)
 
 
-def _idle(path: Path, name: str, process: Started, spec: RobotSpec) -> Iterator[Finding]:
+def _idle(path: Path, name: str, process: StartedSpec, spec: RobotSpec) -> Iterator[Finding]:
     """Yield a finding for each key beside external or simulate that does nothing.
 
     Where an overlay puts that in the place of something else, the keys below it are meant for what
@@ -506,7 +506,7 @@ def full_name(namespace: str, name: str) -> str:
     return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
 
 
-def namespace_of(declared: Started | ContainerSpec | None, namespace: str) -> str:
+def namespace_of(declared: StartedSpec | ContainerSpec | None, namespace: str) -> str:
     """Return the namespace of a process's nodes, without a leading slash.
 
     Its own, or the robot's ``namespace``.

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tfcompose.launcher.publishers.mimics import Followed
-    from tfcompose.model.plan import Joint, PlanEdge
+    from tfcompose.model.plan import PlanEdge, PlanJoint
     from tfcompose.tf.ros.joint_codec import JointNames
 
 _SECOND_NS = 1_000_000_000
@@ -210,7 +210,7 @@ class JointGroup:
     def __init__(
         self,
         edges: Sequence[PlanEdge],
-        joints: Sequence[Joint],
+        joints: Sequence[PlanJoint],
         followed: Sequence[Followed],
         names: Sequence[str],
     ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.model.plan import Joint
+    from tfcompose.model.plan import PlanJoint
 
 TURNING = ("revolute", "continuous")
 SLIDING = ("prismatic",)
@@ -34,7 +34,7 @@ class Joints:
     it. Joints that follow each other in a circle are never determined.
     """
 
-    def __init__(self, joints: Sequence[Joint]) -> None:
+    def __init__(self, joints: Sequence[PlanJoint]) -> None:
         self._joints = list(joints)
         self._mimics = {joint.name: joint for joint in joints if joint.mimic is not None}
 
@@ -49,7 +49,7 @@ class Joints:
         found = (self._followed(index, joint, columns) for index, joint in enumerate(self._joints))
         return [one for one in found if one is not None]
 
-    def _followed(self, index: int, joint: Joint, columns: dict[str, int]) -> Followed | None:
+    def _followed(self, index: int, joint: PlanJoint, columns: dict[str, int]) -> Followed | None:
         multiplier, offset, name = 1.0, 0.0, joint.name
         for _ in range(len(self._mimics) + 1):
             if name in columns:

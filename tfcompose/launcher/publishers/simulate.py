@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from tfcompose.foundation.signals import Stop
-    from tfcompose.model.plan import Joint, Simulation, Sweep
+    from tfcompose.model.plan import PlanJoint, Simulation, Sweep
     from tfcompose.tf.process import Own
 
 _SECOND_NS = 1_000_000_000
@@ -140,7 +140,7 @@ class JointSource:
     that mimics are sent with their own values.
     """
 
-    def __init__(self, simulation: Simulation, joints: Sequence[Joint]) -> None:
+    def __init__(self, simulation: Simulation, joints: Sequence[PlanJoint]) -> None:
         own = list(simulation.joints)
         self._moves = [
             (start, simulation.sweep.get(name)) for name, start in simulation.joints.items()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.text import counted
 from tfcompose.tf.process import ready, say, start, wait_for_go
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +35,7 @@ def static(own: Own, stop: Stop) -> None:
     # have begun.
     stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
     edges = [
-        Transform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges
+        SentTransform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges
     ]
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         publisher = TFPublisher(node, static=True)

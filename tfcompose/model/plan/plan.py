@@ -110,7 +110,7 @@ class EdgePattern:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class PlanJoint:
     """A moving joint: the edge's ``pose`` followed by motion along ``axis`` gives the pose.
 
     ``axis`` is a unit vector in the child's frame at q = 0. With ``mimic`` the position is
@@ -142,7 +142,7 @@ class PlanEdge:
     pose: Pose
     rate: float | None
     source: SourceLine
-    joint: Joint | None = None
+    joint: PlanJoint | None = None
     switched: tuple[str, ...] = ()
     pose_known: bool = True
 

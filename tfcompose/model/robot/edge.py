@@ -15,8 +15,7 @@ from tfcompose.foundation.units import (  # noqa: TC001 (read by them)
     Number,
 )
 from tfcompose.model.fields import documented, narrowed
-from tfcompose.model.plan import Joint as PlanJoint
-from tfcompose.model.plan import PlanEdge, SourceLine
+from tfcompose.model.plan import PlanEdge, PlanJoint, SourceLine
 
 if TYPE_CHECKING:
     from collections.abc import Callable

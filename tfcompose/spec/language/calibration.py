@@ -34,7 +34,7 @@ from tfcompose.foundation.geometry import (
 )
 from tfcompose.foundation.units import Number, refused, shown
 from tfcompose.spec.language.pose import CalibrationFormat, has_unit_length, is_rotation
-from tfcompose.spec.language.reading import Refusal, read
+from tfcompose.spec.language.reading import SpecRefusal, read
 from tfcompose.spec.language.spec import Spec
 from tfcompose.spec.language.values import InARow, Text
 from tfcompose.spec.load.calibration import load_calibration
@@ -403,9 +403,9 @@ class _FormatReader:
 
     def refuse(self, path: Path, message: str, advice: str = "") -> None:
         """Note what is wrong at a path."""
-        self._refused(Refusal("TF610", path, message, advice))
+        self._refused(SpecRefusal("TF610", path, message, advice))
 
-    def _refused(self, one: Refusal) -> None:
+    def _refused(self, one: SpecRefusal) -> None:
         code = "TF614" if one.code in _NO_ROTATION else "TF610"
         self.found.append(_inside(code, one.finding(self.source), self.source.file, self.named_at))
 

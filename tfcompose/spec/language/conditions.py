@@ -22,7 +22,7 @@ from tfcompose.spec.language.expressions import (
     inserted,
     items,
 )
-from tfcompose.spec.language.reading import Refusal
+from tfcompose.spec.language.reading import SpecRefusal
 from tfcompose.spec.language.variables import NothingNewError, Variables
 
 if TYPE_CHECKING:
@@ -272,7 +272,7 @@ class _Unfolding:
     def _refuse(self, path: Path, error: ExpressionError, *, on_key: bool = False) -> None:
         self.done.refused.append(path)
         if not isinstance(error, NothingNewError):
-            refusal = Refusal("TF105", path, str(error), error.advice, on_key)
+            refusal = SpecRefusal("TF105", path, str(error), error.advice, on_key)
             self.done.found.append(refusal.finding(self.source))
 
     def _drop_waits(self, data: dict[str, Any]) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from pydantic.fields import FieldInfo
 
-    from tfcompose.spec.language.preset import Option
+    from tfcompose.spec.language.preset import PresetOption
     from tfcompose.spec.language.spec import Spec
 
 #: The languages of the core besides that of robot files.
@@ -353,7 +353,7 @@ def _add_presets(
     }
 
 
-def _option(option: Option) -> dict[str, Any]:
+def _option(option: PresetOption) -> dict[str, Any]:
     """Return the schema of one of a preset's options."""
     forms: dict[str, dict[str, Any]] = {
         "bool": {"type": "boolean"},

@@ -17,7 +17,7 @@ from tfcompose.spec.language.bodies import ShapeSpec
 from tfcompose.spec.language.node_preset import Fact
 from tfcompose.spec.language.optics import OpticsSpec
 from tfcompose.spec.language.pose import Rotated
-from tfcompose.spec.language.reading import Refusal
+from tfcompose.spec.language.reading import SpecRefusal
 from tfcompose.spec.language.spec import Spec, key
 from tfcompose.spec.language.values import (
     Anything,
@@ -46,7 +46,7 @@ _WHEN = (
 )
 
 
-class Option(Spec):
+class PresetOption(Spec):
     """A choice that the user has."""
 
     type: Literal["set", "bool", "text", "choice"] = key(..., "what kind of value it takes", "set")
@@ -190,7 +190,7 @@ class PresetDriver(PresetProcess):
     about: Text = key("", "what else is to be known")
 
 
-class Topic(Spec):
+class PresetTopic(Spec):
     """A topic that the driver publishes."""
 
     type: Text = key(..., "its type", "sensor_msgs/Image")
@@ -225,12 +225,12 @@ class PresetSpec(Spec):
     words: dict[str, Annotated[Text, Matches(r"[A-Za-z0-9_]*", "a part of a frame's name")]] = key(
         {}, "used in names as {word}", {"side": "left"}
     )
-    options: dict[str, Option] = key({}, "the choices that the user has")
+    options: dict[str, PresetOption] = key({}, "the choices that the user has")
     frames: dict[str, PresetFrame] = key({}, "the frames by name")
     body: Body | None = key(None, "the sensor's body")
     optics: dict[str, PresetOptics] = key({}, "what each stream sees")
     driver: PresetDriver | None = key(None, "the vendor's driver")
-    topics: dict[str, Topic] = key(
+    topics: dict[str, PresetTopic] = key(
         {}, "what the driver publishes; below its node where the name begins with ~/"
     )
     source: tuple[Fact, ...] = key((), "where the figures are from")
@@ -240,7 +240,7 @@ _HOLE = re.compile(r"\{([^{}]*)\}")
 _TF = ("driver", "tfcompose")
 
 
-def wrong_names(preset: PresetSpec) -> Iterator[Refusal]:
+def wrong_names(preset: PresetSpec) -> Iterator[SpecRefusal]:
     """Yield what the preset names and does not have: frames, options and their values.
 
     Its frames are one tree.
@@ -249,9 +249,9 @@ def wrong_names(preset: PresetSpec) -> Iterator[Refusal]:
     yield from _options(preset)
     for path, process in _processes(preset):
         if (process.executable is None) == (process.launch is None):
-            yield Refusal("TF606", path, "give either executable or launch", on_key=True)
+            yield SpecRefusal("TF606", path, "give either executable or launch", on_key=True)
         if process.args and not process.launch:
-            yield Refusal(
+            yield SpecRefusal(
                 "TF606",
                 (*path, "args"),
                 "a node takes params; args are a launch file's",
@@ -267,16 +267,16 @@ def _processes(preset: PresetSpec) -> Iterator[tuple[Path, PresetProcess]]:
             yield ("driver", "also", name), process
 
 
-def _frames(preset: PresetSpec) -> Iterator[Refusal]:
+def _frames(preset: PresetSpec) -> Iterator[SpecRefusal]:
     known = [preset.mount, *preset.frames]
     for path, name in _named_frames(preset):
         if name not in known:
             advice = did_you_mean(name, known, f"there is {', '.join(known)}")
-            yield Refusal("TF606", path, f"{preset.model} has no frame {name}", advice)
+            yield SpecRefusal("TF606", path, f"{preset.model} has no frame {name}", advice)
     for name in known:
         for word in _HOLE.findall(name):
             if word != "name" and word not in preset.words:
-                yield Refusal(
+                yield SpecRefusal(
                     "TF606",
                     ("words",),
                     f"{name}: no word {word}",
@@ -284,13 +284,13 @@ def _frames(preset: PresetSpec) -> Iterator[Refusal]:
                 )
     if preset.mount in preset.frames:
         message = f"{preset.mount} is the mount; where it is, the robot says"
-        yield Refusal("TF606", ("frames", preset.mount), message, on_key=True)
+        yield SpecRefusal("TF606", ("frames", preset.mount), message, on_key=True)
     for name in preset.frames:
         above, steps = name, 0
         while above in preset.frames and steps <= len(preset.frames):
             above, steps = preset.frames[above].parent, steps + 1
         if above in preset.frames:
-            yield Refusal("TF606", ("frames", name), f"{name} is above itself", on_key=True)
+            yield SpecRefusal("TF606", ("frames", name), f"{name} is above itself", on_key=True)
 
 
 def _named_frames(preset: PresetSpec) -> Iterator[tuple[Path, str]]:
@@ -312,7 +312,7 @@ def _named_frames(preset: PresetSpec) -> Iterator[tuple[Path, str]]:
             yield ("topics", name, "frame"), topic.frame
 
 
-def _options(preset: PresetSpec) -> Iterator[Refusal]:
+def _options(preset: PresetSpec) -> Iterator[SpecRefusal]:
     for name, option in preset.options.items():
         known: tuple[str, ...] = (
             tuple(option.variants) if option.type == "choice" else option.values
@@ -322,7 +322,7 @@ def _options(preset: PresetSpec) -> Iterator[Refusal]:
             for value in given if isinstance(given, list) else [given]:
                 if value not in known:
                     message = f"the option {name} cannot be {value!r}"
-                    yield Refusal(
+                    yield SpecRefusal(
                         "TF606",
                         ("options", name),
                         message,
@@ -335,15 +335,17 @@ def _options(preset: PresetSpec) -> Iterator[Refusal]:
     for at, value in _chosen(preset):
         if value.option and value.option not in preset.options:
             advice = did_you_mean(value.option, preset.options)
-            yield Refusal("TF606", at, f"{preset.model} has no option {value.option}", advice)
+            yield SpecRefusal("TF606", at, f"{preset.model} has no option {value.option}", advice)
 
 
-def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[Refusal]:
+def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[SpecRefusal]:
     name = str(path[-1])
     option = preset.options.get(name)
     if option is None and name != "tf":
         advice = did_you_mean(name, [*preset.options, "tf"], "the word tf, or an option")
-        yield Refusal("TF606", path, f"{preset.model} has no option {name}", advice, on_key=True)
+        yield SpecRefusal(
+            "TF606", path, f"{preset.model} has no option {name}", advice, on_key=True
+        )
         return
     known = (
         {"set": option.values, "choice": tuple(option.variants), "bool": (True, False)}
@@ -354,7 +356,7 @@ def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[Refusal]
     for one in wanted if isinstance(wanted, list) else [wanted]:
         if values and one not in values:
             advice = f"one of: {', '.join(map(str, values))}"
-            yield Refusal("TF606", path, f"{name} is never {one!r}", advice)
+            yield SpecRefusal("TF606", path, f"{name} is never {one!r}", advice)
 
 
 def _conditions(preset: PresetSpec) -> Iterator[tuple[Path, dict[str, Any]]]:

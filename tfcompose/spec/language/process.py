@@ -488,7 +488,7 @@ Plugin = Annotated[
 ]
 
 
-class Started(Supervised):
+class StartedSpec(Supervised):
     """What is started, simulated, or expected to run."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (RUNNING,)
@@ -576,11 +576,11 @@ class Started(Supervised):
                 )
 
 
-class ProcessSpec(Started, Entry):
+class ProcessSpec(StartedSpec, Entry):
     """What is started, simulated, or expected to run."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
-        *Started.EXCLUSIVE,
+        *StartedSpec.EXCLUSIVE,
         *(frozenset({"nodes", name}) for name in ("node", "lifecycle", "component")),
     )
 
@@ -635,7 +635,7 @@ class ContainerSpec(Supervised, Entry):
     )
 
 
-class DriverSpec(Started):
+class DriverSpec(StartedSpec):
     """Keys over those of the preset's driver.
 
     Or the name of the process that drives this sensor; or none.

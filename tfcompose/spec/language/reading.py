@@ -37,7 +37,7 @@ _MAX_ATTEMPTS = 50
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class SpecRefusal:
     """One value or key that the language does not take. ``path`` is its place.
 
     ``on_key`` says that the key is wrong, not its value; ``other`` is the key that it conflicts
@@ -83,13 +83,13 @@ def _laid_over_nothing(source: Source, path: Path) -> str:
 
 def read(
     model: type[M], data: Any, already: Iterable[Path] = ()
-) -> tuple[M | None, list[Refusal]]:
+) -> tuple[M | None, list[SpecRefusal]]:
     """Return the model of the data without what is refused, and the refusals.
 
     ``already`` are paths of what was refused before: it is left out, and so is what is refused
     only because of it. The model is None where a required key of the whole is missing.
     """
-    refusals: list[Refusal] = []
+    refusals: list[SpecRefusal] = []
     gone: set[Path] = set()
     rest = _without(data, already, gone)
     for attempt in range(_MAX_ATTEMPTS):
@@ -198,7 +198,7 @@ def _pruned(data: Any, tree: dict[Any, Any]) -> Any:
 
 def _refusals(
     model: type[Spec], errors: list[tuple[Path, ErrorDetails]], data: Any
-) -> list[Refusal]:
+) -> list[SpecRefusal]:
     """Return what pydantic refused in one turn, in this project's words."""
     unknown = [path for path, one in errors if one["type"] in UNKNOWN_KEYS]
     meant = Counter((path[:-1], _slip(model, path)) for path in unknown)
@@ -222,7 +222,7 @@ def _slip(model: type[Spec], path: Path) -> str | None:
 
 def _unknown_key(
     model: type[Spec], path: Path, data: Any, meant: Counter[tuple[Path, str | None]]
-) -> Refusal:
+) -> SpecRefusal:
     """Return the refusal of a key.
 
     One that is there already, or is meant by two, is not proposed.
@@ -236,7 +236,7 @@ def _unknown_key(
     usual = habit(name, known, around.get(path[-1])) or getattr(holder, "HABITS", {}).get(name, "")
     if not slip and not usual and _is_a_section(model, path):
         message = f"{path[1]} is a section of its own, not one of {path[0]}"
-        return Refusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
+        return SpecRefusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
     is_safe = slip not in around and meant[path[:-1], slip] == 1 and not usual
     advice = (
         (absent(name, "key") if len(path) == 1 else "")
@@ -252,7 +252,7 @@ def _unknown_key(
             else ""
         )
         advice = did_you_mean(name, known, option + listing)
-    return Refusal(
+    return SpecRefusal(
         "TF101",
         path,
         f"unknown key {name}",
@@ -277,13 +277,13 @@ def _indented_too_little(path: Path, around: dict[str, Any], known: list[str]) -
     return f"indent it, if it belongs to {owner}" if owner and around[owner] is None else ""
 
 
-def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
+def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> SpecRefusal:
     kind, value = error["type"], error["input"]
     context, on_key = error.get("ctx", {}), "[key]" in error["loc"]
     if kind.startswith("TF"):
         other = (*path[:-1], context["other"]) if "other" in context else None
         is_on_key = on_key or context.get("on_key", False)
-        return Refusal(
+        return SpecRefusal(
             kind,
             path,
             context["message"],
@@ -295,7 +295,7 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
     if kind == "missing":
         field = fields_of(mapping_at(model, path[:-1]))[str(path[-1])]
         advice = f"for example {path[-1]}: {field.examples[0]}" if field.examples else ""
-        return Refusal("TF102", path[:-1], f"{path[-1]} is missing", advice, on_key=True)
+        return SpecRefusal("TF102", path[:-1], f"{path[-1]} is missing", advice, on_key=True)
     if kind == "literal_error":
         allowed = [str(word) for word in _words_allowed(model, path)]
         advice = f"one of: {', '.join(allowed)}"
@@ -304,7 +304,7 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
             if isinstance(value, str)
             else advice
         )
-        return Refusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
+        return SpecRefusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
     code, message, advice = WORDS.get(kind, UNFORESEEN)
     if kind == "string_type":
         advice = _as_string(value)
@@ -317,7 +317,7 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
             advice = f"{path[-1]} belongs to the entry above: indent it more than the name of that"
     elif kind == "dict_type":
         advice = _as_mapping(model, path, value)
-    return Refusal(code, path, message.format(value=shown(value), **context), advice, on_key)
+    return SpecRefusal(code, path, message.format(value=shown(value), **context), advice, on_key)
 
 
 def _example(model: type[Spec], path: Path, value: Any) -> str:

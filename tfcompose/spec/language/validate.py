@@ -12,7 +12,7 @@ from tfcompose.spec.language.args import Given
 from tfcompose.spec.language.conditions import unfolded
 from tfcompose.spec.language.overlay import is_for_later
 from tfcompose.spec.language.preset import PresetSpec, wrong_names
-from tfcompose.spec.language.reading import Refusal, read
+from tfcompose.spec.language.reading import SpecRefusal, read
 from tfcompose.spec.language.rules import RuleSpec, level_of
 from tfcompose.spec.language.spec import Spec
 from tfcompose.spec.language.tool_keys import problems_with, robot_model
@@ -134,7 +134,7 @@ def validate_preset(source: Source) -> PresetSpec:
 
 
 def validate_file(
-    kind: type[M], source: Source, check: Callable[[M], Iterable[Refusal]] = lambda _: ()
+    kind: type[M], source: Source, check: Callable[[M], Iterable[SpecRefusal]] = lambda _: ()
 ) -> M:
     """Return the typed file of a language that needs nothing but its model.
 
@@ -171,12 +171,12 @@ def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[s
         )
 
 
-def _nulls(source: Source) -> list[Refusal]:
+def _nulls(source: Source) -> list[SpecRefusal]:
     """Return a refusal of each key and item without a value.
 
     Null only removes what it is merged over.
     """
-    found: list[Refusal] = []
+    found: list[SpecRefusal] = []
 
     def visit(value: Any, path: Path) -> None:
         for step, item in value.items() if isinstance(value, dict) else enumerate(value):
@@ -185,7 +185,7 @@ def _nulls(source: Source) -> list[Refusal]:
                 visit(item, at)
             elif item is None and isinstance(value, list):
                 message = "an item of the list has no value"
-                found.append(Refusal("TF006", at, message, "give a value, or remove the item"))
+                found.append(SpecRefusal("TF006", at, message, "give a value, or remove the item"))
             elif item is None and not is_for_later(path):
                 message = f"{step} has no value"
                 advice = f"write {step}: {{}}, remove it, or indent what belongs to it"
@@ -193,7 +193,7 @@ def _nulls(source: Source) -> list[Refusal]:
                     advice = "decimals take a point, such as 1.5 kg; or a mapping is not closed"
                 elif glued := _WITHOUT_SPACE.fullmatch(str(step)):
                     advice = f"a space belongs after the colon: {glued[1]}: {glued[2]}"
-                found.append(Refusal("TF006", at, message, advice, on_key=True))
+                found.append(SpecRefusal("TF006", at, message, advice, on_key=True))
 
     if source.has_nulls:
         visit(source.data, ())
@@ -207,7 +207,7 @@ _WITHOUT_SPACE = re.compile(r"([a-z_]+):(\S+)")
 _AFTER_A_COMMA = re.compile(r"\d+(\s*[a-zA-Z°/^0-9]+)?")
 
 
-def _findings(refusals: Iterable[Refusal], source: Source) -> list[Finding]:
+def _findings(refusals: Iterable[SpecRefusal], source: Source) -> list[Finding]:
     """Return the findings, each once.
 
     What stands in an anchor is refused wherever an alias names it.

@@ -24,7 +24,7 @@ from tfcompose.spec.language.expressions import (
     fill,
     names_in,
 )
-from tfcompose.spec.language.reading import Refusal
+from tfcompose.spec.language.reading import SpecRefusal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -131,7 +131,7 @@ class Variables:
         self.source = source
         self.given = source.mapping("vars")
         self.outside = given
-        self.refusals: list[Refusal] = []
+        self.refusals: list[SpecRefusal] = []
         self.found: list[Finding] = []
         self.uncomputed: list[Path] = []
         self.known: dict[str, Value | None] = {}  # None: it was refused
@@ -281,7 +281,7 @@ class Variables:
         self.uncomputed.append(path)
         if not isinstance(error, NothingNewError):
             advice = f"{error.advice}; {_LITERALLY}" if path[0] == "xml" else error.advice
-            self.refusals.append(Refusal("TF105", path, str(error), advice))
+            self.refusals.append(SpecRefusal("TF105", path, str(error), advice))
 
     def _lookup_at(self, path: Path) -> Callable[[str], Value]:
         scope = self.scopes.get(path[:2])

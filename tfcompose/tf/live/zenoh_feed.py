@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
 
 
-class _Listener:
+class _TopicFeed:
     """Feeds an observer with what comes on a pair of TF topics (moving, fixed)."""
 
     def __init__(
@@ -90,7 +90,7 @@ class ZenohFeed:
         domain = domain_of(os.environ)
         graph = ZenohGraph(session, domain)
         self._listeners = [
-            _Listener(graph, ZenohTF(session, domain, topics), topics, observer)
+            _TopicFeed(graph, ZenohTF(session, domain, topics), topics, observer)
             for topics, observer in self._observers.items()
         ]
         return self

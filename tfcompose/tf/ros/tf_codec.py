@@ -62,7 +62,7 @@ LONGEST_NAME = 1024
 
 
 @dataclass(frozen=True, slots=True)
-class Transform:
+class SentTransform:
     """One transform of a TFMessage, as it was sent: nothing is normalised.
 
     ``stamp_ns`` counts from the epoch.
@@ -78,7 +78,7 @@ class Transform:
 # Writing.
 
 
-def encode(transforms: Sequence[Transform]) -> bytes:
+def encode(transforms: Sequence[SentTransform]) -> bytes:
     """Return the transforms as one TFMessage, header included.
 
     Raises:
@@ -218,7 +218,7 @@ def _gap(at: int, alignment: int) -> int:
 # Reading.
 
 
-def decode(data: bytes) -> list[Transform]:
+def decode(data: bytes) -> list[SentTransform]:
     """Return the transforms of a TFMessage, in order.
 
     Either byte order is read, and bytes after the last are ignored.
@@ -231,7 +231,7 @@ def decode(data: bytes) -> list[Transform]:
     return list(transforms(data))
 
 
-def transforms(data: bytes) -> Iterator[Transform]:
+def transforms(data: bytes) -> Iterator[SentTransform]:
     """Yield the transforms of a TFMessage as they are read, as ``decode`` returns them.
 
     Raises:
@@ -496,9 +496,9 @@ class _MessageReader:
         self._at = end
         return _as_taken(raw)
 
-    def transform(self) -> Transform:
+    def transform(self) -> SentTransform:
         seconds, nanoseconds = self.numbers("iI", 4)
         parent, child = self.text(), self.text()
         x, y, z, qx, qy, qz, qw = self.numbers("7d", 8)
         stamp_ns = int(seconds) * _SECOND_NS + int(nanoseconds)
-        return Transform(stamp_ns, parent, child, (x, y, z), (qx, qy, qz, qw))
+        return SentTransform(stamp_ns, parent, child, (x, y, z), (qx, qy, qz, qw))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.tf.tf2.messages import nanoseconds
 
 if TYPE_CHECKING:
-    from tfcompose.tf.ros.tf_codec import Transform
+    from tfcompose.tf.ros.tf_codec import SentTransform
 
 
 class TransformBroadcaster:
@@ -55,7 +55,7 @@ class StaticTransformBroadcaster:
         #: rclpy's publisher; what it publishes are bytes.
         self.pub_tf = TFPublisher(node, static=True, qos=qos).publisher
         self._node = node
-        self._sent: dict[str, Transform] = {}
+        self._sent: dict[str, SentTransform] = {}
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802 (tf2_ros's name)
         """Send a TransformStamped, or several, together with those of earlier calls."""
@@ -77,13 +77,13 @@ def _several(transform: Any) -> Iterable[Any]:
     return transform if isinstance(transform, Iterable) else [transform]
 
 
-def _plain(message: Any) -> Transform:
+def _plain(message: Any) -> SentTransform:
     # The buffer is used without tfcompose.tf.ros.
-    from tfcompose.tf.ros.tf_codec import Transform  # noqa: PLC0415
+    from tfcompose.tf.ros.tf_codec import SentTransform  # noqa: PLC0415
 
     to, rotation = message.transform.translation, message.transform.rotation
     xyz, quat = (to.x, to.y, to.z), (rotation.x, rotation.y, rotation.z, rotation.w)
-    return Transform(
+    return SentTransform(
         nanoseconds(message.header.stamp),
         message.header.frame_id,
         message.child_frame_id,
@@ -92,7 +92,7 @@ def _plain(message: Any) -> Transform:
     )
 
 
-def _message(transforms: Iterable[Transform]) -> bytes:
+def _message(transforms: Iterable[SentTransform]) -> bytes:
     from tfcompose.tf.ros.tf_codec import encode  # noqa: PLC0415 (the same)
 
     return encode(list(transforms))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tfcompose.model.plan import Plan
-    from tfcompose.tools.deploy.connection import Host
+    from tfcompose.tools.deploy.connection import ConnectedHost
 
 
 def run_on_all_hosts(
@@ -89,11 +89,11 @@ async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _HostPrin
 
 
 async def _run_on(plan: Plan, name: str, words: list[str], printer: _HostPrinter) -> int:
-    from tfcompose.tools.deploy.connection import Host, connected, settings_of
+    from tfcompose.tools.deploy.connection import ConnectedHost, connected, settings_of
 
     host = plan.hosts[name]
     there = await connected(name, host, settings_of(plan.robot, name, host), None)
-    if not isinstance(there, Host):
+    if not isinstance(there, ConnectedHost):
         print_findings([there], sys.stderr)
         return FAILED
     try:
@@ -102,7 +102,7 @@ async def _run_on(plan: Plan, name: str, words: list[str], printer: _HostPrinter
         await there.close()
 
 
-async def _printed(host: Host, words: list[str], printer: _HostPrinter) -> int:
+async def _printed(host: ConnectedHost, words: list[str], printer: _HostPrinter) -> int:
     process = await host.execute(words)
 
     async def errors() -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.tools.deploy.release import Release
-    from tfcompose.tools.deploy.rollout import Rollout, Target
+    from tfcompose.tools.deploy.rollout import DeployTarget, Rollout
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -116,7 +116,7 @@ def run(arguments: Namespace) -> int:
         reject(error.findings)
 
 
-async def _deploy(target: Target, release: Release | None, arguments: Namespace) -> int:
+async def _deploy(target: DeployTarget, release: Release | None, arguments: Namespace) -> int:
     from tfcompose.tools.deploy.rollout import reached
 
     async with reached(

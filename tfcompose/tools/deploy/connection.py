@@ -84,7 +84,7 @@ class RefusedError(Exception):
     """Raised where a host cannot do what it is asked; the message is its reason."""
 
 
-class Host:
+class ConnectedHost:
     """A host that is connected. ``at`` is its place in the robot file."""
 
     def __init__(
@@ -167,7 +167,7 @@ class Host:
 
 async def connected(
     name: str, host: PlanHost, settings: Settings, at: Span | None
-) -> Host | Finding:
+) -> ConnectedHost | Finding:
     """Return the host, with its agent, or why it cannot be reached."""
     user, _, address = host.ssh.rpartition("@")
     options: dict[str, Any] = {"username": user} if user else {}
@@ -205,7 +205,7 @@ async def connected(
             agent_command(python), encoding=None, window=2**21, max_pktsize=2**15
         )
         process.stdin.write(agent_input(settings))
-        there = Host(name, connection, process, at)
+        there = ConnectedHost(name, connection, process, at)
         await there.ask("clock", 2 * CONNECT_S)
     except (OSError, asyncssh.Error, LostError, RefusedError) as error:
         why = await _stderr_of(process) or str(error)

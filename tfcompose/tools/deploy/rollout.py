@@ -23,7 +23,13 @@ from tfcompose.foundation.text import counted, duration, listed
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import hosts_of, share_of, without_computer
 from tfcompose.tools.deploy.agent import UNIT
-from tfcompose.tools.deploy.connection import Host, LostError, RefusedError, connected, settings_of
+from tfcompose.tools.deploy.connection import (
+    ConnectedHost,
+    LostError,
+    RefusedError,
+    connected,
+    settings_of,
+)
 from tfcompose.tools.deploy.following import can_follow, same_files
 from tfcompose.tools.deploy.release import name_of
 from tfcompose.tools.deploy.unit import Unit
@@ -46,7 +52,7 @@ NAMED_AT_MOST = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class DeployTarget:
     """Targets of a deployment: the plan's hosts, their places in the file, and options.
 
     ``is_complete`` says that these are all hosts that have processes; ``clock_limit_s`` is by how
@@ -70,7 +76,7 @@ class Share:
     ``follows`` says that its launcher can change to the release while it runs.
     """
 
-    host: Host
+    host: ConnectedHost
     unit: Unit
     probe: dict[str, Any]
     state: dict[str, Any] = field(default_factory=dict)
@@ -126,7 +132,9 @@ class Share:
 class Rollout:
     """A deployment to connected hosts. ``report`` is given lines about what is done."""
 
-    def __init__(self, target: Target, shares: list[Share], report: Callable[[str], None]) -> None:
+    def __init__(
+        self, target: DeployTarget, shares: list[Share], report: Callable[[str], None]
+    ) -> None:
         self.target = target
         self.shares = shares
         self.report = report
@@ -511,7 +519,7 @@ class Rollout:
         return {share.name: answer for share, answer in zip(self.shares, answers, strict=True)}
 
 
-async def _probed(host: Host) -> dict[str, Any]:
+async def _probed(host: ConnectedHost) -> dict[str, Any]:
     try:
         probe: dict[str, Any] = await host.ask("probe")
     except (LostError, RefusedError) as error:
@@ -521,10 +529,10 @@ async def _probed(host: Host) -> dict[str, Any]:
 
 def target_of(
     plan: Plan, names: Sequence[str], places: Mapping[str, Span], **options: Any
-) -> Target:
+) -> DeployTarget:
     """Return what is deployed to: all hosts that have processes, or the named ones.
 
-    ``options`` are a ``Target``'s.
+    ``options`` are those of ``DeployTarget``.
 
     Raises:
         RejectedError: with what the robot file lacks.
@@ -553,10 +561,10 @@ def target_of(
     if found:
         raise RejectedError(found)
     chosen = {name: plan.hosts[name] for name in used if not names or name in names}
-    return Target(plan, chosen, places, is_complete=len(chosen) == len(used), **options)
+    return DeployTarget(plan, chosen, places, is_complete=len(chosen) == len(used), **options)
 
 
-def _clocks_apart(offsets: Mapping[str, float], target: Target) -> Iterable[Finding]:
+def _clocks_apart(offsets: Mapping[str, float], target: DeployTarget) -> Iterable[Finding]:
     """Yield a finding if clocks of hosts differ by more than may be."""
     if len(offsets) < 2:  # noqa: PLR2004 (a difference needs two)
         return
@@ -584,7 +592,7 @@ _HOLDS = {
 }
 
 
-def _settings_apart(shares: Sequence[Share], target: Target) -> Iterable[Finding]:
+def _settings_apart(shares: Sequence[Share], target: DeployTarget) -> Iterable[Finding]:
     """Yield what keeps the hosts' nodes from finding each other.
 
     Another domain, middleware, or no discovery.
@@ -621,7 +629,7 @@ def _settings_apart(shares: Sequence[Share], target: Target) -> Iterable[Finding
 
 @asynccontextmanager
 async def reached(
-    target: Target,
+    target: DeployTarget,
     has_wheels: bool,  # noqa: FBT001
     report: Callable[[str], None],
 ) -> AsyncIterator[Rollout]:
@@ -636,7 +644,7 @@ async def reached(
         settings = settings_of(plan.robot, name, host, system=target.system)
         connecting.append(connected(name, host, settings, target.places.get(name)))
     done = await asyncio.gather(*connecting)
-    hosts = [one for one in done if isinstance(one, Host)]
+    hosts = [one for one in done if isinstance(one, ConnectedHost)]
     try:
         if found := [one for one in done if isinstance(one, Finding)]:
             raise RejectedError(found)

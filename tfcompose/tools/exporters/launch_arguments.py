@@ -28,8 +28,8 @@ from tfcompose.spec.language.expressions import environment_in, names_in
 from tfcompose.spec.language.values import plain
 from tfcompose.spec.load import load
 from tfcompose.tools.exporters.launch_values import (
-    Argument,
     ArgumentValue,
+    LaunchArgument,
     LaunchValues,
     Text,
     VariableValue,
@@ -136,8 +136,8 @@ def launch_values(
     )
 
 
-def _argument(name: str, spec: ArgSpec, value: Any) -> Argument:
-    return Argument(
+def _argument(name: str, spec: ArgSpec, value: Any) -> LaunchArgument:
+    return LaunchArgument(
         name,
         spec.kind,
         as_given(value),

@@ -36,7 +36,7 @@ _TRUTHS = ("true", "false")
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class LaunchArgument:
     """A launch argument. ``kind`` is bool, int, float or string.
 
     ``env`` a variable that gives the default.
@@ -92,7 +92,7 @@ class LaunchValues:
     stand beside the launch file.
     """
 
-    arguments: tuple[Argument, ...] = ()
+    arguments: tuple[LaunchArgument, ...] = ()
     conditions: Mapping[str, str] = field(default_factory=dict)
     texts: Mapping[str, Mapping[str, Text]] = field(default_factory=dict)
     more: tuple[PlanProcess, ...] = ()

@@ -7,7 +7,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.tf.ros.tf_codec import Decoder, Transform, encode
+from tfcompose.tf.ros.tf_codec import Decoder, SentTransform, encode
 from tfcompose.tools.fleet.session import connected
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class SharedEdges:
             self._names[parent, child] = (fleet.final(robot, parent), fleet.final(robot, child))
             self._periods_ns[parent, child] = int(_SECOND_NS / shared.rate)
         self._period_of: dict[tuple[str, str], int] = {}
-        self._fixed: dict[tuple[str, str], Transform] = {}
+        self._fixed: dict[tuple[str, str], SentTransform] = {}
 
     def take(self, data: bytes, *, static: bool, now_ns: int) -> bytes | None:
         """Take a message of the robot; return what of it is to be sent now, or None.
@@ -72,13 +72,13 @@ class SharedEdges:
     def _is_due(self, edge: tuple[str, str], now_ns: int) -> bool:
         return self._period_of.get(edge) != now_ns // self._periods_ns[edge]
 
-    def _renamed(self, rows: Iterable[Row], due: list[tuple[str, str]]) -> Iterable[Transform]:
+    def _renamed(self, rows: Iterable[Row], due: list[tuple[str, str]]) -> Iterable[SentTransform]:
         for parent, child, sec, nsec, *numbers in rows:
             edge = (parent.removeprefix("/"), child.removeprefix("/"))
             if edge in due:
                 x, y, z, *quat = numbers
                 stamp_ns = sec * _SECOND_NS + nsec
-                yield Transform(
+                yield SentTransform(
                     stamp_ns, *self._names[edge], (x, y, z), (quat[0], quat[1], quat[2], quat[3])
                 )
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.files import Target
     from tfcompose.spec.load import Source
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
 
 _LAUNCH = (".py", ".xml", ".launch", ".yaml", ".yml")
 _ENDINGS = frozenset({".urdf", ".xacro", ".sh", ".bash", ".txt", "", *_LAUNCH})
@@ -153,12 +153,12 @@ def _import_bringup(arguments: Namespace) -> int:
 
     from tfcompose.cli.reading import STDIN, read_text
     from tfcompose.foundation.reading import is_folder
-    from tfcompose.tools.importers.draft import Draft, robot_name
+    from tfcompose.tools.importers.draft import ImportDraft, robot_name
     from tfcompose.tools.importers.shell import add_script
 
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
-    draft = Draft(wanted, [f"imported from {name} by tfcompose"])
+    draft = ImportDraft(wanted, [f"imported from {name} by tfcompose"])
     if is_folder(arguments.file):
         _add_vehicles(draft, arguments)
     elif kit := _kit(arguments.file):
@@ -203,7 +203,7 @@ def _kit(file: str) -> Source | None:
     return source if source and "launch" not in source.data else None
 
 
-def _add_kits(draft: Draft, first: Source, arguments: Namespace) -> None:
+def _add_kits(draft: ImportDraft, first: Source, arguments: Namespace) -> None:
     from tfcompose.cli.reading import read_text
     from tfcompose.spec.load import load
     from tfcompose.tools.importers.kits import add_kit
@@ -216,7 +216,7 @@ def _add_kits(draft: Draft, first: Source, arguments: Namespace) -> None:
         add_kit(draft, source)
 
 
-def _add_vehicles(draft: Draft, arguments: Namespace) -> None:
+def _add_vehicles(draft: ImportDraft, arguments: Namespace) -> None:
     from tfcompose.cli.reading import read_text
     from tfcompose.spec.load import load
     from tfcompose.tools.importers.kits import add_vehicles
@@ -244,7 +244,7 @@ def _import_observed(arguments: Namespace) -> int:
     from tfcompose.cli.live import observed
     from tfcompose.model.plan.topics import topics_below
     from tfcompose.tf.ros.processes import words_of
-    from tfcompose.tools.importers.draft import Draft, robot_name
+    from tfcompose.tools.importers.draft import ImportDraft, robot_name
     from tfcompose.tools.importers.observed import Observed
 
     topics = topics_below(arguments.namespace)
@@ -256,7 +256,7 @@ def _import_observed(arguments: Namespace) -> int:
         head = f"imported from the recording {name} by tfcompose"
     else:
         name, head = "robot", "imported from a running robot by tfcompose"
-    draft = Draft(arguments.robot or robot_name(name), [head])
+    draft = ImportDraft(arguments.robot or robot_name(name), [head])
     if arguments.namespace:
         draft.sections["ros"] |= {"namespace": arguments.namespace, "isolate": "topics"}
     tree = Observed(draft, observer.publishers.where, words_of, arguments.namespace)
@@ -291,7 +291,7 @@ def _ending_of(text: str) -> str:
     )
 
 
-def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") -> None:
+def _add_launch(draft: ImportDraft, arguments: Namespace, file: str, shown: str = "") -> None:
     from tfcompose.cli.compiling import library, print_output, report_missing_confinement
     from tfcompose.cli.reading import read_text
     from tfcompose.tools.importers.launch import Launch, add_launch
@@ -319,7 +319,7 @@ def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") 
     add_descriptions(draft, descriptions, Workshop(known, target, presets, folders))
 
 
-def _finish(draft: Draft, arguments: Namespace) -> int:
+def _finish(draft: ImportDraft, arguments: Namespace) -> int:
     """Write a draft, with what ``lint`` finds in it; return the exit code."""
     from dataclasses import replace
 

@@ -53,7 +53,7 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 
 
 @dataclass(slots=True)
-class Draft:
+class ImportDraft:
     """A robot file in the making.
 
     ``sections`` hold plain data as in a robot file, ``notes`` the comments above entries,
@@ -240,7 +240,9 @@ def robot_name(wanted: str) -> str:
     return name if name[0].isalpha() else f"robot_{name}"
 
 
-def text_with_findings(draft: Draft, lint: Callable[[str], Compiled]) -> tuple[str, Compiled]:
+def text_with_findings(
+    draft: ImportDraft, lint: Callable[[str], Compiled]
+) -> tuple[str, Compiled]:
     """Return the robot file, and what ``lint`` finds in it.
 
     Names of the source are no errors, and a source without frames gives a robot of one.

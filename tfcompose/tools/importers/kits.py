@@ -16,7 +16,7 @@ from tfcompose.foundation.reading import is_file, is_folder, names_in
 from tfcompose.tools.importers.draft import pose_keys
 from tfcompose.tools.importers.programs import where
 from tfcompose.tools.importers.texts import Argument, Text, concatenated
-from tfcompose.tools.importers.yaml_text import Expression
+from tfcompose.tools.importers.yaml_text import ExpressionText
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tfcompose.model.files import Target
     from tfcompose.spec.load import Path as Steps
     from tfcompose.spec.load import Source
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
 
 _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Of Clearpath's mounts those that are in a folder of their own.
@@ -86,7 +86,7 @@ def is_autoware(source: Source) -> bool:
     )
 
 
-def add_autoware(draft: Draft, source: Source) -> None:
+def add_autoware(draft: ImportDraft, source: Source) -> None:
     """Add the frames of a calibration file."""
     draft.note(
         ("", ""),
@@ -118,7 +118,7 @@ _CALIBRATIONS = ("sensors_calibration.yaml", "sensor_kit_calibration.yaml")
 
 
 def add_vehicles(
-    draft: Draft,
+    draft: ImportDraft,
     folder: Path,
     target: Target,
     given: Mapping[str, str],
@@ -173,7 +173,7 @@ def add_vehicles(
         for (parent, child), several in _calibrated(draft, sources).items():
             keys: dict[str, Any] = {"calibration": path}
             if len(several) < len(vehicles):
-                keys["when"] = Expression(
+                keys["when"] = ExpressionText(
                     " or ".join(f"args.vehicle_id == {_quoted(one)}" for one in several)
                 )
             draft.frame(parent, child, keys, sources[several[0]].at_key((parent, child)))
@@ -189,7 +189,9 @@ def _quoted(word: str) -> str:
     return f'"{word}"' if "'" in word else f"'{word}'"
 
 
-def _calibrated(draft: Draft, sources: Mapping[str, Source]) -> dict[tuple[str, str], list[str]]:
+def _calibrated(
+    draft: ImportDraft, sources: Mapping[str, Source]
+) -> dict[tuple[str, str], list[str]]:
     """Return the edges of calibrations, each with the vehicles that have it."""
     found: dict[tuple[str, str], list[str]] = {}
     for vehicle, source in sources.items():
@@ -230,7 +232,7 @@ def _words(value: Any) -> Any:
 class _Clearpath:
     """Reads one robot.yaml."""
 
-    def __init__(self, draft: Draft, source: Source) -> None:
+    def __init__(self, draft: ImportDraft, source: Source) -> None:
         self.draft, self.source, self.data = draft, source, source.data
         found = _NUMBERED.match(source.data["serial_number"])
         self.platform = found[1] if found else ""
@@ -481,13 +483,13 @@ class _Clearpath:
                 )
 
 
-def add_clearpath(draft: Draft, source: Source) -> None:
+def add_clearpath(draft: ImportDraft, source: Source) -> None:
     """Add what Clearpath's generator would describe."""
     draft.has_unknown_frames = True
     _Clearpath(draft, source).add()
 
 
-def add_kit(draft: Draft, source: Source) -> None:
+def add_kit(draft: ImportDraft, source: Source) -> None:
     """Add a YAML file that is Clearpath's or Autoware's.
 
     Raises:

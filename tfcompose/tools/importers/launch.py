@@ -60,13 +60,13 @@ from tfcompose.tools.importers.texts import (
     fill,
     from_json,
 )
-from tfcompose.tools.importers.yaml_text import Expression
+from tfcompose.tools.importers.yaml_text import ExpressionText
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from tfcompose.model.files import Target
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
 
 #: The module that reads launch files, confined.
 PROCESS = "tfcompose.tools.importers.launch_process"
@@ -114,7 +114,7 @@ class Launch:
         return Span(self.shown or self.file, max(line, 1))
 
 
-def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
+def add_launch(draft: ImportDraft, launch: Launch, target: Target) -> list[Description]:
     """Add what a launch file starts to the draft.
 
     Return what its robot_state_publishers are given.
@@ -366,7 +366,7 @@ class _LaunchImport:
     """Turns records into entries."""
 
     def __init__(
-        self, draft: Draft, launch: Launch, target: Target, records: list[dict[str, Any]]
+        self, draft: ImportDraft, launch: Launch, target: Target, records: list[dict[str, Any]]
     ) -> None:
         self.draft, self.launch, self.target = draft, launch, target
         self.descriptions: list[Description] = []
@@ -589,7 +589,7 @@ class _LaunchImport:
             self.draft.note(at, f"only if {text}")
         if record.get("only_when"):
             entry = self.draft.sections[at[0]][at[1]]
-            entry["when"] = Expression(record["only_when"])
+            entry["when"] = ExpressionText(record["only_when"])
 
     def _program(self, record: dict[str, Any], span: Span) -> Program:
         todo: list[str] = []

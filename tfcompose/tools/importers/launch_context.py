@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import launch
 
 from tfcompose.tools.importers.launch_objects import here
-from tfcompose.tools.importers.launch_records import FailedError, Recording, with_package
+from tfcompose.tools.importers.launch_records import FailedError, LaunchRecording, with_package
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,12 +26,12 @@ _SCOPE = ("params", "conditions", "whens", "period_s", "after", "depth")
 _DEEPEST = 30
 
 
-class RecordingContext(launch.LaunchContext, Recording):  # type: ignore[misc]
+class RecordingContext(launch.LaunchContext, LaunchRecording):  # type: ignore[misc]
     """Launch's context, with what is recorded beside it."""
 
     def __init__(self, find: Callable[[str, str], str | None], *, every_branch: bool) -> None:
         launch.LaunchContext.__init__(self, noninteractive=True)
-        Recording.__init__(self, find, every_branch=every_branch)
+        LaunchRecording.__init__(self, find, every_branch=every_branch)
         #: Parameters of all nodes: mappings, and names of files.
         self.params: list[Any] = []
         #: What loads the components that are visited: the id of its action, or the full name of

@@ -27,7 +27,7 @@ from tfcompose.tools.importers import launch_records, launch_ros1
 from tfcompose.tools.importers.launch_records import (
     PACKAGE,
     FailedError,
-    Recording,
+    LaunchRecording,
     jsonable,
     with_package,
 )
@@ -91,14 +91,14 @@ _READS = frozenset({"open", "os.listdir", "os.scandir"})
 _TOOLS = {"xacro"}
 
 
-class Packages:
+class LaunchPackages:
     """Finds packages: named and installed ones, and those around the launch file.
 
     ``recording`` is told of those that are not found.
     """
 
     def __init__(self, packages: dict[str, str], prefixes: list[str]) -> None:
-        self.recording: Recording | None = None
+        self.recording: LaunchRecording | None = None
         self._packages, self._prefixes = packages, prefixes
         self._missed: set[str] = set(_TOOLS)
         self._known: dict[tuple[str, Path], str | None] = {}
@@ -133,7 +133,7 @@ class Packages:
 
 
 def _watch(  # noqa: C901 (one hook after another)
-    recording: Recording, null: int, readable: Readable | None
+    recording: LaunchRecording, null: int, readable: Readable | None
 ) -> SavedFiles:
     """Refuse and name what a launch file may not do; pass over what is often done and needless.
 
@@ -234,9 +234,9 @@ def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dic
 
     Records, in order, and why and at which line it stopped if it did.
     """
-    packages = Packages(request["packages"], request["prefixes"])
+    packages = LaunchPackages(request["packages"], request["prefixes"])
     stopped, line = "", 0
-    recording: Recording | None = None
+    recording: LaunchRecording | None = None
     saved: SavedFiles | None = None
     try:
         recording, read = _reader(request, packages)
@@ -265,7 +265,9 @@ def answer(request: dict[str, Any], null: int, readable: Readable | None) -> dic
     }
 
 
-def _reader(request: dict[str, Any], packages: Packages) -> tuple[Recording, Callable[[], None]]:
+def _reader(
+    request: dict[str, Any], packages: LaunchPackages
+) -> tuple[LaunchRecording, Callable[[], None]]:
     """Return the recording, and the function that reads a launch file into it.
 
     Raises:

@@ -34,7 +34,7 @@ class FailedError(Exception):
         self.reason, self.line = reason, line
 
 
-class Recording:
+class LaunchRecording:
     """What a launch file starts, as far as it is read.
 
     ``records`` is what came of it, in order.

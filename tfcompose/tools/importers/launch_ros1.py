@@ -21,7 +21,7 @@ from tfcompose.tools.importers.launch_records import (
     IDS,
     PACKAGE,
     FailedError,
-    Recording,
+    LaunchRecording,
     file_text,
     of_command,
     relative,
@@ -51,7 +51,7 @@ _SUBSTITUTION = re.compile(r"\$\((arg|find|optenv|env|anon|dirname|eval)\b\s*([^
 _OF_ROS1 = re.compile(r"\$\((arg|find|optenv)\s")
 
 
-class Ros1Recording(Recording):
+class Ros1Recording(LaunchRecording):
     """What is recorded of a launch file of ROS 1, and the scope that its elements change."""
 
     def __init__(

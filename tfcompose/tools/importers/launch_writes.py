@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.tools.importers.launch_records import Recording
+    from tfcompose.tools.importers.launch_records import LaunchRecording
 
 #: So much one file may hold, in characters or bytes.
 MOST = 1_000_000
@@ -28,7 +28,7 @@ class SavedFiles:
     it would have made: folders without such a file, and temporary names without one.
     """
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: LaunchRecording) -> None:
         self.texts: dict[str, str] = {}
         self._recording = recording
         self._folders: dict[str, tuple[str, int]] = {}
@@ -37,7 +37,7 @@ class SavedFiles:
     def open(self, path: str, mode: str) -> Any | None:
         """Return a file as ``open`` does, or None where it is to be opened on the disk."""
         path = os.path.abspath(path)  # noqa: PTH100 (links stay)
-        kind = _Bytes if "b" in mode else _Text
+        kind = _BytesFile if "b" in mode else _TextFile
         if set(mode) <= _READABLE:
             return kind(path, self.texts[path], lambda _: None) if path in self.texts else None
         if "+" in mode and "w" not in mode:
@@ -95,7 +95,7 @@ class SavedFiles:
                 )
 
 
-class _Text(io.StringIO):
+class _TextFile(io.StringIO):
     def __init__(self, path: str, text: str, keep: Callable[[str], object]) -> None:
         super().__init__(text)
         self.name = path
@@ -110,7 +110,7 @@ class _Text(io.StringIO):
         super().close()
 
 
-class _Bytes(io.BytesIO):
+class _BytesFile(io.BytesIO):
     def __init__(self, path: str, text: str, keep: Callable[[str], object]) -> None:
         super().__init__(text.encode())
         self.name = path

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve import Library
     from tfcompose.foundation.geometry import Pose
     from tfcompose.tf.live.edges import EdgeState
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
     from tfcompose.tools.importers.sensors import Recognised
 
 #: The process that owns moving edges whose publisher nobody knows, as in a bag.
@@ -49,7 +49,7 @@ class Observed:
     ``namespace`` is that of the robot, without slashes.
     """
 
-    draft: Draft
+    draft: ImportDraft
     where: Callable[[bytes | None], str]
     words_of: Callable[[int], Sequence[str]]
     namespace: str = ""

@@ -36,7 +36,7 @@ from tfcompose.tools.importers.texts import (
     partition,
     parts_of,
 )
-from tfcompose.tools.importers.yaml_text import Expression
+from tfcompose.tools.importers.yaml_text import ExpressionText
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
     from tfcompose.model.files import Target
     from tfcompose.spec.load.params import NodeParams
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
     from tfcompose.tools.importers.static_transforms import Reader
 
 STATE_PUBLISHER = "robot_state_publisher"
@@ -123,7 +123,7 @@ class Program:
     exact: range = range(0)
 
 
-def add_program(draft: Draft, program: Program, target: Target) -> str | None:
+def add_program(draft: ImportDraft, program: Program, target: Target) -> str | None:
     """Add a program to the draft; return the name of its process, or None where it is none.
 
     A robot_state_publisher is not added here: its description makes links or a part, which
@@ -138,7 +138,7 @@ def add_program(draft: Draft, program: Program, target: Target) -> str | None:
     return _add_process(draft, program, target)
 
 
-def one_clock(draft: Draft) -> None:
+def one_clock(draft: ImportDraft) -> None:
     """Set the robot's clock from node parameters or their argument, if all agree."""
     several = [process["params"] for process in draft.started().values() if "params" in process]
     clocks = [params["use_sim_time"] for params in several if "use_sim_time" in params]
@@ -149,10 +149,12 @@ def one_clock(draft: Draft) -> None:
             if process.get("params", {}).pop("use_sim_time", None) and not process["params"]:
                 del process["params"]
     elif len(arguments) == 1 and (argument := arguments.pop()):
-        draft.sections["ros"]["clock"] = Expression(f"'sim' if args.{argument.name} else 'wall'")
+        draft.sections["ros"]["clock"] = ExpressionText(
+            f"'sim' if args.{argument.name} else 'wall'"
+        )
 
 
-def is_setting(draft: Draft, name: str, value: str) -> bool:
+def is_setting(draft: ImportDraft, name: str, value: str) -> bool:
     """Return whether a variable is a setting of the whole robot, which then has it.
 
     The first value counts.
@@ -317,7 +319,7 @@ def _yaml_value(text: str) -> Any:
     return text if isinstance(value, dict) else _value_in(value)
 
 
-def _add_transform(draft: Draft, program: Program) -> None:
+def _add_transform(draft: ImportDraft, program: Program) -> None:
     at = program.at
     moved = dict(program.remap)
     reader = program.reader or reader_of(program.argv)
@@ -343,7 +345,7 @@ def _add_transform(draft: Draft, program: Program) -> None:
         draft.todo(one, at, entry)
 
 
-def isolated(draft: Draft, moved: Mapping[str, str], namespace: str | None) -> bool:
+def isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | None) -> bool:
     """Return whether remappings keep TF, or move it below the draft's namespace."""
     new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
     if any(name != topic.strip("/") for topic, name in new.items()):
@@ -357,7 +359,7 @@ def isolated(draft: Draft, moved: Mapping[str, str], namespace: str | None) -> b
     return True
 
 
-def one_namespace(draft: Draft) -> None:
+def one_namespace(draft: ImportDraft) -> None:
     """Give namespaces as the robot's has them below it, and absolute where they are elsewhere."""
     ros = draft.sections["ros"]
     space = ros.get("namespace")
@@ -380,7 +382,7 @@ def one_namespace(draft: Draft) -> None:
 SEVERAL = "several robots are parts, each with its namespace, or a fleet: import each on its own"
 
 
-def _add_joint_publisher(draft: Draft, program: Program) -> str:
+def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
     """Add a stand-in for joint states.
 
     All joints at 0, as joint_state_publisher has them unless it is told.
@@ -426,7 +428,7 @@ def _hertz(value: float) -> Any:
     return f"{number(value)} Hz"
 
 
-def _add_process(draft: Draft, program: Program, target: Target) -> str:
+def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
     program = replace(program, argv=tuple(_with_made(word, draft) for word in program.argv))
     source_name = program.name
@@ -490,7 +492,7 @@ def _is_literal(word: str, at: Span | None) -> bool:
     return all(address in source for address in re.findall(rf"{PACKAGE}\w+", word))
 
 
-def _with_made(word: str, draft: Draft) -> str:
+def _with_made(word: str, draft: ImportDraft) -> str:
     """Return a word of a command line, with the path of a file that the source makes as ours."""
     made = next((path for path in draft.made if word.endswith(path)), None)
     if made is None:
@@ -553,7 +555,7 @@ def _container_keys(program: Program) -> dict[str, Any]:
     return keys | ({"args": words} if words else {})
 
 
-def _named_in_files(params: Sequence[Mapping[str, Any] | str], draft: Draft) -> str | None:
+def _named_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft) -> str | None:
     """Return the node that parameter files are written for, where that is one alone.
 
     None where none is named.
@@ -621,7 +623,7 @@ def _plain(program: Program) -> str:
 
 
 def _params(
-    program: Program, target: Target, node: str, draft: Draft, *, keeps_name: bool
+    program: Program, target: Target, node: str, draft: ImportDraft, *, keeps_name: bool
 ) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
     """Return the parameters as a robot file has them, files first, its node's own, and the rest.
 
@@ -701,7 +703,7 @@ def _by_full_name(params: Mapping[str, Any], above: str) -> Iterator[tuple[str, 
             yield f"{above}{key}", value
 
 
-def _nodes_in(file: str, draft: Draft) -> list[NodeParams] | None:
+def _nodes_in(file: str, draft: ImportDraft) -> list[NodeParams] | None:
     """Return what a parameter file has for nodes, or None where it has nothing.
 
     None, too, if it is not there, or may not be read.

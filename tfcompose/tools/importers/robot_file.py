@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from tfcompose.model.files import Target
     from tfcompose.model.robot import Edge, Robot
     from tfcompose.model.robot.hardware import Hardware, Interface
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
     from tfcompose.tools.importers.omitted import Entry
     from tfcompose.tools.importers.sensors import Recognised
 
@@ -69,7 +69,7 @@ def robot_file(imported: Imported, head: Iterable[str]) -> str:
     return "\n".join([*_Writer(imported).lines(head), ""])
 
 
-def put_into(draft: Draft, imported: Imported) -> None:
+def put_into(draft: ImportDraft, imported: Imported) -> None:
     """Put what was imported of a description into the draft of a robot that is more than that."""
     writer = _Writer(imported)
     for title, entries in writer.sections().items():

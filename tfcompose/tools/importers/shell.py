@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.model.files import Target
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ASSIGNMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)=(.*)", re.DOTALL)
@@ -313,7 +313,7 @@ def _closing(text: str) -> int:
 
 @dataclass(slots=True)
 class _Script:
-    draft: Draft
+    draft: ImportDraft
     target: Target
     file: str
     environment: dict[str, str] = field(default_factory=dict)
@@ -459,7 +459,7 @@ def _without_redirections(words: list[str]) -> list[str]:
     return kept
 
 
-def add_script(draft: Draft, text: str, file: str, target: Target) -> None:
+def add_script(draft: ImportDraft, text: str, file: str, target: Target) -> None:
     """Add what the commands of a script start to the draft.
 
     Raises:

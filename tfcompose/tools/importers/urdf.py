@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tfcompose.compiler.resolve import Library
     from tfcompose.model.files import Target
-    from tfcompose.tools.importers.draft import Draft
+    from tfcompose.tools.importers.draft import ImportDraft
     from tfcompose.tools.importers.programs import Description
 
 _OUTSIDE = "--package NAME=FOLDER names its package; --trust is for files of your own"
@@ -39,7 +39,7 @@ class Workshop:
 
 
 def add_descriptions(
-    draft: Draft, descriptions: Iterable[Description], workshop: Workshop
+    draft: ImportDraft, descriptions: Iterable[Description], workshop: Workshop
 ) -> None:
     """Add what robot_state_publishers are given.
 
@@ -58,7 +58,7 @@ def add_descriptions(
             _add_links(draft, described, workshop)
 
 
-def _add_part(draft: Draft, described: Description, workshop: Workshop) -> None:
+def _add_part(draft: ImportDraft, described: Description, workshop: Workshop) -> None:
     path = described.file
     around = (
         (name, folder)
@@ -91,7 +91,7 @@ def _installed(path: str, packages: Packages) -> str:
     return ""
 
 
-def _add_links(draft: Draft, described: Description, workshop: Workshop) -> None:
+def _add_links(draft: ImportDraft, described: Description, workshop: Workshop) -> None:
     packages, file = workshop.packages, described.file
     if described.text and packages.disk:
         text = described.text

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tfcompose.tools.importers.texts import Part
 
 
-class Expression(str):
+class ExpressionText(str):
     """An expression, which is computed: ``${…}`` in the written file."""
 
     __slots__ = ()
@@ -24,7 +24,7 @@ def without_expressions(
     literals = (
         part
         for text in texts_in(sections)
-        if not isinstance(text, Expression)
+        if not isinstance(text, ExpressionText)
         for part in parts_of(text)
         if isinstance(part, str)
     )
@@ -39,7 +39,7 @@ def _escaped(value: Any) -> Any:
         return [_escaped(item) for item in value]
     if not isinstance(value, str):
         return value
-    if isinstance(value, Expression):
+    if isinstance(value, ExpressionText):
         return f"${{{value}}}"
     if isinstance(value, Text):
         return "".join(map(_escaped_part, value.parts))

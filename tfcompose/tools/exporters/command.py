@@ -185,9 +185,9 @@ def _exported(
         urdf = read_text(str(file.parent / STOCK_DESCRIPTION))
         if is_plan(arguments.file):
             return launch(plan, Machine(relative), urdf)
-        from tfcompose.tools.exporters.launch_arguments import launch_values
+        from tfcompose.tools.exporters.launch_arguments import collect_launch_values
 
-        values, further, fixed = launch_values(arguments, plan)
+        values, further, fixed = collect_launch_values(arguments, plan)
         files, gaps = launch(plan, Machine(relative), urdf, values)
         return (*files, *further), [*gaps, *fixed]
     if arguments.kind == "compose":

@@ -64,7 +64,7 @@ class _Uses:
     fixed: set[str] = field(default_factory=set)
 
 
-def launch_values(
+def collect_launch_values(
     arguments: Namespace, plan: Plan
 ) -> tuple[LaunchValues, tuple[File, ...], list[str]]:
     """Return what the launch file decides itself, the files it needs, and what is fixed.

@@ -1,6 +1,7 @@
 """Findings of the guard about publishers and edges, from histories with a set clock."""
 
 import re
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -16,7 +17,7 @@ from tfcompose.model.messages import (
     RecoveredShown,
     TreeComplete,
 )
-from tfcompose.model.plan import EdgePattern, GuardPolicy
+from tfcompose.model.plan import EdgePattern, GuardPolicy, SourceLine
 
 
 def test_owners_are_live_and_nothing_is_found(running: History) -> None:
@@ -43,6 +44,28 @@ def test_all_is_clear_after_the_settling_time_when_nobody_sends(history: History
     history.wait(SETTLE_S - 0.05)
     assert history.events == []
     assert history.wait(TICK_S).events == [Clear()]
+
+
+def test_findings_name_the_lines_of_the_plan_that_is_followed_now(running: History) -> None:
+    slam, static = running.joins("/slam"), running.joins("/static", static=True)
+    running.send(static, FIXED).repeat(slam, "map odom", 20)
+    running.repeat(running.joins("/rogue"), "odom base", 3)
+    running.leaves(static)
+    running.wait(5)
+    judge = running.judge
+
+    def lines() -> set[int]:
+        notes = [
+            note.message for found in (*judge.wrong(), *judge.live.wrong()) for note in found.notes
+        ]
+        return {int(line) for note in notes for line in re.findall(r"rover.yaml:(\d+)", note)}
+
+    assert lines() == {7}
+    moved = tuple(replace(edge, source=SourceLine("rover.yaml", 9)) for edge in judge.plan.edges)
+    judge.follow(replace(judge.plan, edges=moved))
+    assert lines() == {9}
+    running.dies().wait(0.5)
+    assert lines() == {9}
 
 
 def test_an_external_owner_that_is_there_before_the_start_is_right(history: History) -> None:

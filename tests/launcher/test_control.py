@@ -4,6 +4,7 @@ import io
 import json
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from selectors import DefaultSelector
 from socket import AF_UNIX, socket
@@ -13,9 +14,11 @@ import pytest
 from tfcompose.launcher import answers
 from tfcompose.launcher.answers import answer
 from tfcompose.launcher.control import LONGEST_REQUEST, Control
+from tfcompose.launcher.events import NewPlan
 from tfcompose.launcher.state import initial
-from tfcompose.model.messages import Done, Refusal, Request, UpdateRequest, line_of
+from tfcompose.model.messages import Done, PlanChange, Refusal, Request, UpdateRequest, line_of
 from tfcompose.model.plan import Plan, RosSettings
+from tfcompose.model.plan.file import write_plan
 
 PLAN = Plan("rover", "", None, RosSettings(), (), ())
 
@@ -113,6 +116,21 @@ def test_a_plan_that_cannot_be_read_is_refused_at_once(
     )
     assert isinstance(refused, Refusal)
     assert (event, commands) == (None, None)
+
+
+def test_a_plan_whose_lines_moved_is_followed_and_the_same_plan_is_not(tmp_path: Path) -> None:
+    file = tmp_path / "plan.json"
+    for digest, is_followed in (("moved", True), (PLAN.spec_digest, False)):
+        file.write_text(write_plan(replace(PLAN, spec_digest=digest)))
+        change, event, _ = answer(
+            UpdateRequest(str(file), str(tmp_path)),
+            initial(PLAN),
+            tmp_path / "old.json",
+            {},
+            lambda base, *_, **__: dict(base),
+        )
+        assert change == PlanChange((), (), (), ())
+        assert isinstance(event, NewPlan) == is_followed
 
 
 class _Waiting(io.BytesIO):

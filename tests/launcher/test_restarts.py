@@ -31,6 +31,7 @@ from tfcompose.model.messages import (
     RecoveredShown,
     Remember,
     Replanned,
+    Reread,
     Silent,
     TreeComplete,
     Verb,
@@ -394,6 +395,14 @@ def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is
     assert list(history.state.tracked) == ["static", "a", "new"]
     assert history.all(Replanned) == [Replanned(("a",), ("new",), ("b",), ("base_link → x",))]
     assert history.found() == []
+
+
+def test_a_guard_that_goes_on_reads_another_plan() -> None:
+    history = begin(GUARD, STATIC).feed(Clear())
+    history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"static"}), file="new.json"))
+    assert Reread("new.json") in history.orders
+    history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"}), file="newer.json"))
+    assert Reread("newer.json") not in history.orders, "the next one reads it itself"
 
 
 def test_a_tree_stays_complete_where_another_plan_changes_nothing_of_it() -> None:

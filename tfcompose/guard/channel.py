@@ -34,6 +34,7 @@ from tfcompose.model.messages import (
     OwnerReady,
     Present,
     Remember,
+    Reread,
     Silent,
     TreeComplete,
     line_of,
@@ -76,10 +77,17 @@ _SWITCHES, _ANSWERED = "switches", "answered"
 class OrderReader:
     """Follows the launcher's orders as they come."""
 
-    def __init__(self, judges: list[Judge], gates: Gates, components: Components) -> None:
+    def __init__(
+        self,
+        judges: list[Judge],
+        gates: Gates,
+        components: Components,
+        reread: Callable[[str], None],
+    ) -> None:
         self._judges = judges
         self._gates = gates
         self._components = components
+        self._reread = reread
         self._fd = int(os.environ[ORDERS_FD]) if ORDERS_FD in os.environ else None
         self._rest = b""
         if self._fd is not None:
@@ -101,6 +109,8 @@ class OrderReader:
                     self._gates.add(gate)
                 case ComponentOrder() as order:
                     self._components.take(order)
+                case Reread(file):
+                    self._reread(file)
         self._gates.check()
         self._components.check()
 

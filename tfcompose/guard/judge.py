@@ -88,6 +88,12 @@ class Judge:
         self._sent = SentPoses(self.plan, self._senders)
         self._started = {node: each.name for each in self.plan.managed for node in each.nodes}
 
+    def follow(self, plan: Plan) -> None:
+        """Follow a plan that differs in its edges' lines, and in poses of fixed ones."""
+        self.plan = plan
+        self.live.follow(plan)
+        self.ledger.follow(plan)
+
     def message(self, message: Message, now: float) -> list[GuardEvent]:
         """Take a message and return which edges it brings to life; ``tick`` reports violations."""
         return self.arrived(self.take(message, now), message, now)

@@ -139,6 +139,14 @@ class Ledger:
         self._stoppable = {process.name for process in offenders}
         self._nodes = {node for process in offenders for node in process.nodes}
 
+    def follow(self, plan: Plan) -> None:
+        """Follow a plan that differs in its edges' lines, and in poses of fixed ones."""
+        self._plan = plan
+        self.planned = {edge.child: edge for edge in plan.edges}
+        for entry in self.entries.values():
+            entry.fault = self._as_planned(entry.fault)
+        self.epoch += 1  # verdicts that are remembered hold edges
+
     # Messages.
 
     @property
@@ -428,8 +436,12 @@ class Ledger:
         for hexed, known in memory.items():
             gid = bytes.fromhex(hexed) or None
             for fault in known:
-                entry = OpenFault(fault, gid, until, until, reported=True)
+                entry = OpenFault(self._as_planned(fault), gid, until, until, reported=True)
                 self.entries[self._key(fault, gid)] = entry
+
+    def _as_planned(self, fault: Fault) -> Fault:
+        """Return a fault that was found under another plan with the edge of this one."""
+        return replace(fault, edge=self.planned.get(fault.child)) if fault.edge else fault
 
     def _group(self, entry: OpenFault) -> Group:
         """Return with what a fault is reported: its code and node, or the robot it belongs to."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.text import listed
@@ -27,7 +28,7 @@ from tfcompose.model.messages import (
 from tfcompose.tf.live.arrivals import Arrivals
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.model.plan import Plan, PlanEdge
@@ -192,6 +193,19 @@ class LivenessMemory:
     gone: tuple[str, ...]
 
 
+@dataclass(slots=True, eq=False)
+class WrongEdges:
+    """What was reported of edges, as their places in the robot file are now."""
+
+    edges: list[PlanEdge]
+    finding_of: Callable[[Sequence[PlanEdge]], Finding]
+
+    @property
+    def found(self) -> Finding:
+        """The finding."""
+        return self.finding_of(self.edges)
+
+
 class Liveness:
     """The planned edges and their owners.
 
@@ -214,8 +228,16 @@ class Liveness:
         self._gone: set[str] = set()
         self._absent: set[str] = set()
         #: What is reported and not over, by the edge's child: silence, a low rate.
-        self._wrong: dict[str, Finding] = {}
+        self._wrong: dict[str, WrongEdges] = {}
         self._watched = WatchedTime()
+
+    def follow(self, plan: Plan) -> None:
+        """Follow a plan that differs in its edges' lines, and in poses of fixed ones."""
+        planned = {edge.child: edge for edge in plan.edges}
+        for track in self.tracks:
+            track.edges = tuple(planned[edge.child] for edge in track.edges)
+        for reported in self._wrong.values():
+            reported.edges = [planned[edge.child] for edge in reported.edges]
 
     def absent(self, owner: str) -> None:
         """Note that the owner was stopped on purpose.
@@ -262,7 +284,9 @@ class Liveness:
         for one in memory.silent:
             for track in self._parted(self._planned(one.children)):
                 track.silent, track.silent_since, track.last = True, one.since, one.since
-                self._note_wrong(_children([track]), silent(list(track.edges), now - one.since))
+                self._note_wrong(
+                    WrongEdges(list(track.edges), partial(silent, silence_s=now - one.since))
+                )
         self._complete = not any(self._waiting.values())
 
     def _planned(self, children: tuple[str, ...]) -> tuple[str, ...]:
@@ -371,22 +395,23 @@ class Liveness:
             if change:
                 changed.setdefault((change, track.edge.owner), []).append(track)
         self.changes += len(changed)
-        events = []
+        events: list[GuardEvent] = []
         for (change, _), tracks in changed.items():
-            event = change_event(change, self._in_order(tracks), now)
-            events.append(event)
-            if isinstance(event, FindingShown):
-                self._note_wrong(_children(tracks), event.found)
-            else:
+            wrong = _wrong(change, self._in_order(tracks), now)
+            if wrong is None:
                 self._note_over(_children(tracks))
+                events.append(_recovered(change, self._in_order(tracks), now))
+            else:
+                self._note_wrong(wrong)
+                events.append(FindingShown(wrong.found))
         return events
 
     def wrong(self) -> list[Finding]:
         """Return what was reported of silent and slow edges and is not over."""
-        return list(dict.fromkeys(self._wrong.values()))
+        return [reported.found for reported in dict.fromkeys(self._wrong.values())]
 
-    def _note_wrong(self, children: Iterable[str], found: Finding) -> None:
-        self._wrong.update(dict.fromkeys(children, found))
+    def _note_wrong(self, reported: WrongEdges) -> None:
+        self._wrong.update({edge.child: reported for edge in reported.edges})
 
     def _note_over(self, children: Iterable[str]) -> None:
         for child in children:
@@ -426,9 +451,9 @@ class Liveness:
             edge = tracks[0].edge
             if edge.node not in nodes and owner not in self._gone:
                 self._gone.add(owner)
-                found = left([edge for track in tracks for edge in track.edges])
-                self._note_wrong(_children(tracks), found)
-                events.append(FindingShown(found))
+                wrong = WrongEdges([edge for track in tracks for edge in track.edges], left)
+                self._note_wrong(wrong)
+                events.append(FindingShown(wrong.found))
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
                 self._note_over(_children(tracks))
@@ -437,26 +462,31 @@ class Liveness:
         return events
 
 
-def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
-    """Return the event for tracks that fell silent or slow, or came back.
-
-    ``change`` says which.
-    """
+def _wrong(change: str, tracks: list[Track], now: float) -> WrongEdges | None:
+    """Return what to report of tracks that fell silent or slow; None where they came back."""
     edges = [edge for track in tracks for edge in track.edges]
-    named, are = listed([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
     match change:
         case "silent":
-            return FindingShown(silent(edges, max(now - track.last for track in tracks)))
+            silence_s = max(now - track.last for track in tracks)
+            return WrongEdges(edges, partial(silent, silence_s=silence_s))
         case "slow":
-            return FindingShown(slow(edges, min(track.rate() or 0.0 for track in tracks)))
-        case "back":
-            silence_s = now - min(track.silent_since for track in tracks)
-            return RecoveredShown(f"{named} {are} back after {silence_s:.1f} s")
+            return WrongEdges(edges, partial(slow, rate=_rate(tracks)))
         case _:
-            return RecoveredShown(
-                f"{named} {are} sent at {min(track.rate() or 0.0 for track in tracks):.3g} Hz"
-                " again"
-            )
+            return None
+
+
+def _recovered(change: str, tracks: list[Track], now: float) -> RecoveredShown:
+    """Return the event for tracks that came back, or come at their rate again."""
+    edges = [edge for track in tracks for edge in track.edges]
+    named, are = listed([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
+    if change == "back":
+        silence_s = now - min(track.silent_since for track in tracks)
+        return RecoveredShown(f"{named} {are} back after {silence_s:.1f} s")
+    return RecoveredShown(f"{named} {are} sent at {_rate(tracks):.3g} Hz again")
+
+
+def _rate(tracks: list[Track]) -> float:
+    return min(track.rate() or 0.0 for track in tracks)
 
 
 def _children(tracks: list[Track]) -> tuple[str, ...]:

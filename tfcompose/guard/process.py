@@ -12,11 +12,14 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from tfcompose.foundation.catalogue import CATALOGUE
+from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.text import counted
 from tfcompose.guard.channel import (
     EventWriter,
@@ -37,6 +40,7 @@ from tfcompose.guard.ledger import MOST_UNDECLARED
 from tfcompose.guard.losses import LossWatch
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.model.messages import Clear, TreeComplete
+from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.middleware import IMPLEMENTATIONS
 from tfcompose.model.plan.topics import GLOBAL, parts_of, private_topics
 from tfcompose.model.variables import (
@@ -356,7 +360,8 @@ def guard(own: Own, stop: Stop) -> None:
         losses = LossWatch(judged, emit)
         wrong = [losses.wrong, joints.wrong, *(judge.wrong for judge in judged)]
         silence = [judge.live.wrong for judge in judged]
-        orders = OrderReader(judged, Gates(node, emit), Components(node, emit))
+        reread = partial(_reread, own, judged)
+        orders = OrderReader(judged, Gates(node, emit), Components(node, emit), reread)
         steps = [orders.take, losses.check, *(watch.step for watch in watches)]
         steps += [memory.hand_on for memory in memories]
         steps += [
@@ -387,6 +392,17 @@ def guard(own: Own, stop: Stop) -> None:
         for watch in watches:
             watch.report(0.0)
             watch.close()
+
+
+def _reread(own: Own, judges: Sequence[Judge], file: str) -> None:
+    """Have the judges follow the plan in the file, which starts no guard anew."""
+    try:
+        plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
+    except (OSError, ValueError, RejectedError) as error:
+        say(f"findings keep the lines of the plan before: {error}")
+        return
+    for judge, part in zip(judges, plans_by_topics(plan, own.process).values(), strict=True):
+        judge.follow(part)
 
 
 def _watches(

@@ -143,9 +143,10 @@ def _update(
         removed=tuple(name for name in before if name not in names),
         held=different.held,
     )
-    if not any((different.changed, answer.added, answer.removed, answer.held)):
+    if plan == state.plan and not different.changed:
         return answer, None, None
-    return answer, NewPlan(plan, different.changed, different.held), (file, commands)
+    event = NewPlan(plan, different.changed, different.held, str(file))
+    return answer, event, (file, commands)
 
 
 def _plain_file(file: Path) -> bytes:

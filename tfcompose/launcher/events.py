@@ -88,12 +88,13 @@ class NewPlan:
     """From now on another plan holds.
 
     ``changed`` are the processes that must be started anew for it, ``held`` the fixed edges that
-    listeners still hold.
+    listeners still hold, ``file`` is where the plan is.
     """
 
     plan: Plan
     changed: frozenset[str]
     held: tuple[str, ...] = ()
+    file: str = ""
 
 
 Event = (

@@ -21,7 +21,7 @@ from tfcompose.launcher.failures import (
     signal_name,
 )
 from tfcompose.launcher.state import UNREAD, StopReason, Tracked, by_owner
-from tfcompose.model.messages import Absent, ComponentOrder, DownRequest, Replanned
+from tfcompose.model.messages import Absent, ComponentOrder, DownRequest, Replanned, Reread
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -274,6 +274,9 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
     for name, one in gone.items():
         if one.alive:
             step.track(name, replace(one, leaving="drop", wanted=False))
+    guard = step.state.guard
+    if guard is not None and guard not in event.changed and step.state.tracked[guard].alive:
+        step.actions.append(Order(Reread(event.file)))
     names = tuple(step.state.tracked)
     started = {process.name for process in (*state.plan.managed, *plan.managed)}
     changed = tuple(name for name in names if name in event.changed & started and name in before)

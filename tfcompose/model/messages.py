@@ -230,7 +230,13 @@ class ComponentOrder(_Order, frozen=True):
     file: str = ""
 
 
-GuardOrder = Absent | Present | Gate | ComponentOrder
+class Reread(_Order, frozen=True):
+    """Read the plan anew: its edges' lines have changed, or poses that ``static`` sends."""
+
+    file: str
+
+
+GuardOrder = Absent | Present | Gate | ComponentOrder | Reread
 
 GUARD_ORDERS = msgspec.json.Decoder(GuardOrder)
 

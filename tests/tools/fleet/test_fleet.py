@@ -2,6 +2,7 @@
 
 import json
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -75,6 +76,18 @@ def test_a_pose_between_two_robots_is_found(
         ("r2", "live"),
     ]
     assert until(lambda: list(observer.findings()) == [])
+
+
+def test_for_one_pose_only_robots_with_edges_between_its_frames_are_heard(two: Two) -> None:
+    observer = FleetObserver(fleet_of(two.routers), ("r1/odom", "r1/base_link"))
+    try:
+        assert until(lambda: observer.buffer.can_lookup("r1/odom", "r1/base_link"))
+        time.sleep(1)  # a robot that was heard would have sent twice
+        assert [robot.age_s is None for robot in observer.status()] == [False, True]
+        callbacks = {thread for thread in threading.enumerate() if "pyo3" in thread.name}
+        assert {thread.daemon for thread in callbacks} == {False}, "Python waits for them"
+    finally:
+        observer.close()
 
 
 def test_a_broken_link_is_stale_within_3_s_and_live_again_when_it_is_mended(

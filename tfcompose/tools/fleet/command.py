@@ -91,9 +91,10 @@ def run(arguments: Namespace) -> int:
         return _share(spec, names[0], arguments.namespace)
     from tfcompose.tools.fleet.observe import FleetObserver
 
-    observer = FleetObserver(spec)
+    is_echo = arguments.action == "echo"
+    observer = FleetObserver(spec, (names[0], names[1]) if is_echo else None)
     try:
-        if arguments.action == "echo":
+        if is_echo:
             return _echo(observer, names[0], names[1], arguments)
         return _report(observer, arguments)
     except KeyboardInterrupt:

@@ -88,36 +88,47 @@ class _Link:
 
 
 class FleetObserver:
-    """Listens to all robots of a fleet until it is closed.
+    """Listens to robots of a fleet until it is closed.
 
-    ``buffer`` answers lookups between them.
+    ``frames`` are a target and a source: only robots with edges between them are listened to then,
+    else all of them. ``buffer`` answers lookups between them.
     """
 
-    def __init__(self, fleet: FleetSpec) -> None:
+    def __init__(self, fleet: FleetSpec, frames: tuple[str, str] | None = None) -> None:
         self.fleet = fleet
         self.buffer = PoseBuffer()
         self._lock = threading.Lock()
         self._links = {robot: _Link() for robot in fleet.robots}
-        ends = (
-            [fleet.final(one, frame) for frame in edge.ends]
-            for one in fleet.robots
-            for edge in fleet.edges_of(one)
-        )
-        self._parents = {child: parent for parent, child in ends}
+        ends = {
+            robot: {
+                fleet.final(robot, edge.ends[1]): fleet.final(robot, edge.ends[0])
+                for edge in fleet.edges_of(robot)
+            }
+            for robot in fleet.robots
+        }
+        self._parents = {
+            child: parent for edges in ends.values() for child, parent in edges.items()
+        }
+        self._heard = list(fleet.robots)
+        if frames is not None:
+            needed = self._between(*frames)
+            self._heard = [robot for robot in fleet.robots if needed & ends[robot].keys()]
         self._sessions: dict[str, Any] = {}
         self._subscribers: list[Any] = []
         self._ended = threading.Event()
+        # Zenoh's callbacks run in threads that are daemons where the subscriber's thread is one. A
+        # daemon that comes back from Zenoh while Python ends aborts the process.
         self._threads = [
             threading.Thread(
-                target=self._connect, args=(router,), name=f"router {router}", daemon=True
+                target=self._connect, args=(router,), name=f"router {router}", daemon=False
             )
-            for router in dict.fromkeys(one.router for one in fleet.robots.values())
+            for router in dict.fromkeys(fleet.robots[robot].router for robot in self._heard)
         ]
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
-        """End the sessions after their subscribers: no thread of theirs calls Python at exit."""
+        """End the sessions after their subscribers, whose threads Python waits for at its exit."""
         self._ended.set()
         for thread in self._threads:
             thread.join()
@@ -218,8 +229,9 @@ class FleetObserver:
                 continue
             with self._lock:
                 self._sessions[router] = session
-            for robot, one in self.fleet.robots.items():
-                for static in (False, True) if one.router == router else ():
+            robots = [robot for robot in self._heard if self.fleet.robots[robot].router == router]
+            for robot in robots:
+                for static in (False, True):
                     key = f"{self.fleet.key_of(robot)}/{'tf_static' if static else 'tf'}"
                     subscriber = session.declare_subscriber(
                         key, partial(self._take, robot, static)

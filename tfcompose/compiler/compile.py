@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.check import check, rules_of_tools, silenced, with_replaced
+from tfcompose.compiler.check import RULES, check, rules_of_tools, silenced, with_replaced
 from tfcompose.compiler.resolve import Disk, Library, resolve
+from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Allow, Finding, RejectedError, without_duplicates
 from tfcompose.spec.language import (
     Given,
@@ -19,7 +20,7 @@ from tfcompose.spec.language import (
 from tfcompose.spec.load import Source, load
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from tfcompose.model.robot import Robot
 
@@ -93,18 +94,30 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
         return Compiled(None, error.findings)
     draft, unresolved = resolve(validated, library, read, disk)
     source, parts, robot = validated.source, draft.collected, draft.robot
-    found = without_duplicates([*validated.found, *unresolved, *_checked(robot)])
     rules = {
         word: (level, source.at_key(("rules", word)))
         for word, level in levels_of(validated, robot.limits)
     }
+    codes = {code_of(word) for word, (level, _) in rules.items() if level == "off"}
+    off = {code for code in codes if code and can_be_allowed(code)}
+    found = without_duplicates([*validated.found, *unresolved, *_checked(robot, off)])
     sources = (source, *parts.sources)
     kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
     ordered = tuple(sorted(kept, key=lambda one: one.sort_key))
     return Compiled(robot, ordered, source.allows, frozenset(used), sources)
 
 
-def _checked(robot: Robot) -> list[Finding]:
-    """Return the findings of the rules, including those of the tools it uses."""
-    rules, found = rules_of_tools(robot)
-    return [*check(robot), *check(robot, rules), *found]
+def _checked(robot: Robot, off: Collection[str]) -> list[Finding]:
+    """Return the findings of the rules, including those of the tools it uses.
+
+    Rules whose codes are ``off`` are not asked.
+    """
+    of_tools, found = rules_of_tools(robot)
+    return [
+        *(
+            one
+            for rules in (RULES.values(), of_tools)
+            for one in check(robot, [rule for rule in rules if rule.code not in off])
+        ),
+        *found,
+    ]

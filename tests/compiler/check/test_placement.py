@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
-from tfcompose.compiler.rays import fixed_to
+from tfcompose.compiler.rays.bodies import _reached
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
     from tfcompose.foundation.geometry import Pose
-    from tfcompose.model.robot import Robot
 
 HEAD = "tfcompose: 1\nrobot: r\nbase: base_link\n"
 CIRCLE = "optics: {scan: {horizontal: 360 deg, near: 0.05, far: 10}}"
@@ -100,25 +99,23 @@ def test_scanners_dazzle_each_other_where_one_plane_meets_the_others_window(
     assert bool(found(text, "TF645")) == is_found
 
 
-def test_the_tree_is_walked_for_each_scanner_and_not_for_each_pair(
+def test_the_poses_of_fixed_frames_are_computed_once_a_robot(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    count = 8
-    text = "frames: {base_link: {}}\nsensors:\n"
-    for number in range(count):
-        text += (
-            f"  l{number}: {{preset: generic/lidar2d, parent: base_link, xyz: [0, {number}, 0],"
-            f" {CIRCLE}}}\n"
-        )
-    walked: list[str] = []
+    text = "frames: {base_link: {}}\nsensors:\n" + "".join(
+        f"  l{number}: {{preset: generic/lidar2d, parent: base_link, xyz: [0, {number}, 0],"
+        f" {CIRCLE}}}\n"
+        for number in range(8)
+    )
+    walks: list[int] = []
 
-    def walk(robot: Robot, frame: str) -> dict[str, Pose]:
-        walked.append(frame)
-        return fixed_to(robot, frame)
+    def walked(neighbours: Any, poses: dict[str, Pose]) -> dict[str, Pose]:
+        walks.append(len(poses))
+        return _reached(neighbours, poses)
 
-    monkeypatch.setattr("tfcompose.compiler.check.placement.fixed_to", walk)
+    monkeypatch.setattr("tfcompose.compiler.rays.bodies._reached", walked)
     assert found(text, "TF645")
-    assert len(walked) == count
+    assert len(walks) == 2  # what is fixed, and what turns on it
 
 
 def test_the_body_of_the_other_sensor_shields_nobody_from_it() -> None:

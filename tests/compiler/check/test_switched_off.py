@@ -5,9 +5,11 @@ from pathlib import Path
 import pytest
 
 from tfcompose.cli.compiling import library
+from tfcompose.compiler.check import Rule
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit import emit
 from tfcompose.foundation.catalogue import can_be_allowed
+from tfcompose.foundation.findings import Finding
 from tfcompose.model.plan.file import read_plan
 
 SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
@@ -69,3 +71,16 @@ def test_a_limit_alone_switches_nothing_off(entry: str) -> None:
     assert compile_robot(text, "r.yaml", PRESETS).found == ()
     (found,) = compile_robot(f"{text}rules: {{{entry}}}\n", "r.yaml", PRESETS).found
     assert (found.code, found.severity) == ("TF641", "error" if "error" in entry else "warning")
+
+
+def test_a_rule_that_is_off_does_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    requested: list[str] = []
+
+    def check(_: object, rules: list[Rule]) -> list[Finding]:
+        requested.extend(one.code for one in rules)
+        return []
+
+    monkeypatch.setattr("tfcompose.compiler.compile.check", check)
+    compile_robot("tfcompose: 1\nrobot: r\nrules: {view_blocked: off}\n", "r.yaml", PRESETS)
+    assert "TF640" in requested
+    assert "TF641" not in requested

@@ -16,7 +16,16 @@ from tests.support.texts import robot_in
 from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.reading import read_text
 from tfcompose.compiler.compile import compile_robot
-from tfcompose.compiler.rays import PosedShape, View, cast, contains, directions, view_of
+from tfcompose.compiler.rays import (
+    PosedShape,
+    Surroundings,
+    View,
+    cast,
+    contains,
+    directions,
+    view_of,
+)
+from tfcompose.compiler.rays.bundle import bundle_of
 from tfcompose.foundation.findings import Span
 from tfcompose.foundation.geometry import Pose, matrix_from_quat, normalised, quat_from_rpy
 from tfcompose.model.robot import Asset, Optics, Robot, Shape
@@ -92,6 +101,43 @@ def test_a_ray_ends_where_trimesh_says(
     assert steep.sum() <= 2
 
 
+@settings(max_examples=50, deadline=None)
+@given(
+    places=st.lists(st.tuples(metres, metres, metres), min_size=1, max_size=12),
+    rpy=st.tuples(angles, angles, angles),
+    optics=st.sampled_from([SCAN, CAMERA]),
+)
+def test_a_ray_ends_at_the_nearest_of_all_bodies(
+    places: list[tuple[float, float, float]],
+    rpy: tuple[float, float, float],
+    optics: Optics,
+) -> None:
+    bodies = [
+        PosedShape(f"b{n}", Shape(kind, SIZES[kind], Pose()), Pose(xyz, quat_from_rpy(*rpy)))
+        for n, (kind, xyz) in enumerate(zip(KINDS_OF_SHAPES * 3, places, strict=False))
+    ]
+    into = directions(optics)
+    together = cast("s", optics, into, bodies)
+    each = [cast("s", optics, into, [body]).hits for body in bodies]
+    for index in range(len(into)):
+        hits = [hit[index] for hit in each if index in hit]
+        assert together.hits.get(index) == min(hits, key=lambda hit: hit[0], default=None)
+
+
+@given(xyz=st.tuples(metres, metres, metres), radius=st.floats(0, 1))
+@pytest.mark.parametrize("optics", [SCAN, CAMERA])
+def test_a_bundle_leaves_out_no_ray_that_meets_a_sphere(
+    optics: Optics, xyz: tuple[float, float, float], radius: float
+) -> None:
+    into = directions(optics)
+    near = {index for index, _ in bundle_of(into).rays_near(*xyz, radius)}
+    square = sum(value * value for value in xyz)
+    for index, direction in enumerate(into):
+        along = sum(a * b for a, b in zip(direction, xyz, strict=True))
+        meets = square - max(0.0, along) ** 2 <= radius**2
+        assert index in near or not meets
+
+
 def test_a_body_around_the_origin_says_how_deep_that_is() -> None:
     box = PosedShape("b", Shape("box", (1.0, 2.0, 3.0), Pose()), Pose((0.2, 0.0, 0.0)))
     view = cast("s", SCAN, directions(SCAN), [box])
@@ -113,7 +159,7 @@ def robot_of(text: str) -> Robot:
 
 def view(text: str) -> View:
     robot = robot_of(text)
-    return view_of(robot, robot.sensors[0], robot.sensors[0].optics[0])
+    return view_of(Surroundings(robot), robot.sensors[0], robot.sensors[0].optics[0])
 
 
 def test_a_wall_over_the_left_half_blocks_half_the_image() -> None:

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose.compiler.check.rule import rule
 from tfcompose.compiler.rays import (
-    bodies_around,
+    Surroundings,
     cast,
     contains,
     different_streams,
-    fixed_to,
     is_plane,
+    reach_of,
     view_of,
 )
 from tfcompose.foundation.catalogue import CATALOGUE
@@ -26,7 +26,7 @@ from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.geometry import Pose, rotate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from tfcompose.compiler.rays import View
     from tfcompose.foundation.geometry import Vector
@@ -42,22 +42,17 @@ def _limit(robot: Robot, code: str) -> float:
 
 @dataclass(slots=True)
 class _Views:
-    """The views of the robot that was asked for last.
+    """What stands around the frames of a robot, and the views of its sensors."""
 
-    Several rules need them, one after the other.
-    """
-
-    robot: Robot | None = None
+    robot: Robot
+    around: Surroundings
     of_sensors: dict[str, list[View]] = field(default_factory=dict)
 
-    def of(self, robot: Robot, sensor: MountedSensor) -> list[View]:
-        if self.robot is not robot:
-            self.robot, self.of_sensors = robot, {}
+    def of(self, sensor: MountedSensor) -> list[View]:
         if sensor.name not in self.of_sensors:
-            streams = (
-                different_streams(sensor) if robot.links and _is_placed(robot, sensor) else ()
-            )
-            self.of_sensors[sensor.name] = [view_of(robot, sensor, one) for one in streams]
+            is_placed = self.robot.links and _is_placed(self.robot, sensor)
+            streams = different_streams(sensor) if is_placed else ()
+            self.of_sensors[sensor.name] = [view_of(self.around, sensor, one) for one in streams]
         return self.of_sensors[sensor.name]
 
 
@@ -71,11 +66,18 @@ def _is_placed(robot: Robot, sensor: MountedSensor) -> bool:
     )
 
 
-_VIEWS = _Views()
+#: Of the robot that was asked for last: several rules need them, one after the other.
+_LAST: list[_Views] = []
+
+
+def _views_of(robot: Robot) -> _Views:
+    if not _LAST or _LAST[0].robot is not robot:
+        _LAST[:] = [_Views(robot, Surroundings(robot))]
+    return _LAST[0]
 
 
 def _views(robot: Robot, sensor: MountedSensor) -> list[View]:
-    return _VIEWS.of(robot, sensor)
+    return _views_of(robot).of(sensor)
 
 
 def _percent(part: float) -> str:
@@ -158,11 +160,12 @@ def _largest_blind(view: View) -> tuple[float, float] | None:
 
     One may go on over the end of a turn.
     """
-    if view.optics.horizontal is None or not view.rays:
+    if view.optics.horizontal is None or not view.directions:
         return None
     start, end = view.optics.horizontal
-    step, count = (end - start) / len(view.rays), len(view.rays)
-    blocked = [ray.link is not None for ray in view.rays]
+    count = len(view.directions)
+    step = (end - start) / count
+    blocked = [index in view.hits for index in range(count)]
     is_circle = end - start > math.tau - step / 2
     if all(blocked):
         return start, end
@@ -175,9 +178,9 @@ def _largest_blind(view: View) -> tuple[float, float] | None:
 
 
 def _sees_only_robot(robot: Robot, view: View) -> bool:
-    return (
-        view.optics.kind == "camera" and bool(view.rays) and view.blocked >= _limit(robot, "TF643")
-    )
+    if view.optics.kind != "camera" or not view.directions:
+        return False
+    return view.blocked >= _limit(robot, "TF643")
 
 
 @rule("TF643")
@@ -231,14 +234,13 @@ def _reach_on_floor(robot: Robot, view: View) -> float | None:
 
     None if one misses it, or no floor is known.
     """
-    if view.optics.kind != "camera" or not view.rays:
+    if view.optics.kind != "camera" or not view.directions:
         return None
-    poses = fixed_to(robot, view.optics.frame)
-    wheels = [
-        edge.child
-        for edge in robot.edges
-        if edge.joint and edge.joint.type == "continuous" and edge.child in poses
-    ]
+    wheels = [edge.child for edge in robot.edges if edge.joint and edge.joint.type == "continuous"]
+    if not wheels:
+        return None
+    poses = _views_of(robot).around.poses(view.optics.frame)
+    wheels = [wheel for wheel in wheels if wheel in poses]
     base = "base_footprint" if "base_footprint" in poses else robot.base
     if not wheels or base not in poses:
         return None
@@ -247,9 +249,9 @@ def _reach_on_floor(robot: Robot, view: View) -> float | None:
     if not math.isfinite(floor) or floor >= 0:
         return None
     free = [
-        sum(a * b for a, b in zip(ray.direction, up, strict=True))
-        for ray in view.rays
-        if ray.link is None
+        sum(a * b for a, b in zip(direction, up, strict=True))
+        for index, direction in enumerate(view.directions)
+        if index not in view.hits
     ]
     if not free or max(free) >= 0:
         return None
@@ -275,21 +277,20 @@ def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
         for stream in one.optics
         if stream.active and _is_light(stream)
     ]
-    poses = (
-        {stream.frame: fixed_to(robot, stream.frame) for _, stream in active}
-        if len(active) > 1
-        else {}
-    )
+    around = _views_of(robot).around
     reported = set()
-    for (one, of_one), (other, of_other) in itertools.combinations(active, 2):
+    for viewer, viewed in itertools.combinations(active, 2):
+        (one, of_one), (other, of_other) = viewer, viewed
         if one is other or of_one.kind != of_other.kind or (one.name, other.name) in reported:
             continue
-        far = _distance_in_sight(robot, (one, of_one), (other, of_other), poses[of_one.frame])
-        if far is None or far > limit:
+        there, back = _sight(around, of_one, of_other), _sight(around, of_other, of_one)
+        if there is None or back is None:
             continue
+        far = math.hypot(*there)
         if (
-            _distance_in_sight(robot, (other, of_other), (one, of_one), poses[of_other.frame])
-            is not None
+            far <= limit
+            and _is_open(around, viewer, viewed, there)
+            and _is_open(around, viewed, viewer, back)
         ):
             reported.add((one.name, other.name))
             message = (
@@ -309,29 +310,29 @@ def _is_light(optics: Optics) -> bool:
 _WINDOW_M = 0.03
 
 
-def _distance_in_sight(
-    robot: Robot,
-    viewer: tuple[MountedSensor, Optics],
-    viewed: tuple[MountedSensor, Optics],
-    poses: Mapping[str, Pose],
-) -> float | None:
-    """Return the distance of the viewed stream's origin, None if it is not seen.
-
-    ``poses`` are those of frames in the viewer's frame.
-    """
-    (sensor, optics), (of_other, other) = viewer, viewed
-    pose = poses.get(other.frame)
-    far = math.dist(pose.xyz, (0.0, 0.0, 0.0)) if pose else 0.0
-    if pose is None or far < _WINDOW_M:
+def _sight(around: Surroundings, optics: Optics, other: Optics) -> Vector | None:
+    """Return the other stream's origin in the stream's frame, None if it is out of its field."""
+    pose = around.pose(optics.frame, other.frame)
+    if pose is None or math.hypot(*pose.xyz) < _WINDOW_M:
         return None
     x, y, z = pose.xyz
     aim = (x, y, 0.0) if is_plane(optics) and abs(z) <= _WINDOW_M else pose.xyz
-    if not contains(optics, aim):
-        return None
-    own = {of_other.mount, *of_other.frames}
-    bodies = [body for body in bodies_around(robot, sensor, poses) if body.link not in own]
-    view = cast(sensor.name, optics, ((x / far, y / far, z / far),), bodies)
-    return None if view.rays[0].distance < far else far
+    return pose.xyz if contains(optics, aim) else None
+
+
+def _is_open(
+    around: Surroundings,
+    viewer: tuple[MountedSensor, Optics],
+    viewed: tuple[MountedSensor, Optics],
+    origin: Vector,
+) -> bool:
+    """Return whether no body is between two streams. ``origin`` is that of the viewed one."""
+    (sensor, optics), (of_other, _) = viewer, viewed
+    (x, y, z), far = origin, math.hypot(*origin)
+    into = ((x / far, y / far, z / far),)
+    own = (of_other.mount, *of_other.frames)
+    bodies = around.bodies(sensor, optics.frame, into, min(far, reach_of(optics)), own)
+    return cast(sensor.name, optics, into, bodies).rays[0].distance >= far
 
 
 @rule("TF646")
@@ -390,27 +391,28 @@ def _covered(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
         )
         for indices in itertools.product(*map(range, _GRID))
     ]
+    around = _views_of(robot).around
     visible, unknown = [False] * len(points), []
     for sensor in robot.sensors:
         for optics in different_streams(sensor):
             if zone.by and optics.kind not in zone.by and sensor.name not in zone.by:
                 continue
-            poses = fixed_to(robot, optics.frame)
-            if zone.frame not in poses:
+            pose = around.pose(optics.frame, zone.frame)
+            if pose is None:
                 continue
             if optics.projection == "pinhole" and (
                 optics.horizontal is None or optics.vertical is None
             ):
                 unknown.append(f"{sensor.name} {optics.stream}")
                 continue
-            bodies = list(bodies_around(robot, sensor, poses))
             open_ = [index for index, is_visible in enumerate(visible) if not is_visible]
-            aims = {index: _aim(optics, zone, points[index], poses[zone.frame]) for index in open_}
+            aims = {index: _aim(optics, zone, points[index], pose) for index in open_}
             into = {index: aim for index, aim in aims.items() if aim and _is_in_reach(optics, aim)}
             lengths = {index: math.hypot(*aim) for index, aim in into.items()}
             rays = tuple(
                 (x / lengths[i], y / lengths[i], z / lengths[i]) for i, (x, y, z) in into.items()
             )
+            bodies = around.bodies(sensor, optics.frame, rays, reach_of(optics))
             for index, ray in zip(into, cast(sensor.name, optics, rays, bodies).rays, strict=True):
                 visible[index] = ray.distance >= lengths[index] - 1e-6
     return sum(visible) / len(visible), unknown

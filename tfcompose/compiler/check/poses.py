@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.compiler.check.rule import rule
 from tfcompose.compiler.mesh_box import size_of
-from tfcompose.compiler.rays import fixed_to, sphere_around
+from tfcompose.compiler.rays import Surroundings, sphere_around
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.geometry import Pose, norm, rotate
 from tfcompose.model.robot import is_optical
@@ -475,7 +475,7 @@ def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None
     """
     inside = {edge.child for edge in robot.edges if edge.sensor == without} if without else set()
     least, most = [math.inf] * 3, [-math.inf] * 3
-    for name, pose in fixed_to(robot, frame, only_static=True).items():
+    for name, pose in Surroundings(robot, only_static=True).poses(frame).items():
         if name not in robot.links or name in inside:
             continue
         for shape in (*robot.links[name].visuals, *robot.links[name].collisions):

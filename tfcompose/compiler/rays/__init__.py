@@ -4,21 +4,21 @@ Pure functions of a ``Robot``; boxes, cylinders, spheres and capsules need no li
 are hit where trimesh is installed.
 """
 
-from tfcompose.compiler.rays.bodies import PosedShape, bodies_around, fixed_to, sphere_around
-from tfcompose.compiler.rays.cast import Ray, View, cast, view_of
+from tfcompose.compiler.rays.bodies import PosedShape, Surroundings, sphere_around
+from tfcompose.compiler.rays.cast import Ray, View, cast, reach_of, view_of
 from tfcompose.compiler.rays.directions import contains, different_streams, directions, is_plane
 
 __all__ = [
     "PosedShape",
     "Ray",
+    "Surroundings",
     "View",
-    "bodies_around",
     "cast",
     "contains",
     "different_streams",
     "directions",
-    "fixed_to",
     "is_plane",
+    "reach_of",
     "sphere_around",
     "view_of",
 ]

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+from tfcompose.compiler.rays.bundle import bundle_of
 from tfcompose.foundation.geometry import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Collection, Iterator
 
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import MountedSensor, Robot, Shape
+
+Neighbours = dict[str, list[tuple[str, Pose]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,25 +28,118 @@ class PosedShape:
     pose: Pose
 
 
-def fixed_to(robot: Robot, frame: str, *, only_static: bool = False) -> dict[str, Pose]:
-    """Return the pose in ``frame`` of each frame that stands still there, up and down the tree.
+@dataclass(frozen=True)
+class _Body(PosedShape):
+    """A shape in the first frame of its group, with the sphere around it."""
+
+    @cached_property
+    def sphere(self) -> tuple[float, float, float, float]:
+        """The centre, and the radius: endless around a mesh that cannot be read."""
+        centre, radius = sphere_around(self.shape) or ((0.0, 0.0, 0.0), math.inf)
+        return *(self.pose @ Pose(centre)).xyz, radius
+
+
+class _Group:
+    """Frames that are fixed to each other, and what stands still there.
+
+    ``poses`` are in the first of them.
+    """
+
+    def __init__(self, robot: Robot, poses: dict[str, Pose]) -> None:
+        self._robot = robot
+        self.poses = poses
+
+    @cached_property
+    def bodies(self) -> list[_Body]:
+        """The shapes of the group's links, for collision, else those seen."""
+        links = self._robot.links
+        return [
+            _Body(name, shape, pose @ shape.pose)
+            for name, pose in self.poses.items()
+            if name in links
+            for shape in links[name].collisions or links[name].visuals
+        ]
+
+
+class Surroundings:
+    """What stands still around each frame of a robot, up and down the tree, and the bodies there.
 
     ``only_static`` keeps to static edges. Otherwise those inside a sensor count too, whoever
     publishes them, and what a continuous joint turns with its pose at zero, if it is below: a
     wheel turns on the spot.
     """
-    neighbours: dict[str, list[tuple[str, Pose]]] = {}
-    for edge in robot.edges:
-        is_fixed = edge.kind == "static" or (
-            not only_static and edge.sensor is not None and not edge.joint
-        )
-        spins = not only_static and edge.joint is not None and edge.joint.type == "continuous"
-        if not edge.pose_known or not (is_fixed or spins):
-            continue
-        neighbours.setdefault(edge.parent, []).append((edge.child, edge.pose))
-        if is_fixed:
-            neighbours.setdefault(edge.child, []).append((edge.parent, edge.pose.inverse()))
-    poses, waiting = {frame: Pose()}, [frame]
+
+    def __init__(self, robot: Robot, *, only_static: bool = False) -> None:
+        self.robot = robot
+        self._above = {edge.child: edge for edge in reversed(robot.edges)}
+        self._fixed: Neighbours = {}
+        self._all: Neighbours = {}
+        self._groups: dict[str, _Group] = {}
+        for edge in robot.edges:
+            is_fixed = edge.kind == "static" or (
+                not only_static and edge.sensor is not None and not edge.joint
+            )
+            spins = not only_static and edge.joint is not None and edge.joint.type == "continuous"
+            if not edge.pose_known or not (is_fixed or spins):
+                continue
+            down, up = (edge.child, edge.pose), (edge.parent, edge.pose.inverse())
+            self._all.setdefault(edge.parent, []).append(down)
+            if is_fixed:
+                self._all.setdefault(edge.child, []).append(up)
+                self._fixed.setdefault(edge.parent, []).append(down)
+                self._fixed.setdefault(edge.child, []).append(up)
+
+    def _group(self, frame: str) -> _Group:
+        if frame not in self._groups:
+            members = _reached(self._fixed, {frame: Pose()})
+            group = _Group(self.robot, _reached(self._all, members))
+            self._groups.update(dict.fromkeys(members, group))
+        return self._groups[frame]
+
+    def poses(self, frame: str) -> dict[str, Pose]:
+        """Return the pose in ``frame`` of each frame that stands still there."""
+        group = self._group(frame)
+        to_frame = group.poses[frame].inverse()
+        return {name: to_frame @ pose for name, pose in group.poses.items()}
+
+    def pose(self, frame: str, other: str) -> Pose | None:
+        """Return the pose of ``other`` in ``frame``, None if it does not stand still there."""
+        poses = self._group(frame).poses
+        return poses[frame].inverse() @ poses[other] if other in poses else None
+
+    def bodies(
+        self,
+        sensor: MountedSensor,
+        frame: str,
+        into: tuple[Vector, ...],
+        reach: float,
+        without: Collection[str] = (),
+    ) -> Iterator[PosedShape]:
+        """Yield, in ``frame``, the shapes that rays from there may meet within ``reach`` metres.
+
+        ``into`` are the rays' directions. Shapes of the sensor itself and of links ``without``
+        are left out. A link in whose origin the sensor stands is its housing.
+        """
+        own = {sensor.mount, *sensor.frames, *without}
+        above = self._above.get(sensor.mount)
+        if above and above.pose == Pose():
+            own.add(above.parent)
+        group = self._group(frame)
+        at = group.poses[frame]
+        (from_x, from_y, from_z), to_frame = at.xyz, at.inverse()
+        cone = bundle_of(into).turned(at.quat_xyzw)
+        for body in group.bodies:
+            if body.link in own:
+                continue
+            x, y, z, radius = body.sphere
+            x, y, z = x - from_x, y - from_y, z - from_z
+            if cone.may_meet(x, y, z, radius) and math.hypot(x, y, z) - radius <= reach:
+                yield PosedShape(body.link, body.shape, to_frame @ body.pose)
+
+
+def _reached(neighbours: Neighbours, poses: dict[str, Pose]) -> dict[str, Pose]:
+    """Return the poses, and those of all frames that a way leads to."""
+    poses, waiting = dict(poses), list(poses)
     while waiting:
         here = waiting.pop()
         for there, pose in neighbours.get(here, ()):
@@ -66,23 +164,3 @@ def sphere_around(shape: Shape) -> tuple[Vector, float] | None:
         return meshes.sphere_around(shape.mesh.path if shape.mesh else "", (x, y, z))
     except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
         return None
-
-
-def bodies_around(
-    robot: Robot, sensor: MountedSensor, poses: Mapping[str, Pose]
-) -> Iterator[PosedShape]:
-    """Yield the shapes of the links at ``poses`` that are not the sensor's own.
-
-    For collision, else those seen.
-
-    A link in whose origin the sensor stands is its housing.
-    """
-    own = {sensor.mount, *sensor.frames}
-    above = robot.parent_edge(sensor.mount)
-    if above and above.pose == Pose():
-        own.add(above.parent)
-    for name, pose in poses.items():
-        link = robot.links.get(name)
-        if link and name not in own:
-            for shape in link.collisions or link.visuals:
-                yield PosedShape(name, shape, pose @ shape.pose)

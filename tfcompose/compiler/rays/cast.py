@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.rays.bodies import PosedShape, bodies_around, fixed_to
+from tfcompose.compiler.rays.bundle import bundle_of
 from tfcompose.compiler.rays.directions import directions
 from tfcompose.compiler.rays.shapes import depth_in, distance
 from tfcompose.foundation.geometry import rotate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
+    from tfcompose.compiler.rays.bodies import PosedShape, Surroundings
+    from tfcompose.compiler.rays.bundle import Bundle
     from tfcompose.foundation.geometry import Pose, Vector
-    from tfcompose.model.robot import MountedSensor, Optics, Robot
+    from tfcompose.model.robot import MountedSensor, Optics
 
 #: Beyond this nothing of a robot is.
 _FAR_M = 1e3
@@ -35,89 +39,103 @@ class Ray:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The rays of one stream, from the origin of its frame.
+    """What rays of one stream hit, from the origin of its frame into ``directions``.
 
-    ``inside`` are the links that the origin is in or on, and how deep in metres; their bodies
-    block no ray: a sensor that is mounted flush looks away from what it is mounted on.
-    ``left_out`` are the links of which a mesh could not be read: trimesh is not installed, or the
-    file is no mesh.
+    ``hits`` are the metres to the first body, and its link, by the number of the ray. ``inside``
+    are the links that the origin is in or on, and how deep in metres; their bodies block no ray: a
+    sensor that is mounted flush looks away from what it is mounted on. ``left_out`` are the links
+    of which a mesh could not be read: trimesh is not installed, or the file is no mesh.
     """
 
     sensor: str
     optics: Optics
-    rays: tuple[Ray, ...]
+    directions: tuple[Vector, ...]
+    hits: Mapping[int, tuple[float, str]]
     inside: Mapping[str, float]
     left_out: tuple[str, ...] = ()
 
     @property
+    def rays(self) -> tuple[Ray, ...]:
+        """Every ray, in the order of the directions."""
+        return tuple(
+            Ray(direction, *self.hits.get(index, (math.inf, None)))
+            for index, direction in enumerate(self.directions)
+        )
+
+    @property
     def blocked(self) -> float:
         """The part of the rays that a body blocks, from 0 to 1."""
-        return (
-            sum(ray.link is not None for ray in self.rays) / len(self.rays) if self.rays else 0.0
-        )
+        return len(self.hits) / len(self.directions) if self.directions else 0.0
 
     @property
     def blocking(self) -> tuple[str, ...]:
         """The links that block rays, the one that blocks most first."""
-        counts: dict[str, int] = {}
-        for ray in self.rays:
-            if ray.link is not None:
-                counts[ray.link] = counts.get(ray.link, 0) + 1
+        counts = Counter(link for _, link in self.hits.values())
         return tuple(sorted(counts, key=lambda link: (-counts[link], link)))
 
 
-def view_of(
-    robot: Robot, sensor: MountedSensor, optics: Optics, poses: Mapping[str, Pose] | None = None
-) -> View:
-    """Return the rays of one stream of the sensor; none if its field of view is not known.
+def view_of(around: Surroundings, sensor: MountedSensor, optics: Optics) -> View:
+    """Return what one stream of the sensor sees of the bodies that are fixed to it.
 
-    ``poses`` are those of frames in the stream's frame, of which bodies are taken into account;
-    default: of all that are fixed to it.
+    No rays if its field of view is not known, and only what its origin is inside.
     """
-    bodies = list(
-        bodies_around(robot, sensor, fixed_to(robot, optics.frame) if poses is None else poses)
-    )
-    return cast(sensor.name, optics, directions(optics), bodies)
+    into = directions(optics)
+    reach = reach_of(optics) if into else 0.0
+    bodies = around.bodies(sensor, optics.frame, into, reach)
+    return cast(sensor.name, optics, into, bodies)
+
+
+def reach_of(optics: Optics) -> float:
+    """Return how far bodies are looked for, in metres."""
+    return min(optics.far or _FAR_M, _FAR_M)
 
 
 def cast(
-    sensor: str, optics: Optics, into: Sequence[Vector], bodies: Sequence[PosedShape]
+    sensor: str, optics: Optics, into: tuple[Vector, ...], bodies: Iterable[PosedShape]
 ) -> View:
     """Return the rays into these directions, unit vectors in the frame in which the bodies are."""
-    found: list[tuple[float, str | None]] = [(math.inf, None)] * len(into)
-    reach = min(optics.far or _FAR_M, _FAR_M)
+    reach, bundle = reach_of(optics), bundle_of(into)
+    nearest: dict[int, tuple[float, int, str]] = {}
     inside: dict[str, float] = {}
     left_out: dict[str, None] = {}
-    for body in bodies:
-        if math.dist(body.pose.xyz, (0, 0, 0)) - body.shape.radius > reach:
+    by_distance = sorted(
+        (math.hypot(*body.pose.xyz) - body.shape.radius, order, body)
+        for order, body in enumerate(bodies)
+    )
+    for begins, order, body in by_distance:
+        if begins > reach:
             continue
-        depth, hits = _read_hits(body, into)
+        depth, hits = _read_hits(body, into, bundle, begins, nearest)
         if depth is None:
             left_out[body.link] = None
         elif depth >= 0:
             inside[body.link] = max(depth, inside.get(body.link, 0.0))
         for index, far in hits:
-            if far < found[index][0] and far <= reach:
-                found[index] = (far, body.link)
-    rays = []
-    for direction, (far, link) in zip(into, found, strict=True):
-        is_free = link in inside
-        rays.append(Ray(direction, math.inf, None) if is_free else Ray(direction, far, link))
-    return View(sensor, optics, tuple(rays), inside, tuple(left_out))
+            if far <= reach and (index not in nearest or (far, order) < nearest[index][:2]):
+                nearest[index] = (far, order, body.link)
+    blocked = {
+        index: (far, link) for index, (far, _, link) in nearest.items() if link not in inside
+    }
+    return View(sensor, optics, into, hits=blocked, inside=inside, left_out=tuple(left_out))
 
 
 Hits = list[tuple[int, float]]
+#: By the number of a ray: how far it goes, the order of the body there, and its link.
+Nearest = Mapping[int, tuple[float, int, str]]
 
 
-def _read_hits(body: PosedShape, into: Sequence[Vector]) -> tuple[float | None, Hits]:
+def _read_hits(
+    body: PosedShape, into: Sequence[Vector], bundle: Bundle, begins: float, nearest: Nearest
+) -> tuple[float | None, Hits]:
     """Return how deep the origin is in the body, and where rays hit it.
 
-    The depth is None if its mesh cannot be read.
+    Rays that end before the body ``begins`` may be left out. The depth is None if its mesh cannot
+    be read.
     """
     to_shape = body.pose.inverse()
     if body.shape.kind != "mesh":
         depth = depth_in(body.shape, to_shape.xyz)
-        return depth, [] if depth >= 0 else _hits(body, to_shape, into)
+        return depth, [] if depth >= 0 else _hits(body, to_shape, bundle, begins, nearest)
     path = body.shape.mesh.path if body.shape.mesh else ""
     x, y, z = body.shape.size
     turned = [rotate(to_shape.quat_xyzw, direction) for direction in into]
@@ -132,15 +150,19 @@ def _read_hits(body: PosedShape, into: Sequence[Vector]) -> tuple[float | None, 
     return depth, [(index, one) for index, one in enumerate(far) if math.isfinite(one)]
 
 
-def _hits(body: PosedShape, to_shape: Pose, into: Sequence[Vector]) -> Hits:
+def _hits(
+    body: PosedShape, to_shape: Pose, bundle: Bundle, begins: float, nearest: Nearest
+) -> Hits:
     """Return the rays that hit a primitive, and where."""
     (x, y, z), radius = body.pose.xyz, body.shape.radius
     miss = x * x + y * y + z * z - radius * radius
     hits = []
-    for index, direction in enumerate(into):
+    for index, direction in bundle.rays_near(x, y, z, radius):
         along = direction[0] * x + direction[1] * y + direction[2] * z
         if miss > 0 and (along <= 0 or along * along < miss):
             continue  # it passes the sphere around the shape
+        if index in nearest and nearest[index][0] < begins:
+            continue
         far = distance(body.shape, to_shape.xyz, rotate(to_shape.quat_xyzw, direction))
         if math.isfinite(far):
             hits.append((index, far))

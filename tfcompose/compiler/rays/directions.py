@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
+
+from tfcompose.foundation.findings import Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,6 +56,14 @@ def directions(optics: Optics) -> tuple[Vector, ...]:
 
     A plane is sampled a degree apart and in order, from its first angle to its last.
     """
+    return _directions(replace(optics, stream="", frame="", at=_NOWHERE, sources=()))
+
+
+_NOWHERE = Span("")
+
+
+@lru_cache(maxsize=32)
+def _directions(optics: Optics) -> tuple[Vector, ...]:
     if optics.projection == "fisheye":
         return _disc(optics)
     if optics.horizontal is None or optics.vertical is None:

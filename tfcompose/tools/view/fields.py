@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tfcompose.compiler.rays import different_streams, is_plane, view_of
+from tfcompose.compiler.rays import Surroundings, different_streams, is_plane, view_of
 from tfcompose.foundation.geometry import Pose
 
 if TYPE_CHECKING:
@@ -250,12 +250,12 @@ class FieldsOfView:
         self._blocked.clear()
         if robot is None:
             return []
-        lines = []
+        lines, around = [], Surroundings(robot)
         mounted = {sensor.name: sensor for sensor in robot.sensors}
         for index, (sensor, optics) in enumerate(self._streams):
             if not self.shown[sensor.name] or sensor.name not in mounted:
                 continue
-            view = view_of(robot, mounted[sensor.name], optics)
+            view = view_of(around, mounted[sensor.name], optics)
             ends = [_end(ray.direction, ray.distance) for ray in view.rays if ray.link is not None]
             if ends:
                 points = np.array([((0.0, 0.0, 0.0), end) for end in ends], np.float32)

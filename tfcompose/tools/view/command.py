@@ -200,25 +200,13 @@ def _source_of(session: Session, arguments: Namespace) -> SceneSource:
 def _write(session: Session, path: Path) -> None:
     """Write the scene as one file; ends where it cannot be written."""
     from tfcompose.cli.writing import replace_file
-    from tfcompose.tools.view.camera import begin_at
-    from tfcompose.tools.view.kinematics import poses_in_roots
     from tfcompose.tools.view.page import page_of
-    from tfcompose.tools.view.scene import RobotScene
-    from tfcompose.tools.view.server import new_token, start_server, stop_server
 
-    robot, poses = session.robot, poses_in_roots(session.robot, {})
-    server = start_server(_HOST, 0, robot.name, new_token())
+    page = page_of(session.robot, session.state.sources)
     try:
-        scene = RobotScene(server.scene, robot)
-        scene.add_meshes()
-        scene.update(robot, poses)
-        begin_at(server, scene.add_grid(poses))
-        page = page_of(server.scene.as_html(), robot, session.state.sources, scene.colours)
         replace_file(path, page.encode())
     except OSError as error:
         fail(f"{path} cannot be written: {error.strerror}", UNREADABLE)
-    finally:
-        stop_server(server)
 
 
 def _running_plan(arguments: Namespace) -> str | None:

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from tfcompose.foundation.geometry import Vector
     from tfcompose.model.robot import MountedSensor, Optics, Robot
 
-_COLOURS = {
+#: The colours of fields of view, by what sees.
+FIELD_COLOURS = {
     "camera": (40, 110, 220),
     "lidar": (225, 125, 20),
     "radar": (140, 70, 200),
@@ -149,6 +150,11 @@ def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
                 yield sensor, optics
 
 
+def drawn_reach(scale: float) -> float:
+    """Return how far fields of view are drawn at a scale, in metres."""
+    return round(_REACH_M * scale, 2)
+
+
 class FieldsOfView:
     """The fields of view in a scene, hidden at first but for those of cameras.
 
@@ -173,13 +179,13 @@ class FieldsOfView:
                     f"/fields/{index}", show_axes=False, visible=self.shown[sensor.name]
                 )
             )
-        self.draw(round(_REACH_M * scale, 2))
+        self.draw(drawn_reach(scale))
 
     def draw(self, reach: float) -> None:
         """Draw the fields of view as far as that, in metres."""
         self.reach = reach
         for index, (_, optics) in enumerate(self._streams):
-            colour = _COLOURS[optics.kind]
+            colour = FIELD_COLOURS[optics.kind]
             self._scene.add_line_segments(
                 f"/fields/{index}/lines",
                 outline(optics, reach),

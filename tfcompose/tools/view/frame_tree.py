@@ -64,6 +64,10 @@ class FrameTree:
         ):
             self._open_levels += 1
 
+    def parent(self, frame: str) -> str | None:
+        """Return the frame that this one is below, None for a root."""
+        return self._parents.get(frame)
+
     def is_open(self, frame: str, chosen: Mapping[str, bool]) -> bool:
         """Return whether the tree is open below a frame: as chosen, or by its level."""
         return chosen.get(frame, self._depths[frame] < self._open_levels)

@@ -33,7 +33,7 @@ _FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
 _NO_RED = 0.1
 _GREY = (105, 112, 122)
 #: The axes of a robot whose largest body is 1 m long, in metres.
-_AXES_M = 0.08
+AXES_M = 0.08
 #: How much larger the axes of the selected frame are.
 _SELECTED = 2.0
 _GHOST = (60, 120, 220)
@@ -55,6 +55,22 @@ def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
         rgb = colorsys.hsv_to_rgb(hue, 0.85, 0.85)
         colours[owner] = (round(rgb[0] * 255), round(rgb[1] * 255), round(rgb[2] * 255))
     return colours
+
+
+def colour_of(shape: Shape) -> tuple[int, int, int]:
+    """Return the colour of a shape's material, grey without one."""
+    rgba = shape.material.rgba if shape.material else None
+    if rgba is None:
+        return _GREY
+    return round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255)
+
+
+def scale_of(sides: Iterable[float]) -> float:
+    """Return how large axes and the like are drawn, against a robot whose largest body is 1 m.
+
+    It is the root of the longest of the bodies' ``sides``, in metres.
+    """
+    return math.sqrt(max(sides, default=1.0) or 1.0)
 
 
 def _add_shape(
@@ -127,10 +143,8 @@ class RobotScene:
             for frame in self._corners
             for low, high in zip(*self.bounds(frame), strict=True)
         )
-        #: How large axes and the like are drawn, against those of a robot whose largest body is 1
-        #: m long: as its root.
-        self.scale = math.sqrt(max(sides, default=1.0) or 1.0)
-        self._axes_m = _AXES_M * self.scale
+        self.scale = scale_of(sides)
+        self._axes_m = AXES_M * self.scale
         self.fields = FieldsOfView(scene, robot, self.scale)
 
     def add_meshes(self) -> None:
@@ -159,13 +173,7 @@ class RobotScene:
     def _add_shapes(self, frame: str, name: str, shapes: tuple[Shape, ...]) -> list[Any]:
         handles = []
         for number, shape in enumerate(shapes):
-            rgba = shape.material.rgba if shape.material else None
-            colour = (
-                (round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255))
-                if rgba
-                else _GREY
-            )
-            added = _add_shape(self._scene, f"{name}/{number}", shape, colour, 0.8)
+            added = _add_shape(self._scene, f"{name}/{number}", shape, colour_of(shape), 0.8)
             if added is not None:
                 mesh, handle = added
                 handles.append(handle)
@@ -335,7 +343,7 @@ class Ghosts:
                 continue
             if frame not in self._shown:
                 self._shown[frame] = self._scene.add_frame(
-                    name, axes_length=_AXES_M / 2, axes_radius=_AXES_M / 40
+                    name, axes_length=AXES_M / 2, axes_radius=AXES_M / 40
                 )
                 link = self._links.get(frame)
                 for number, shape in enumerate((link.visuals or link.collisions) if link else ()):

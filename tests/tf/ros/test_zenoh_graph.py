@@ -201,6 +201,7 @@ def test_the_guards_verdict_names_who_took_an_edge(peers: Peers) -> None:
         (slam,),
     )
     judge, reader, found = Judge(plan, 0.0, 0.0, 0), MessageReader(), list[FindingShown]()
+    judge.tick(0.0)  # the start is over: who is found before has taken the edge
     with ExitStack() as stack:
         opened = open_session(environment_of(peers))
         stack.callback(opened.close)

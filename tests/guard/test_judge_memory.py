@@ -125,6 +125,13 @@ def test_the_guard_names_the_switch_of_a_node_that_publishes_by_default(switch: 
     expect(history.only(), "TF801", "/diff", "by default", switch)
 
 
+def test_the_tree_of_a_simulator_is_named_as_such_with_its_switch() -> None:
+    history = History().clear()
+    history.repeat(history.joins("/drive"), "odom base", 5)
+    history.repeat(history.joins("/sim/ros_gz_bridge"), "odom base", 10)
+    expect(history.only(), "TF801", "/sim/ros_gz_bridge", "Gazebo", "config_file")
+
+
 def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
     history = History(claims=(PlanClaim("/diff", "odom", "base", "x: false"),)).clear()
     history.repeat(history.joins("/other"), "odom base", 10)

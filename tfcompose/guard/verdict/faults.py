@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.text import counted, listed
 from tfcompose.guard.verdict import publishers, stamps, tree
+from tfcompose.guard.verdict.simulators import switch_of_simulator
 from tfcompose.model.plan import PlanEdge  # noqa: TC001 (faults are decoded by their types)
 from tfcompose.tf.live.state import NAMELESS, NO_NODE
 
@@ -427,7 +428,7 @@ def _switch_help(group: FaultGroup) -> str:
     first = group.first
     claim = group.plan.claim_on(first.nodes, first.parent, first.child)
     if claim is None or first.namesake:
-        return ""
+        return switch_of_simulator(first.nodes)
     by_default = f"{first.who} publishes it by default"
     if not claim.switch:
         return f"{by_default} and has no switch: let its process own the edge"

@@ -20,7 +20,7 @@ links:
   base: {visual: {box: [0.2, 0.2, 0.2]}}
   upper: {}
   tool: {visual: {sphere: 0.05, xyz: [0.1, 0, 0]}}
-frames: {hand: {parent: tool, xyz: [0.2, 0.1, 0], rpy: [0.3, 0.2, 0.1]}}
+frames: {camera_of_the_second_arm_depth_optical_frame: {parent: hand}, hand: {parent: tool, xyz: [0.2, 0.1, 0], rpy: [0.3, 0.2, 0.1]}}
 joints:
   turn: {type: revolute, parent: base, child: upper, xyz: [0, 0, 0.5], rpy: [10 deg, 0, 40 deg], axis: [0, 0.6, 0.8],
          limit: {lower: -90 deg, upper: 57.2957795 deg, effort: 1, velocity: 1}}
@@ -66,6 +66,8 @@ def test_the_page_moves_joints_finds_selects_measures_and_has_named_views(tmp_pa
         assert page.locator("input[type=range]").count() == 1, "the other joint follows"
         slider.fill("-35.5")
         everything = rows(page)
+        aside = page.locator("aside").first
+        assert aside.evaluate("one => one.scrollWidth <= one.clientWidth"), "no name is cut"
         page.locator("#search").fill("HA")
         assert rows(page) == ["base", "upper", "tool", "hand"]
         page.get_by_text("hand in tool, static, by static").wait_for()

@@ -108,7 +108,7 @@ def measure() -> list[tuple[float, float]]:
 
 def _rounds(processes: list[psutil.Process], log: Path) -> list[tuple[float, float]]:
     end = time.monotonic() + 30
-    while '"Complete"' not in log.read_text("utf-8"):
+    while '"TreeComplete"' not in log.read_text("utf-8"):
         if time.monotonic() > end:
             raise RuntimeError("the guard did not see every edge")
         time.sleep(0.1)

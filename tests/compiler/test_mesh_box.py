@@ -72,6 +72,7 @@ def test_a_broken_mesh_has_no_box(ending: str, content: bytes, tmp_path: Path) -
     [
         ("{uri: cube.obj, scale: 1000}", "[1, 1, 1]"),
         ("{uri: cube.obj, scale: 0.001}", "[1, 1, 1]"),
+        ("small.obj", "[1000, 1000, 1000]"),
         ("cube.obj", None),
         ("{uri: cube.obj, scale: [0.5, -1, 1]}", None),
     ],
@@ -80,7 +81,9 @@ def test_a_mesh_in_another_unit_is_found_in_a_robot_file(
     mesh: str, advice: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("cube.obj").write_text(CUBE.read_text("utf-8"), "utf-8")
+    cube = CUBE.read_text("utf-8")
+    Path("cube.obj").write_text(cube, "utf-8")
+    Path("small.obj").write_text(cube.replace("0.1", "0.0001"), "utf-8")
     text = f"""tfcompose: 1
 robot: r
 links:

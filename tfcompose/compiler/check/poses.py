@@ -328,8 +328,8 @@ def _sizes(link: Link) -> list[float]:
 _MESH_TIMES, _LARGE_MESH_M = 20, 5.0
 #: Nothing to go by but the mesh: a hall or a field may be this long.
 _LONE_MESH_M = 50.0
-#: No mesh that is scaled down ends up smaller.
-_SMALL_MESH_M = 0.005
+#: No mesh that is scaled down ends up smaller than the first, and no body than the second.
+_SMALL_MESH_M, _TINY_MESH_M = 0.005, 0.0005
 #: Ground planes are thinner than this part of their length.
 _FLAT = 1e-3
 
@@ -346,19 +346,19 @@ def _meshes_in_other_units(robot: Robot) -> Iterator[Finding]:
                 continue
             done.add(mesh.at)
             largest, scale = max(size), max(map(abs, shape.size))
-            is_small = 0 < largest < _SMALL_MESH_M and scale < 1
+            is_small = 0 < largest < (_SMALL_MESH_M if scale < 1 else _TINY_MESH_M)
             if not is_small and (largest <= limit or min(size) < _FLAT * largest):
                 continue
             factor = 1000 if is_small else 0.001
-            unit = "metres" if is_small else "millimetres"
+            why = "is in metres" if is_small else "is in millimetres"
+            if is_small and scale >= 1:
+                why = "was scaled down already"
             right = " ".join(f"{abs(part) * factor:g}" for part in shape.size)
             advice = f'scale="{right}"'
             if not robot.is_foreign(mesh.at):
                 advice = f"scale: [{right.replace(' ', ', ')}]"
             message = f"the mesh of {link.name} is {largest:.3g} m long at its scale of {scale:g}"
-            yield finding(
-                "TF414", message, mesh.at, help=f"if the file is in {unit}, write {advice}"
-            )
+            yield finding("TF414", message, mesh.at, help=f"if the file {why}, write {advice}")
 
 
 #: The least and the greatest x, y, z.

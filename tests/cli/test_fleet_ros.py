@@ -17,13 +17,13 @@ pytestmark = pytest.mark.ros
 ROBOT = Path(__file__).parents[2] / "robots" / "two_rovers.yaml"
 STRANGER = """
 import sys, time
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node
 topic, parent, child = sys.argv[1:]
 with open_node("stranger", "", args=["-r", f"/tf:={topic}"]) as node:
     publisher = TFPublisher(node, static=False)
     while True:
-        publisher.publish(encode([Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+        publisher.publish(encode([SentTransform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
         time.sleep(0.01)
 """  # noqa: E501 (a text as its reader has it)
 

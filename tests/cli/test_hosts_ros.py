@@ -69,14 +69,14 @@ def test_two_hosts_start_their_shares_and_each_receives_the_entire_tree(
 #: A node that sends its own edge, and another machine's.
 LIAR = """
 import signal, sys, time
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("arm_drive", "/", args=sys.argv[2:]) as node:
     publisher = TFPublisher(node, static=False)
     while True:
         for ends in (("base_link", "arm"), ("odom", "base_link")):
-            publisher.publish(encode([Transform(time.time_ns(), *ends, (0.0, 0.0, 5.0), (0.0, 0.0, 0.0, 1.0))]))
+            publisher.publish(encode([SentTransform(time.time_ns(), *ends, (0.0, 0.0, 5.0), (0.0, 0.0, 0.0, 1.0))]))
         time.sleep(0.05)
 """  # noqa: E501 (a text as its reader has it)
 

@@ -46,12 +46,12 @@ from tfcompose.cli.console import Console, StatusLine
 from tfcompose.cli.terminal import size_of
 from tfcompose.model.plan.file import read_plan
 from tfcompose.launcher.output import NonBlockingOutput
-from tfcompose.launcher.supervisor import Session, supervise
+from tfcompose.launcher.supervisor import RunSession, supervise
 file = Path(sys.argv[1])
 plan = read_plan(file.read_text(), str(file))
 output = NonBlockingOutput(1)
 console = Console(plan, output, colour=True, status=StatusLine(plan, lambda: size_of(1)[0]))
-code = supervise(plan, file, report=console, session=Session(file, output=output, refresh=console.refresh))
+code = supervise(plan, file, report=console, session=RunSession(file, output=output, refresh=console.refresh))
 output.close()
 sys.exit(code)
 """  # noqa: E501 (a text as its reader has it)

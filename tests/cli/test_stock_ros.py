@@ -46,7 +46,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import JOINT_STATES, latch, open_node
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.ros.node import Subscription, TFPublisher, wait
@@ -66,7 +66,7 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
         origin = joint.find("origin").get if joint.find("origin") is not None else lambda key, other: other
         xyz, rpy = (tuple(map(float, origin(key, "0 0 0").split())) for key in ("xyz", "rpy"))
         kinds[kind].append([*ends, xyz, quat_from_rpy(*rpy)])
-    still = [Transform(0, *fixed) for fixed in kinds["fixed"]]
+    still = [SentTransform(0, *fixed) for fixed in kinds["fixed"]]
     fixed, moving = TFPublisher(node, static=True), TFPublisher(node, static=False)
     fixed.publish(encode(still))
     states = Subscription(node, JointState, "joint_states", JOINT_STATES)
@@ -75,7 +75,7 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
         for received in states.take():
             stamp = deserialize_message(received.data, JointState).header.stamp
             stamp_ns = stamp.sec * 10**9 + stamp.nanosec
-            moving.publish(encode([Transform(stamp_ns, *at_zero) for at_zero in kinds["moving"]]))
+            moving.publish(encode([SentTransform(stamp_ns, *at_zero) for at_zero in kinds["moving"]]))
 """  # noqa: E501 (a text as its reader has it)
 
 

@@ -17,12 +17,12 @@ pytestmark = pytest.mark.ros
 
 NODE = """
 import sys, time
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node
 with open_node(sys.argv[1], "/") as node:
     sent = TFPublisher(node, static=False)
     while True:
-        edge = Transform(time.time_ns(), *sys.argv[2:], (0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
+        edge = SentTransform(time.time_ns(), *sys.argv[2:], (0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
         sent.publish(encode([edge]))
         time.sleep(0.05)
 """

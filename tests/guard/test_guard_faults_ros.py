@@ -45,7 +45,7 @@ PATIENT = ROBOT.replace("owner: slam, rate: 10 Hz", "owner: slam, rate: 1 Hz")
 NODE = """
 import os, signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import open_node, qos
 from tfcompose.tf.ros.typesupport import tf_message_type
 name, reliability, stamps, *edges = sys.argv[1:]
@@ -63,7 +63,7 @@ with open_node(name, namespace) as node:
     n = 0
     while True:
         n += 1
-        transforms = [Transform(stamp(n), *edge.split(), (1., 0., 0.), (0., 0., 0., 1.)) for edge in edges]
+        transforms = [SentTransform(stamp(n), *edge.split(), (1., 0., 0.), (0., 0., 0., 1.)) for edge in edges]
         publisher.publish(encode(transforms))
         time.sleep(0.05)
 """  # noqa: E501 (a text as its reader has it)
@@ -267,13 +267,13 @@ def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twic
 #: looks meanwhile.
 LATCHES = """
 import signal, sys, time
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 with open_node("mounts", "/") as node:
     publisher = TFPublisher(node, static=True)
     for child in ("camera", "lidar"):
-        publisher.publish(encode([Transform(time.time_ns(), "base_link", child, (1., 0., 0.), (0., 0., 0., 1.))]))
+        publisher.publish(encode([SentTransform(time.time_ns(), "base_link", child, (1., 0., 0.), (0., 0., 0., 1.))]))
     print("ready", flush=True)
     while True:
         time.sleep(1)
@@ -367,12 +367,12 @@ rclpy.spin(node)
 #: A node with so many latched publishers: one for each frame, as a static_transform_publisher is.
 MANY = """
 import signal
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node
 with open_node("foreign", "/") as node:
     publishers = [TFPublisher(node, static=True) for _ in range(120)]
     for n, publisher in enumerate(publishers):
-        publisher.publish(encode([Transform(1, "map", f"dock_{n}", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+        publisher.publish(encode([SentTransform(1, "map", f"dock_{n}", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
     print("ready", flush=True)
     signal.pause()
 """  # noqa: E501 (a text as its reader has it)

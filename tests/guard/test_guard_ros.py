@@ -23,12 +23,12 @@ ROBOT = Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml"
 STRANGER = """
 import signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node, qos
 from tfcompose.tf.ros.typesupport import tf_message_type
 name, kind, hertz, seconds, *edges = sys.argv[1:]
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leave in order: what is killed haunts the graph for 20 s
-transforms = [Transform(time.time_ns(), *edge.split(), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for edge in edges]
+transforms = [SentTransform(time.time_ns(), *edge.split(), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for edge in edges]
 with open_node(name, "/strange") as node:
     if kind == "volatile":
         profile = qos(1, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)

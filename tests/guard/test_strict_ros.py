@@ -31,12 +31,12 @@ pytestmark = pytest.mark.ros
 #: it hears on TF.
 CHILD = """
 import json, signal, sys, time
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 from tfcompose.tf.ros.node import TFPublisher, TFSubscription, open_node
 name, fixed, moving = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[3])
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 def message(edges):
-    return encode([Transform(time.time_ns(), *edge.split(), (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8)) for edge in edges])
+    return encode([SentTransform(time.time_ns(), *edge.split(), (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8)) for edge in edges])
 def wait_until_passed_on(edge):
     # A latched topic keeps the last message only, and counted subscribers may be its own.
     with open_node(name, "/outside") as node:
@@ -289,7 +289,7 @@ def test_at_its_end_it_prints_what_it_held_back(robot: Fenced) -> None:
 LISTENER = """
 import json, signal, sys, time
 from collections import Counter
-from tfcompose.tf.ros.tf_codec import Transform, decode, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, decode, encode
 from tfcompose.tf.ros.node import open_node
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.ros.node import TFPublisher, TFSubscription, wait
@@ -297,7 +297,7 @@ signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("ear", "/", args=sys.argv[2:]) as node:
     readers = [TFSubscription(node, static=static) for static in (False, True)]
     latched, heard = TFPublisher(node, static=True), Counter()
-    latched.publish(encode([Transform(0, "base_link", "ear", (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8))]))
+    latched.publish(encode([SentTransform(0, "base_link", "ear", (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8))]))
     while True:
         wait(node, readers, 0.5, Stop())
         heard.update(t.child for reader in readers for one in reader.take() for t in decode(one.data))

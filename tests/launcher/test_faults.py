@@ -48,7 +48,7 @@ from tfcompose.launcher.output import Logs
 from tfcompose.launcher.run_files import RunFiles
 from tfcompose.launcher.output import NonBlockingOutput
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
-from tfcompose.launcher.supervisor import Session, supervise
+from tfcompose.launcher.supervisor import RunSession, supervise
 file = Path(sys.argv[1])
 if len(sys.argv) > 3:
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
@@ -56,7 +56,7 @@ place = RuntimeDir(sys.argv[2], file.parent / "place", file.parent / "log")
 lock = Lock(place)
 plan = read_plan(file.read_text(), str(file))
 output, logs = NonBlockingOutput(1), Logs(place.logs)
-session = Session(file, RunFiles(place, lock, file), None, output)
+session = RunSession(file, RunFiles(place, lock, file), None, output)
 code = supervise(plan, file, report=Console(plan, output, colour=False, keep=logs.write), session=session)
 output.close()
 sys.exit(code)

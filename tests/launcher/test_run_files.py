@@ -168,11 +168,11 @@ from tfcompose.cli.console import Console
 from tfcompose.launcher.output import NonBlockingOutput
 from tfcompose.launcher.run_files import RunFiles
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
-from tfcompose.launcher.supervisor import Session, supervise
+from tfcompose.launcher.supervisor import RunSession, supervise
 from tfcompose.model.plan.file import read_plan
 name, folder, file = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
 place = RuntimeDir(name, folder, folder.parent)
-session = Session(file, RunFiles(place, Lock(place), file), output=NonBlockingOutput(1))
+session = RunSession(file, RunFiles(place, Lock(place), file), output=NonBlockingOutput(1))
 plan = read_plan(file.read_text(), str(file))
 report = Console(plan, session.output, colour=False)
 sys.exit(supervise(plan, file, report=report, session=session))

@@ -34,7 +34,7 @@ GUARDS = {"watch": "mode: watch", "strict": "mode: strict", "remap": "mode: stri
 #: hexadecimal.
 NODE = """
 import os, signal, sys, time
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node
 words, _, ros = "\\n".join(sys.argv[1:]).partition("\\n--ros-args\\n")
 name, namespace, x, *edges = words.split("\\n")
@@ -44,7 +44,7 @@ def message():
     if edges[0].startswith("hex:"):
         return bytes.fromhex(edges[0][4:])
     now, rest = time.time_ns(), ((float(x), 0, 0), (0, 0, 0, 1))
-    return encode([Transform(now, *edge.split(), *rest) for edge in edges])
+    return encode([SentTransform(now, *edge.split(), *rest) for edge in edges])
 with open_node(name, namespace, args=ros.split("\\n") if ros else []) as node:
     publisher = TFPublisher(node, static=False, topic=os.environ.get("TOPIC", "/tf"))
     print("ready", flush=True)

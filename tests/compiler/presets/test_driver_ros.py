@@ -25,7 +25,7 @@ STAND_IN = """
 import os, signal, sys, threading, time
 import rclpy
 from rclpy.node import Node
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher
 rclpy.init(args=sys.argv)
 node = Node("camera", automatically_declare_parameters_from_overrides=True)
@@ -42,7 +42,7 @@ places |= dict.fromkeys(["gyro", "accel"], (-0.01174, -0.00552, 0.0051))
 def send(parent, child, xyz=(0.0, 0.0, 0.0), optical=False):
     turn = (-0.5, 0.5, -0.5, 0.5) if optical else (0.0, 0.0, 0.0, 1.0)
     xyz = (xyz[0], xyz[1] + float(off.get(child.removeprefix(prefix), 0.0)), xyz[2])
-    kept[child] = Transform(time.time_ns(), parent, child, xyz, turn)
+    kept[child] = SentTransform(time.time_ns(), parent, child, xyz, turn)
 for name in (stream for stream, enabled in streams.items() if enabled):
     frame, optical = f"{prefix}{name}_frame", f"{prefix}{name}_optical_frame"
     x, y, z = places.get(name, (0.0, 0.0, 0.0))

@@ -341,13 +341,13 @@ int clock_gettime(clockid_t id, struct timespec *now) {
 """
 TALKER = """
 import time
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher, open_node
 with open_node("far", "") as node:
     publisher = TFPublisher(node, static=False)
     print("up", flush=True)
     while True:
-        publisher.publish(encode([Transform(time.time_ns(), "odom", "base_link", (0.0,) * 3, (0.0, 0.0, 0.0, 1.0))]))
+        publisher.publish(encode([SentTransform(time.time_ns(), "odom", "base_link", (0.0,) * 3, (0.0, 0.0, 0.0, 1.0))]))
         time.sleep(0.03)
 """  # noqa: E501 (a text as its reader has it)
 

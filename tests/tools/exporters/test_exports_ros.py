@@ -41,13 +41,13 @@ ARM = """
 import signal, sys
 import rclpy
 from rclpy.lifecycle import LifecycleNode
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import TFPublisher
 
 class Arm(LifecycleNode):
     def on_activate(self, state):
         self.sent = TFPublisher(self, static=True)
-        self.sent.publish(encode([Transform(0, "base_link", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))]))
+        self.sent.publish(encode([SentTransform(0, "base_link", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))]))
         return super().on_activate(state)
 
 signal.signal(signal.SIGINT, lambda *_: sys.exit())  # with 0, also after rclpy's own handler has ended spin
@@ -285,7 +285,7 @@ STOCK = """#!{python}
 import sys, yaml
 import xml.etree.ElementTree as ET
 from tfcompose.foundation.geometry import quat_from_rpy
-from tfcompose.tf.ros.tf_codec import Transform, encode
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
 from tfcompose.tf.ros.node import open_node
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.ros.node import TFPublisher
@@ -296,7 +296,7 @@ rules = [word for n, word in enumerate(ros_args) if word == "-r" or ros_args[n -
 edges = []
 if own:
     numbers = [float(own[key]) for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")]
-    edges.append(Transform(0, own["--frame-id"], own["--child-frame-id"], tuple(numbers[:3]), tuple(numbers[3:])))
+    edges.append(SentTransform(0, own["--frame-id"], own["--child-frame-id"], tuple(numbers[:3]), tuple(numbers[3:])))
 for file in files:
     for node in yaml.safe_load(open(file)).values():
         urdf = node["ros__parameters"].get("robot_description")
@@ -304,7 +304,7 @@ for file in files:
             origin = joint.find("origin")
             xyz, rpy = ([float(x) for x in origin.get(key, "0 0 0").split()] for key in ("xyz", "rpy"))
             ends = [joint.find(end).get("link") for end in ("parent", "child")]
-            edges.append(Transform(0, *ends, tuple(xyz), quat_from_rpy(*rpy)))
+            edges.append(SentTransform(0, *ends, tuple(xyz), quat_from_rpy(*rpy)))
 with Stop() as stop, open_node("stock", "", args=rules) as node:
     TFPublisher(node, static=True).publish(encode(edges))
     stop.wait(None)

@@ -138,15 +138,15 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_721,
-    "model": 1_891,
+    "foundation": 1_792,
+    "model": 1_904,
     "spec": 4_825,
-    "compiler": 9_946,
-    "tf": 5_403,
-    "guard": 4_259,
-    "launcher": 3_835,
-    "cli": 5_436,
-    "tools": 11_262,
+    "compiler": 10_090,
+    "tf": 5_596,
+    "guard": 4_399,
+    "launcher": 3_834,
+    "cli": 5_474,
+    "tools": 11_520,
 }
 
 

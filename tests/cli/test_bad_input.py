@@ -414,3 +414,22 @@ def test_a_duration_is_refused_where_no_running_tree_is_observed(words: str, fol
     assert done.stderr.startswith("tfcompose: ")
     assert "--for" in done.stderr
     assert not everything_below(folder)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--at", "soon"),
+        ("--at", "3000000000"),
+        ("--at", "1.0000000001"),
+        ("--precision", "-1"),
+        ("--rate", "0"),
+    ],
+)
+def test_an_option_of_echo_that_cannot_be_read_is_wrong_use(
+    words: tuple[str, str], tmp_path: Path
+) -> None:
+    done = tfcompose("echo", "odom", "base_link", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert words[1] in done.stderr
+    assert "Traceback" not in done.stderr

@@ -5,7 +5,6 @@ It is drawn, left, and put back.
 
 from __future__ import annotations
 
-import os
 import signal
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ import pytest
 
 from tests.support.shell import PROMPT, Shell
 from tests.support.waiting import gone, until
-from tfcompose.cli.live_run import can_show_live
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -88,20 +86,18 @@ def test_ctrl_z_leaves_the_view_and_not_the_robot_and_fg_shows_it_again(shell: S
     assert until(lambda: gone(launcher))
 
 
-@pytest.mark.parametrize("number", [signal.SIGQUIT, signal.SIGKILL])
-def test_whatever_ends_the_view_ends_the_robot(shell: Shell, number: signal.Signals) -> None:
+@pytest.mark.parametrize("number", [signal.SIGQUIT, signal.SIGKILL, None])
+def test_whatever_ends_the_view_ends_the_robot(
+    shell: Shell, number: signal.Signals | None
+) -> None:
+    """Its terminal, too, which goes away."""
     shell.up()
     shell.shows("all well")
     started = shell.below()
-    shell.view().send_signal(number)
-    assert until(lambda: all(map(gone, started)))
-
-
-def test_a_terminal_that_goes_away_ends_the_robot(shell: Shell) -> None:
-    shell.up()
-    shell.shows("all well")
-    started = shell.below()
-    shell.process.kill()
+    if number is None:
+        shell.process.kill()
+    else:
+        shell.view().send_signal(number)
     assert until(lambda: all(map(gone, started)))
 
 
@@ -117,39 +113,6 @@ def test_a_process_that_fails_ends_it_and_the_reason_stays_on_the_terminal(
     shell.shows("exit code 1")
 
 
-class Terminal:
-    """A stream of a terminal."""
-
-    @staticmethod
-    def isatty() -> bool:
-        return True
-
-    @staticmethod
-    def fileno() -> int:
-        return 0
-
-
-@pytest.mark.parametrize(
-    ("environment", "group", "shows"),
-    [
-        ({}, os.getpgrp(), True),
-        ({"TERM": "dumb"}, os.getpgrp(), False),
-        ({"CI": "true"}, os.getpgrp(), False),
-        ({}, 1, False),
-    ],
-    ids=["a terminal", "a dumb one", "CI", "in the background"],
-)
-def test_a_view_needs_a_terminal_that_redraws(
-    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], group: int, *, shows: bool
-) -> None:
-    for name, value in ({"TERM": "xterm", "CI": ""} | environment).items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setattr("sys.stdout", Terminal())
-    monkeypatch.setattr("sys.stdin", Terminal())
-    monkeypatch.setattr("os.tcgetpgrp", lambda _: group)
-    assert can_show_live() == shows
-
-
 @pytest.mark.parametrize("words", ["--no-live", "| cat"])
 def test_elsewhere_it_prints_lines(shell: Shell, words: str) -> None:
     shell.up(words)
@@ -158,19 +121,6 @@ def test_elsewhere_it_prints_lines(shell: Shell, words: str) -> None:
     shell.type("\003")
     assert until(lambda: all(map(gone, started)))
     assert OTHER_SCREEN not in shell.text
-
-
-def test_without_colours_there_are_none(domain: object, tmp_path: Path) -> None:
-    assert domain
-    (tmp_path / "robot.yaml").write_text(ROBOT)
-    shell = Shell(tmp_path, NO_COLOR="1")
-    try:
-        shell.up()
-        shell.shows("all well")
-        colours = {char.fg for line in shell.screen.buffer.values() for char in line.values()}
-        assert colours == {"default"}
-    finally:
-        shell.close()
 
 
 def test_ctrl_s_stops_neither_the_view_nor_its_end(shell: Shell) -> None:
@@ -201,11 +151,20 @@ def test_a_terminal_that_takes_nothing_keeps_neither_the_view_nor_the_robot_from
     shell.shows(PROMPT)
 
 
-def test_what_the_build_found_is_shown_in_the_view(shell: Shell, tmp_path: Path) -> None:
+def test_what_the_build_found_is_shown_in_the_view_and_without_colours_there_are_none(
+    domain: object, tmp_path: Path
+) -> None:
+    assert domain
     (tmp_path / "robot.yaml").write_text(f"{ROBOT}vars: {{idle: 1}}\n")
-    shell.up()
-    shell.shows("1 warning", "TF", "idle", "1/1 edges live")
-    shell.type("f")
-    shell.shows("robot.yaml:9")
-    shell.type("\003")
-    shell.shows("ended", PROMPT)
+    shell = Shell(tmp_path, NO_COLOR="1")
+    try:
+        shell.up()
+        shell.shows("1 warning", "TF", "idle", "1/1 edges live")
+        shell.type("f")
+        shell.shows("robot.yaml:9")
+        colours = {char.fg for line in shell.screen.buffer.values() for char in line.values()}
+        assert colours == {"default"}
+        shell.type("\003")
+        shell.shows("ended", PROMPT)
+    finally:
+        shell.close()

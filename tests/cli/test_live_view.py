@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.cli.console import Console, StatusLine
+from tfcompose.cli.live_run import can_show_live
 from tfcompose.cli.terminal import coloured_only, plain
 from tfcompose.foundation.findings import finding
 from tfcompose.foundation.geometry import Pose
@@ -43,6 +44,7 @@ LAUNCHER = """
 import sys
 from pathlib import Path
 from tfcompose.cli.console import Console, StatusLine
+from tfcompose.cli.live_run import can_show_live
 from tfcompose.cli.terminal import size_of
 from tfcompose.model.plan.file import read_plan
 from tfcompose.launcher.output import NonBlockingOutput
@@ -272,3 +274,36 @@ def test_on_a_real_terminal_the_log_is_complete_the_line_below_it_and_ctrl_c_lea
     ]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
     assert len(numbers) > 80
+
+
+class StreamOfTerminal:
+    """A stream of a terminal."""
+
+    @staticmethod
+    def isatty() -> bool:
+        return True
+
+    @staticmethod
+    def fileno() -> int:
+        return 0
+
+
+@pytest.mark.parametrize(
+    ("environment", "group", "shows"),
+    [
+        ({}, os.getpgrp(), True),
+        ({"TERM": "dumb"}, os.getpgrp(), False),
+        ({"CI": "true"}, os.getpgrp(), False),
+        ({}, 1, False),
+    ],
+    ids=["a terminal", "a dumb one", "CI", "in the background"],
+)
+def test_a_view_needs_a_terminal_that_redraws(
+    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], group: int, *, shows: bool
+) -> None:
+    for name, value in ({"TERM": "xterm", "CI": ""} | environment).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("sys.stdout", StreamOfTerminal())
+    monkeypatch.setattr("sys.stdin", StreamOfTerminal())
+    monkeypatch.setattr("os.tcgetpgrp", lambda _: group)
+    assert can_show_live() == shows

@@ -14,8 +14,6 @@ from tfcompose.tf.ros.node import Received
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-pytestmark = pytest.mark.ros
-
 
 class Messages:
     """A subscription whose messages a test gives."""

@@ -27,23 +27,40 @@ def rows(done: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
     return found
 
 
-def test_each_publisher_of_an_edge_is_named_with_its_rate_and_delay() -> None:
+def test_each_publisher_is_named_with_rate_and_delay_and_a_chain_has_a_net_delay() -> None:
     def are_named(seconds: float) -> None:
         found = {
             each["publisher"]: each
             for each in rows(monitor("--for", str(seconds), "--format", "json"))
         }
-        assert set(found) == {"/drive", "/ekf"}
-        assert found["/drive"]["rate"] == pytest.approx(drive(), rel=0.15)
-        assert found["/ekf"]["rate"] == pytest.approx(ekf(), rel=0.15)
-        assert 0 <= found["/drive"]["least_delay_s"] < 0.25 <= found["/ekf"]["least_delay_s"]
-        assert found["/ekf"]["present"]
+        assert set(found) == {"/drive", "/ekf", "/one", "/other"}
+        for name, rate in (("one", one()), ("other", other())):
+            assert found[f"/{name}"]["child"] == "y"
+            assert found[f"/{name}"]["rate"] == pytest.approx(rate, rel=0.15)
+        assert 0 <= found["/one"]["least_delay_s"] < 0.25 <= found["/other"]["least_delay_s"]
+        assert found["/other"]["present"]
+
+    def is_a_chain(seconds: float) -> None:
+        done = json.loads(
+            monitor("map", "/base_link", "--for", str(seconds), "--format", "json").stdout
+        )
+        assert done["chain"] == ["map", "odom", "base_link"]
+        assert [(each["child"], each["publisher"]) for each in done["edges"]] == [
+            ("odom", "/ekf"),
+            ("base_link", "/drive"),
+        ]
+        assert done["most_behind"] == ["map", "odom"]
+        assert 0.25 + 0.5 / 20 * 0.9 <= done["net_delay_s"] <= done["most_net_delay_s"]
 
     with (
-        sending("drive", "odom", "base_link", rate=50) as drive,
-        sending("ekf", "odom", "base_link", rate=20, late_s=0.25) as ekf,
+        sending("drive", "odom", "base_link", rate=50),
+        sending("ekf", "map", "odom", rate=20, late_s=0.25),
+        sending("one", "x", "y", rate=50) as one,
+        sending("other", "x", "y", rate=20, late_s=0.25) as other,
     ):
         at_last(are_named)
+        at_last(is_a_chain)
+    assert "A and B" in monitor("map", code=2).stderr
 
 
 #: Starts a node as a machine does that is busy with something else.
@@ -86,25 +103,3 @@ def test_piped_it_prints_a_table_each_second_and_ends_with_exit_code_0_on_a_sign
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 0
     assert errors == ""
-
-
-def test_between_two_frames_each_edge_has_its_publisher_and_a_net_delay() -> None:
-    def is_named(seconds: float) -> None:
-        done = json.loads(
-            monitor("map", "/base_link", "--for", str(seconds), "--format", "json").stdout
-        )
-        assert done["chain"] == ["map", "odom", "base_link"]
-        assert [(each["child"], each["publisher"]) for each in done["edges"]] == [
-            ("odom", "/ekf"),
-            ("base_link", "/drive"),
-        ]
-        assert done["most_behind"] == ["map", "odom"]
-        assert 0.25 + 0.5 / 20 * 0.9 <= done["net_delay_s"] <= done["most_net_delay_s"]
-
-    with (
-        sending("drive", "odom", "base_link", rate=50),
-        sending("ekf", "map", "odom", rate=20, late_s=0.25),
-        sending("other", "x", "y", rate=50),
-    ):
-        at_last(is_named)
-    assert "A and B" in monitor("map", code=2).stderr

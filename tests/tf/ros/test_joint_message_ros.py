@@ -7,7 +7,6 @@ from sensor_msgs.msg import JointState
 from tfcompose.launcher.publishers.joint_mover import positions_of
 from tfcompose.tf.ros.joint_codec import encode_names, fill, read_names
 
-pytestmark = pytest.mark.ros
 NAMES = [[], ["a"], ["left", "grippér"], [f"joint_{n}" for n in range(11)]]
 
 

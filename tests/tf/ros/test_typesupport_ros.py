@@ -11,8 +11,6 @@ from tfcompose.tf.ros.environment import RosError
 from tfcompose.tf.ros.node import TFPublisher, open_node
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE_HASH, SentTransform, encode
 
-pytestmark = pytest.mark.ros
-
 
 @pytest.fixture
 def own() -> Any:
@@ -94,6 +92,7 @@ with open_node("one", "/") as node:
 """
 
 
+@pytest.mark.ros
 def test_a_reader_may_be_the_first_that_uses_an_installed_tf2_msgs(
     domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, python: Callable[[str], str]
 ) -> None:
@@ -119,6 +118,7 @@ print(dict(node.get_topic_names_and_types())["/tf"], info.topic_type, info.topic
 """
 
 
+@pytest.mark.ros
 @pytest.mark.usefixtures("domain")
 def test_another_process_sees_the_type_and_its_hash(python: Callable[[str], str]) -> None:
     with open_node("talks", "/rover") as node:

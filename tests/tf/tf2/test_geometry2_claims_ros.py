@@ -40,8 +40,6 @@ from tfcompose.tf.tf2 import (
 from tfcompose.tf.tf2 import messages as tf2_geometry_msgs
 from tfcompose.tf.tf2 import messages as tf2_sensor_msgs
 
-pytestmark = pytest.mark.ros
-
 
 def stamped(parent: str, child: str, seconds: float, x: float = 2.0) -> TransformStamped:
     message = TransformStamped(child_frame_id=child)
@@ -214,6 +212,7 @@ def test_a_coroutine_ends_at_the_step_after_its_transform_came(*, full: bool, la
     assert ended.value.value == message
 
 
+@pytest.mark.ros
 def test_what_broadcasters_send_a_listener_in_the_same_node_hears(node: Any) -> None:
     buffer = Buffer()
     moving, fixed = TransformBroadcaster(node), StaticTransformBroadcaster(node)
@@ -251,6 +250,7 @@ def test_what_broadcasters_send_a_listener_in_the_same_node_hears(node: Any) -> 
     executor.shutdown()
 
 
+@pytest.mark.ros
 def test_fixed_transforms_of_several_calls_come_to_a_late_listener_and_the_first_of_a_frame_stays(
     node: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -270,6 +270,7 @@ def test_fixed_transforms_of_several_calls_come_to_a_late_listener_and_the_first
     assert buffer.lookup_transform("base", "camera", Time()).transform.translation.x == 2.0
 
 
+@pytest.mark.ros
 @pytest.mark.parametrize("kind", [TransformBroadcaster, StaticTransformBroadcaster])
 def test_a_broadcasters_depth_is_the_callers_and_the_rest_is_tf2s(node: Any, kind: Any) -> None:
     kind(node, 7)

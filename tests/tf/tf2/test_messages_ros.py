@@ -25,8 +25,6 @@ from sensor_msgs.msg import PointCloud2, PointField
 from tfcompose.foundation.geometry import Pose, normalised
 from tfcompose.tf.tf2 import Buffer, TypeException
 
-pytestmark = pytest.mark.ros
-
 S = 1_000_000_000
 QUAT = normalised((0.4, -0.1, 0.5, -0.7))
 XYZ = (-2.0, 0.25, 11.0)

@@ -11,7 +11,6 @@ import posixpath
 import re
 import shlex
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.param_files import matches
@@ -470,7 +469,7 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     section = "containers" if program.loads else "processes"
     draft.process(name, keys, *(note for note in notes if note), section=section)
     for word in _texts((*program.argv, *program.env.values())):
-        if PACKAGE in word and not _is_literal(word, at):
+        if PACKAGE in word and not _is_literal(word, at, draft):
             todo.append(f"{word} is in a package that is not found here: write its path")
             advice = "--package NAME=FOLDER, or source the workspace's setup file"
     for one in (*todo, *left):
@@ -480,16 +479,16 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     return name
 
 
-def _is_literal(word: str, at: Span | None) -> bool:
+def _is_literal(word: str, at: Span | None, draft: ImportDraft) -> bool:
     """Whether the source has the word's addresses of packages itself, as the program reads them.
 
     What the source looks up in a package that is not found has such an address too.
     """
     try:
-        source = Path(at.file).read_text("utf-8") if at else ""
-    except (OSError, UnicodeDecodeError):
+        source = draft.reach.read(at.file, _MOST_BYTES) if at else b""
+    except (OutsideError, OSError):
         return False
-    return all(address in source for address in re.findall(rf"{PACKAGE}\w+", word))
+    return all(address.encode() in source for address in re.findall(rf"{PACKAGE}\w+", word))
 
 
 def _with_made(word: str, draft: ImportDraft) -> str:

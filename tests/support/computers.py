@@ -251,7 +251,10 @@ class Computers:
                 "address",
                 hardware,
             ]
-            self.office_run(*link, "netns", str(computer.inside()))
+            # The kernel takes a network away, and the link with it, after its last process.
+            self.office_run("ip", "link", "del", f"to-{name}")
+            inside = str(computer.inside())
+            assert until(lambda: self.office_run(*link, "netns", inside).returncode == 0)
             self.office_run("ip", "link", "set", f"to-{name}", "master", "br0", "up")
             line = process.stdout.readline()
         assert line == "ready\n", (self.folder / f"{name}.log").read_text()

@@ -235,9 +235,9 @@ def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
     running.repeat(other, edges, 3) if foreign_first else running.check()
     for _ in range(10):
         running.send(own, edges)
-        assert running.judge.admitted is None, "the owner's messages pass"
+        assert running.admitted is None, "the owner's messages pass"
         running.send(other, edges).wait(0.1)
-        assert running.judge.admitted == frozenset(), "the other's do not"
+        assert running.admitted == frozenset(), "the other's do not"
     found = [event for event in running.events if isinstance(event, FindingShown)]
     assert {one.found.code for one in found} == {"TF801"}
     assert {one.process for one in found} == ({"joints"} if process == "joints" else {""})
@@ -252,7 +252,7 @@ def test_a_child_with_a_stopped_owners_name_is_not_the_owner() -> None:
     running.judge.absent("slam")
     child = running.joins("/slam", process="joints")
     running.repeat(child, "map odom", 5)
-    assert running.judge.admitted == frozenset()
+    assert running.admitted == frozenset()
     expect(running.only(), "TF801", "another /slam")
 
 

@@ -109,6 +109,8 @@ class History:
     graph: list[Publisher] = field(default_factory=list)
     made: int = 0
     judge: Judge = field(init=False)
+    #: The edges of the last message that may pass in a strict plan; None: all.
+    admitted: frozenset[tuple[str, str]] | None = field(init=False)
     ticked: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -179,7 +181,9 @@ class History:
         sent_ns = self.wall_ns() - round(ago * 1e9)
         stamps = () if stamp_s is None else (round(stamp_s * 1e9),) * len(pairs)
         message = Message(pairs, kind, gid, sent_ns, publisher.sent, stamps, self.wall_ns())
-        self.events += self.judge.message(message, self.now)
+        judged = self.judge.take(message, self.now)
+        self.admitted = judged.admitted
+        self.events += self.judge.arrived(judged, message, self.now)
         return self
 
     def check(self) -> History:

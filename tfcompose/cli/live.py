@@ -50,19 +50,23 @@ def refuse_live_bag(arguments: Namespace) -> None:
         fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
 
 
-def observed_topics(arguments: Namespace) -> tuple[Plan | None, list[Topics]]:
-    """Return the plan of FILE, if one is given, and the topics (moving, fixed) to observe.
+def observed_for(
+    name: str, arguments: Namespace
+) -> tuple[Plan | None, dict[Topics, TreeObserver]]:
+    """Return the plan of FILE, if one is given, and what was observed on topics (moving, fixed).
 
-    Its own, or --namespace's.
+    On its own, or --namespace's. ``name`` is that of the node that observes.
 
     Raises:
-        SystemExit: after saying what cannot be read, or cannot be asked for together.
+        SystemExit: after saying what cannot be read or observed, or asked for together.
     """
     refuse_live_bag(arguments)
-    if arguments.file is None:
-        return None, [topics_below(arguments.namespace)]
-    plan, _ = expected_plan(arguments.file, arguments)
-    return plan, list(parts_of(plan)) or [topics_below(plan.ros.namespace)]
+    plan = expected_plan(arguments.file, arguments)[0] if arguments.file is not None else None
+    ros = plan.ros if plan else None
+    pairs = list(parts_of(plan)) if plan else []
+    pairs = pairs or [topics_below(ros.namespace if ros else arguments.namespace)]
+    duration_s = arguments.duration
+    return plan, observed(name, pairs, bag=arguments.bag, ros=ros, duration_s=duration_s)
 
 
 def from_bag(read: Callable[[], T]) -> T:

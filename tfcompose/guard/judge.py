@@ -56,8 +56,7 @@ class Judge:
 
     ``says_who`` says whether the ids of messages are those of the graph; where they are not, they
     tell senders apart. ``remapped`` says that what the plan's processes send is fenced off by
-    remappings. ``admitted`` are the edges of the last message that may pass in a strict plan;
-    None: all.
+    remappings.
     """
 
     plan: Plan
@@ -76,7 +75,6 @@ class Judge:
     #: The processes that the plan starts, by their nodes.
     _started: dict[str, str] = field(init=False)
     _finds_until: float = 0.0
-    admitted: frozenset[tuple[str, str]] | None = None
 
     def __post_init__(self) -> None:
         self.live = Liveness(self.plan)
@@ -94,21 +92,15 @@ class Judge:
         self.live.follow(plan)
         self.ledger.follow(plan)
 
-    def message(self, message: Message, now: float) -> list[GuardEvent]:
-        """Take a message and return which edges it brings to life; ``tick`` reports violations."""
-        return self.arrived(self.take(message, now), message, now)
-
     def take(self, message: Message, now: float) -> JudgedMessage:
         """Take a message and return the verdict on it, with which it can be passed on.
 
-        Give both to ``arrived`` afterwards.
+        Give both to ``arrived`` afterwards; ``tick`` reports violations.
         """
         self._senders.heard(message, now)
         if message.poses:
             self._sent.take(message)
-        judged = self.ledger.take(message, now)
-        self.admitted = judged.admitted
-        return judged
+        return self.ledger.take(message, now)
 
     def arrived(self, judged: JudgedMessage, message: Message, now: float) -> list[GuardEvent]:
         """Judge when a message that was taken came; return which edges it brings to life."""

@@ -161,17 +161,10 @@ def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
 
 def _published_graph(arguments: Namespace) -> Graph:
     """Return the published tree as a graph."""
-    from tfcompose.cli.live import observed, observed_topics
+    from tfcompose.cli.live import observed_for
 
-    plan, pairs = observed_topics(arguments)
-    observers = observed(
-        "tfcompose_graph",
-        pairs,
-        bag=arguments.bag,
-        ros=plan.ros if plan else None,
-        duration_s=arguments.duration,
-    )
-    title = arguments.bag or (plan.robot if plan else pairs[0][0])
+    plan, observers = observed_for("tfcompose_graph", arguments)
+    title = arguments.bag or (plan.robot if plan else next(iter(observers))[0])
     return graph_of_observers(list(observers.values()), title, plan, poses=arguments.poses)
 
 

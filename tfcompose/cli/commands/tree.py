@@ -132,26 +132,19 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
 
 def _print_published(arguments: Namespace) -> None:
     from tfcompose.cli.edge_table import not_kept
-    from tfcompose.cli.live import observed, observed_topics
+    from tfcompose.cli.live import observed_for
     from tfcompose.model.plan.topics import parts_of
     from tfcompose.tf.live.edges import forest
 
-    plan, pairs = observed_topics(arguments)
+    plan, observers = observed_for("tfcompose_tree", arguments)
     parts = parts_of(plan) if plan else {}
-    observers = observed(
-        "tfcompose_tree",
-        pairs,
-        bag=arguments.bag,
-        ros=plan.ros if plan else None,
-        duration_s=arguments.duration,
-    )
     for pair, observer in observers.items():
         planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
         trees = forest(observer.edges(observer.until_ns), planned)
         if arguments.format == "json":
             sys.stdout.write(_published_json(pair, trees, plan=plan))
         else:
-            heading = f"on {pair[0]} and {pair[1]}:\n" if len(pairs) > 1 else ""
+            heading = f"on {pair[0]} and {pair[1]}:\n" if len(observers) > 1 else ""
             more = f"\n{not_kept(observer)}\n" if observer.beyond else ""
             sys.stdout.write(heading + _drawn(trees, plan=plan) + more)
 

@@ -130,15 +130,21 @@ class RosFeed:
         Raises:
             RosError: if ROS cannot start one.
         """
-        self.node = self._stack.enter_context(open_node(self._name, ""))
-        self.listeners = [
-            TreeListener(self.node, observer, pair) for pair, observer in self._observers.items()
-        ]
-        self._joints = [JointStates(self.node, topic) for topic in self._joint_topics]
+        with ExitStack() as stack:
+            self.node = stack.enter_context(open_node(self._name, ""))
+            self.listeners = [
+                TreeListener(self.node, observer, pair)
+                for pair, observer in self._observers.items()
+            ]
+            self._joints = [JointStates(self.node, topic) for topic in self._joint_topics]
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the node."""
+        """Give the observers who sent joint states, and end the node."""
+        sent = tuple(one for joints in self._joints for one in joints.sent())
+        for observer in self._observers.values():
+            observer.sent_joints = sent
         self._stack.close()
 
     @property
@@ -158,10 +164,6 @@ class RosFeed:
             stop.wait(timeout_s)
         for joints in self._joints:
             joints.take()
-        if self._joints:
-            sent = tuple(one for joints in self._joints for one in joints.sent())
-            for observer in self._observers.values():
-                observer.sent_joints = sent
         return True
 
     def elsewhere(self) -> tuple[str, ...]:

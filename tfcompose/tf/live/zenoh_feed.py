@@ -85,14 +85,16 @@ class ZenohFeed:
         Raises:
             RosError: if there is no router.
         """
-        session = open_session(os.environ)
-        self._stack.callback(session.close)
-        domain = domain_of(os.environ)
-        graph = ZenohGraph(session, domain)
-        self._listeners = [
-            _TopicFeed(graph, ZenohTF(session, domain, topics), topics, observer)
-            for topics, observer in self._observers.items()
-        ]
+        with ExitStack() as stack:
+            session = open_session(os.environ)
+            stack.callback(session.close)
+            domain = domain_of(os.environ)
+            graph = ZenohGraph(session, domain)
+            self._listeners = [
+                _TopicFeed(graph, ZenohTF(session, domain, topics), topics, observer)
+                for topics, observer in self._observers.items()
+            ]
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import did_you_mean, finding
 from tfcompose.model.robot import Optics, OpticsSource
+from tfcompose.spec.language.optics import OpticsSpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -13,14 +15,14 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve.draft import Finds
     from tfcompose.compiler.resolve.presets import Sensor
     from tfcompose.model.robot import OpticsKind
-    from tfcompose.spec.language.optics import OpticsSourceSpec, OpticsSpec
+    from tfcompose.spec.language.optics import OpticsSourceSpec
     from tfcompose.spec.language.robot import RobotSpec
 
-#: Keys of the language that ``Optics`` has under the same name; those that are left out stay as
-#: they are there.
-_KEYS = (
-    *("projection", "backward", "horizontal", "vertical", "diagonal", "resolution", "near"),
-    *("far", "channels", "elevations", "samples", "rate", "shutter", "baseline", "active"),
+#: Keys of the language that ``Optics`` has under the same name, but for those that are found here.
+_KEYS = tuple(
+    field.name
+    for field in fields(Optics)
+    if field.name in OpticsSpec.model_fields and field.name not in {"frame", "kind"}
 )
 #: What the streams of a sensor are unless they say it.
 _KINDS: dict[str, OpticsKind] = {

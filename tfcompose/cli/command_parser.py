@@ -26,7 +26,7 @@ class Parser(ArgumentParser):
         if message.startswith("unrecognized arguments"):
             words = [word.partition("=")[0] for word in message.split() if word.startswith("-")]
             known = [text for action in self._actions for text in action.option_strings]
-            near = [one for word in words for one in difflib.get_close_matches(word, known, 1)]
+            near = [match for word in words for match in difflib.get_close_matches(word, known, 1)]
             advice = f"did you mean {near[0]}?" if near else advice
         fail(f"{self.prog.partition(' ')[2]}: {message}; {advice}", UNREADABLE)
 

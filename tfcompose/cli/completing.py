@@ -108,7 +108,7 @@ def _frames(argv: Sequence[str]) -> list[str]:
     from tfcompose.compiler.compile import compile_source
     from tfcompose.spec.load import load
 
-    file = next((word for word in argv if word.endswith(YAML)), None)
+    file = next((argument for argument in argv if argument.endswith(YAML)), None)
     if file is None and argv[0] == "explain":
         return []
     try:
@@ -141,14 +141,17 @@ def _codes(_: Sequence[str]) -> list[str]:
 
 
 def _codes_or_frames(argv: Sequence[str]) -> list[str]:
-    return _frames(argv) if any(word.endswith(YAML) for word in argv) else _codes(argv)
+    return _frames(argv) if any(argument.endswith(YAML) for argument in argv) else _codes(argv)
 
 
 def _section(name: str, argv: Sequence[str]) -> list[str]:
     """Return the names in a section of the robot file that is given, or of that of this folder."""
     from tfcompose.spec.load import load
 
-    file = next((word for word in argv if word.endswith(YAML) and not is_plan(word)), DEFAULT_FILE)
+    file = next(
+        (argument for argument in argv if argument.endswith(YAML) and not is_plan(argument)),
+        DEFAULT_FILE,
+    )
     try:
         section = load(read_text(file), file).data.get(name)
     except RejectedError:

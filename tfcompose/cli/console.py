@@ -215,7 +215,7 @@ class Console:
     def _(self, notice: Replanned) -> None:
         self._width = max(self._width, *map(len, ("", *notice.added)))
         parts = (("changed", notice.changed), ("new", notice.added), ("gone", notice.removed))
-        changes = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
+        changes = "; ".join(f"{label}: {', '.join(names)}" for label, names in parts if names)
         self._say(f"another plan: {changes or 'nothing to restart'}")
         if notice.held:
             self._say(self._paint(vanished(notice.held), YELLOW))
@@ -239,7 +239,7 @@ class Console:
 
     @_write.register
     def _(self, notice: FindingShown) -> None:
-        notes = tuple(one for one in notice.found.notes if not self._is_printed(one.message))
+        notes = tuple(note for note in notice.found.notes if not self._is_printed(note.message))
         for line in render_text(
             [replace(notice.found, notes=notes)], line_of, colour=self._colour
         ).splitlines():

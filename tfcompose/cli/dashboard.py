@@ -188,7 +188,9 @@ class Dashboard:
         """Forget what notices said: they are going to come again."""
         self._reports.clear()
         self._events.clear()
-        self._events.extend((self._began, f"WARNING {plain(one)}") for one in self.warnings)
+        self._events.extend(
+            (self._began, f"WARNING {plain(warning)}") for warning in self.warnings
+        )
         self._counts = dict.fromkeys(self._counts, 0)
         for found in self.built_with:
             self.take(FindingShown(found), self._began)
@@ -335,8 +337,8 @@ class Dashboard:
 
     def _live_edges(self) -> tuple[int, int]:
         """Return how many edges the processes own, and how many of them are live."""
-        return sum(one.edges for one in self._processes()), sum(
-            one.live for one in self._processes()
+        return sum(process.edges for process in self._processes()), sum(
+            process.live for process in self._processes()
         )
 
     def _foot(self) -> Text:
@@ -370,7 +372,7 @@ class Dashboard:
 
     def _process_lines(self, columns: int, rows: int) -> list[Text]:
         """Return the table's head and the processes that fit, the chosen one among them."""
-        rows_of = [row(one, self.used) for one in self._processes()]
+        rows_of = [row(process, self.used) for process in self._processes()]
         head, *shown = (
             Text.from_ansi(line)
             for line in TABLE.lines([HEAD, *rows_of], columns - len(_INDENT), coloured=True)
@@ -391,7 +393,7 @@ class Dashboard:
     def _news(self) -> list[Text]:
         """Return the first line of each report; where there is none, what the launcher said."""
         if self._reports:
-            return [self._timed(one.at, one.lines[0]) for one in self._reports]
+            return [self._timed(report.at, report.lines[0]) for report in self._reports]
         return [self._timed(at, _styled(line)) for at, line in self._events]
 
     def _log_page(self, columns: int, rows: int) -> list[Text]:

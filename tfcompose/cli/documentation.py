@@ -176,7 +176,7 @@ def html(commands: Mapping[str, CommandModule]) -> str:
 
     renderer = MarkdownIt("commonmark", {"html": False}).enable("table")
     names = topics()
-    about = {f"topic-{word}": renderer.render(topic(word)) for word in names}
+    about = {f"topic-{name}": renderer.render(topic(name)) for name in names}
     about["topic-language"] = _MODEL.sub(_with_id, about["topic-language"])
     about["topic-codes"] = _CODE_CELL.sub(r'<td><a href="#\1">\1</a></td>', about["topic-codes"])
     about["topic-codes"] += "\n".join(

@@ -56,9 +56,9 @@ class Fixer:
         found = self._findings([file])
         while True:
             todo = [
-                one
-                for one in found
-                if one.edits and all(self._may_edit(edit.span.file) for edit in one.edits)
+                finding
+                for finding in found
+                if finding.edits and all(self._may_edit(edit.span.file) for edit in finding.edits)
             ]
             kept = self._sound(file, [], todo)
             if not kept:
@@ -143,7 +143,7 @@ def _path(file: str) -> str:
 
 
 def _counted(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
-    return Counter((one.code, one.message) for one in found)
+    return Counter((finding.code, finding.message) for finding in found)
 
 
 def rewrite(path: Path, old: str, new: str) -> None:

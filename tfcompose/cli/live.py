@@ -132,7 +132,7 @@ def observe(  # noqa: PLR0913 (all but two are named)
     """
     if bag:
         from_bag(lambda: follow(BagFeed(bag, observers), Stop()))
-        if not may_be_silent and not any(one.received_any for one in observers.values()):
+        if not may_be_silent and not any(observer.received_any for observer in observers.values()):
             _reject_silent_bag(bag, list(observers))
         return
     feed = _live_feed(name, observers, ros, joint_topics)

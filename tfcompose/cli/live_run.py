@@ -340,7 +340,7 @@ class _LiveView:
             status = self._dashboard.status
             if status and self._dashboard.page == "processes":
                 self._dashboard.used = self._meter.usage(
-                    [one.pid for one in status.processes if one.pid]
+                    [process.pid for process in status.processes if process.pid]
                 )
         if now >= self._status_at:
             self._status_at = now + STATUS_EVERY_S

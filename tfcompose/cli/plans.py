@@ -148,7 +148,7 @@ def copy_plan(
     parts = {PLAN: write_plan(plan).encode()}
     descriptions = {
         plan.description,
-        *(one.description for one in plan.processes if one.description is not None),
+        *(process.description for process in plan.processes if process.description is not None),
     }
     try:
         for name in (*descriptions, *(process.params_file for process in plan.processes)):

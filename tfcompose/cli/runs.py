@@ -263,7 +263,11 @@ def since(holder: Holder) -> str:
 
 def hidden_run(place: RuntimeDir) -> str | None:
     """Return a message if the robot already runs in another runtime directory."""
-    led = [one for one in leftovers(f"{place.name}:") if one.launcher not in (None, os.getpid())]
+    led = [
+        leftover
+        for leftover in leftovers(f"{place.name}:")
+        if leftover.launcher not in (None, os.getpid())
+    ]
     if not led or led[0].launcher is None:
         return None
     with contextlib.suppress(OSError):
@@ -365,10 +369,12 @@ def plan_of_domain() -> Plan | None:
 def _left_behind(place: RuntimeDir, run_id: str) -> Iterator[str]:
     """Name processes of earlier runs that are still there."""
     found = [
-        one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None
+        leftover
+        for leftover in leftovers(f"{place.name}:")
+        if leftover.run != run_id and leftover.launcher is None
     ]
-    for one in found:
-        yield f"an earlier run left {one.pid} behind: {one.command}"
+    for leftover in found:
+        yield f"an earlier run left {leftover.pid} behind: {leftover.command}"
     if found:
         them = "it" if len(found) == 1 else "them"
         yield f"tfcompose down --leftovers --robot {place.name} stops {them}"

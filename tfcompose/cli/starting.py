@@ -102,8 +102,8 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
         copy = copy_plan(plan, file, place, alone=True)
         session = RunSession(copy, RunFiles(place, lock, copy), file.absolute().parent)
         warnings = warnings_before_start(place, plan, session.run_id)
-        for one in warnings:
-            warn(one)
+        for warning in warnings:
+            warn(warning)
         if arguments.detach or arguments.wait:
             return _detach(plan, place, lock, session, arguments)
         if arguments.live and can_show_live():
@@ -129,7 +129,7 @@ def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
         else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
     )
     if found:
-        reject([_with_profiles(one, arguments) for one in found])
+        reject([_with_profiles(finding, arguments) for finding in found])
     odd = (other_middleware(os.environ, plan.ros), other_distro(os.environ, plan.ros))
     print_findings([one for one in odd if one], sys.stderr)
 
@@ -173,7 +173,7 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     if answer is None:
         fail(who)
     parts = (("restarted", answer.changed), ("started", answer.added), ("stopped", answer.removed))
-    changes = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
+    changes = "; ".join(f"{label}: {', '.join(names)}" for label, names in parts if names)
     if changes:
         print(f"{who}; {changes}")
     else:

@@ -65,11 +65,11 @@ def print_findings(found: Sequence[Finding], stream: TextIO, *, most: int | None
 
     shown: list[Finding] = []
     counts: Counter[tuple[str, str]] = Counter()
-    for one in found:
-        place = (one.span.file if one.span else "", one.code)
+    for finding in found:
+        place = (finding.span.file if finding.span else "", finding.code)
         counts[place] += 1
         if most is None or counts[place] <= most:
-            shown.append(one)
+            shown.append(finding)
     stream.write(render_text(shown, line_of, colour=coloured(stream)))
     for (file, code), count in counts.items():
         if most is not None and count > most:
@@ -89,7 +89,7 @@ def reject(found: Sequence[Finding], code: int | None = None) -> NoReturn:
 
 def exit_code_of(found: Sequence[Finding]) -> int:
     """Return 2 if the command lacks a file, ROS or a package, else 1."""
-    return UNREADABLE if any(one.code in _LACKING for one in found) else FAILED
+    return UNREADABLE if any(finding.code in _LACKING for finding in found) else FAILED
 
 
 def coloured(stream: TextIO) -> bool:

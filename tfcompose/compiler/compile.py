@@ -98,7 +98,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
         word: (level, source.at_key(("rules", word)))
         for word, level in levels_of(validated, robot.limits)
     }
-    codes = {code_of(word) for word, (level, _) in rules.items() if level == "off"}
+    codes = {code_of(name) for name, (level, _) in rules.items() if level == "off"}
     off = {code for code in codes if code and can_be_allowed(code)}
     found = without_duplicates([*validated.found, *unresolved, *_checked(robot, off)])
     sources = (source, *parts.sources)

@@ -134,10 +134,10 @@ def without_duplicates(found: Iterable[Finding]) -> list[Finding]:
     Of those that differ in notes only, the first, with the notes of all.
     """
     first: dict[Finding, Finding] = {}
-    for one in found:
-        alone = replace(one, notes=()) if one.notes else one
-        before = first.setdefault(alone, one)
-        notes = dict.fromkeys((*before.notes, *one.notes))
+    for finding in found:
+        alone = replace(finding, notes=()) if finding.notes else finding
+        before = first.setdefault(alone, finding)
+        notes = dict.fromkeys((*before.notes, *finding.notes))
         if len(notes) > len(before.notes):
             first[alone] = replace(before, notes=tuple(notes))
     return list(first.values())

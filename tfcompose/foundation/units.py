@@ -346,7 +346,7 @@ class Measure:
         return (
             ""
             if self.dimension == NUMBER
-            else " or ".join(SI_UNITS[one] for one in self.dimensions)
+            else " or ".join(SI_UNITS[dimension] for dimension in self.dimensions)
         )
 
     @property

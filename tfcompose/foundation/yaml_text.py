@@ -53,7 +53,7 @@ def entry(key: str, value: Any, depth: int = 0) -> list[str]:
         return (
             [f"{head} {text(value)}"]
             if lines is None
-            else [f"{head} |", *(indent(one, before + "  ") for one in lines)]
+            else [f"{head} |", *(indent(line, before + "  ") for line in lines)]
         )
     line = f"{head} {flow(value)}"
     if len(line) <= WIDTH or not isinstance(value, (dict, list)) or not _splits(value):

@@ -100,19 +100,22 @@ def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
 
 def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) -> list[Status]:
     """Return one status for the tree, with current faults, and one for each owner."""
-    severe = any(one.severity == "error" for one in found)
+    severe = any(finding.severity == "error" for finding in found)
     level = ERROR if severe else WARN if found else OK
     message = (
-        "; ".join(f"{one.code} {one.message}" for one in found)
+        "; ".join(f"{finding.code} {finding.message}" for finding in found)
         or f"{len(edges)} edges are watched"
     )
     lines = [
         Status(
-            f"tfcompose {robot}: tree", level, message, [(one.code, one.message) for one in found]
+            f"tfcompose {robot}: tree",
+            level,
+            message,
+            [(finding.code, finding.message) for finding in found],
         )
     ]
-    for owner in dict.fromkeys(one.edge.owner for one in edges):
-        owned = [one for one in edges if one.edge.owner == owner]
+    for owner in dict.fromkeys(edge.edge.owner for edge in edges):
+        owned = [edge for edge in edges if edge.edge.owner == owner]
         # Not seen yet is worse than fine, and better than silent.
         worst = max((_level(one) for one in owned), key=[OK, WARN, STALE, ERROR].index)
         number = sum(_level(one) == worst for one in owned)
@@ -157,7 +160,7 @@ class DiagnosticsPage:
         self._due = now + EVERY_S
         if self._publisher.is_heard:
             edges = [edge for judge in judges for edge in judge.health(now)]
-            wrong = [one for findings in found for one in findings()]
+            wrong = [finding for findings in found for finding in findings()]
             page = statuses(self._robot, edges, wrong)
             if (counts := held()) is not None:
                 page.append(held_status(self._robot, counts))

@@ -90,7 +90,7 @@ class Gates:
         if gate.topic:
             found = writers(self._node, gate.topic)
             observed = (
-                f"{gate.topic} is published by {', '.join(one.node for one in found)}"
+                f"{gate.topic} is published by {', '.join(writer.node for writer in found)}"
                 if found
                 else self._topics(gate.topic)
             )
@@ -104,7 +104,7 @@ class Gates:
             )
             states.append((is_there, observed))
         for topic in gate.writers:
-            names = ", ".join(one.node for one in writers(self._node, topic))
+            names = ", ".join(writer.node for writer in writers(self._node, topic))
             states.append((False, f"{topic} is published by {names or 'nobody'}"))
         return all(is_open for is_open, _ in states), "; ".join(observed for _, observed in states)
 

@@ -140,7 +140,11 @@ class Judge:
             events += self._publishers.unfenced(one, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
             events += self.live.static_writers(
-                {one.node for one in publishers if one.static and one.node is not None}
+                {
+                    publisher.node
+                    for publisher in publishers
+                    if publisher.static and publisher.node is not None
+                }
             )
         return events
 

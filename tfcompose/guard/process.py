@@ -230,7 +230,7 @@ class TopicWatch:
     def _ask_graph(self, now: float) -> None:
         """Take who publishes now; what waited for a name may pass."""
         publishers = self._graph.publishers()
-        present = {one.gid for one in publishers}
+        present = {publisher.gid for publisher in publishers}
         forget_oldest(self._known, present)
         forget_oldest(self._malformed, present)
         self._pass_on(self.judge.graph(publishers, now))

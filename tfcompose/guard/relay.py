@@ -164,7 +164,9 @@ class Relay:
         if self._feedback is None:
             return
         others = self._feedback.sources("")
-        if not self._graph.says_who and any(one.static and not one.fenced for one in writers):
+        if not self._graph.says_who and any(
+            writer.static and not writer.fenced for writer in writers
+        ):
             return
         self._feedback.forget([source for source in others if source not in present])
 
@@ -288,23 +290,23 @@ class Feedback:
 
     def update(self) -> None:
         """See who listens now, and latch for them what has changed."""
-        for process, one in self._listeners.items():
-            if one.moving is None and self._is_heard(one.topics[0]):
-                one.moving = self._publisher(one.topics[0], static=False)
-            if one.fixed is None and self._is_heard(one.topics[1]):
-                one.fixed = self._publisher(one.topics[1], static=True)
-            if one.fixed and not one.is_sent:
-                one.is_sent = True
-                one.fixed.publish(encode(self._rest(process)))
+        for process, listener in self._listeners.items():
+            if listener.moving is None and self._is_heard(listener.topics[0]):
+                listener.moving = self._publisher(listener.topics[0], static=False)
+            if listener.fixed is None and self._is_heard(listener.topics[1]):
+                listener.fixed = self._publisher(listener.topics[1], static=True)
+            if listener.fixed and not listener.is_sent:
+                listener.is_sent = True
+                listener.fixed.publish(encode(self._rest(process)))
 
     def moving(self, data: bytes, sender: str) -> None:
         """Send a message to all but the process that it is from.
 
         Empty: it is from none of them.
         """
-        for process, one in self._listeners.items():
-            if one.moving and process != sender:
-                one.moving.publish(data)
+        for process, listener in self._listeners.items():
+            if listener.moving and process != sender:
+                listener.moving.publish(data)
 
     def fixed(self, source: bytes, edges: Mapping[str, SentTransform], sender: str) -> None:
         """Latch the fixed edges of one source, by their child, at the next update."""
@@ -314,7 +316,7 @@ class Feedback:
 
     def forget(self, sources: Collection[bytes]) -> None:
         """Latch the edges of these no more."""
-        for source in [one for one in sources if one in self._fixed]:
+        for source in [source for source in sources if source in self._fixed]:
             self._outdate_all_but(self._fixed.pop(source)[0])
 
     def sources(self, sender: str) -> list[bytes]:
@@ -332,8 +334,8 @@ class Feedback:
         return list(rest.values())
 
     def _outdate_all_but(self, sender: str) -> None:
-        for process, one in self._listeners.items():
-            one.is_sent = one.is_sent and process == sender
+        for process, listener in self._listeners.items():
+            listener.is_sent = listener.is_sent and process == sender
 
     def _is_heard(self, topic: str) -> bool:
         return self._node.count_subscribers(topic) > 1  # the first is the node's own

@@ -116,9 +116,9 @@ class PublisherReports:
         """Return findings for publishers whose quality of service no listener accepts."""
         return [
             found
-            for one in publishers
-            for wrong in self._wrong_settings(one)
-            for found in self._once(one, wrong)
+            for publisher in publishers
+            for wrong in self._wrong_settings(publisher)
+            for found in self._once(publisher, wrong)
         ]
 
     def _wrong_settings(self, one: Publisher) -> Iterator[Finding]:
@@ -143,12 +143,12 @@ class PublisherReports:
         One that sends nothing for a while is returned then.
         """
         outside = [
-            one
-            for one in publishers
-            if one.node
-            and ((one.ours and one.process) or one.unmarked)
-            and one.fenced is False
-            and not self._is_known(_UNFENCED, one)
+            publisher
+            for publisher in publishers
+            if publisher.node
+            and ((publisher.ours and publisher.process) or publisher.unmarked)
+            and publisher.fenced is False
+            and not self._is_known(_UNFENCED, publisher)
         ]
         since = {one.gid: self._silent_since.get(one.gid, now) for one in outside}
         self._silent_since = since
@@ -176,12 +176,13 @@ class PublisherReports:
         Forget those that have left.
         """
         found = []
-        for gid, one in list(flooders.items()):
+        for gid, flooder in list(flooders.items()):
             publisher = senders.known.get(gid) if gid is not None else None
-            if publisher is None or not publisher.node or now - one.since < FLOOD_COUNTED_S:
+            if publisher is None or not publisher.node or now - flooder.since < FLOOD_COUNTED_S:
                 continue
             found += self._once(
-                publisher, flood(publisher.node, publisher.where, one.transforms, one.hertz)
+                publisher,
+                flood(publisher.node, publisher.where, flooder.transforms, flooder.hertz),
             )
             if not senders.is_present(gid):
                 del flooders[gid]
@@ -194,9 +195,12 @@ class PublisherReports:
         inside = f"/{self._plan.ros.namespace.strip('/')}/"
         return [
             found
-            for one in publishers
-            if one.node and (one.node in self._nodes or one.node.startswith(inside))
-            for found in self._once(one, leak(one.node, GLOBAL[one.static], topics[one.static]))
+            for publisher in publishers
+            if publisher.node
+            and (publisher.node in self._nodes or publisher.node.startswith(inside))
+            for found in self._once(
+                publisher, leak(publisher.node, GLOBAL[publisher.static], topics[publisher.static])
+            )
         ]
 
     def replaced(

@@ -130,7 +130,7 @@ def _update(
     except ValueError as error:  # a NUL in the folder's name
         return Refusal(f"{request.base!r} cannot be used: {error}"), None, None
     if found:
-        return Refusal("; ".join(one.message for one in found)), None, None
+        return Refusal("; ".join(finding.message for finding in found)), None, None
     different = change(state.plan, plan_file.parent, plan, file.parent)
     names, before = (
         [process.name for process in plan.processes],

@@ -99,12 +99,14 @@ def writer_of(state: State, process: str, line: str) -> str:
     if not components:
         return process
     loggers = {
-        node.strip("/").replace("/", "."): one.process.name
-        for one in components
-        for node in one.process.nodes
+        node.strip("/").replace("/", "."): component.process.name
+        for component in components
+        for node in component.process.nodes
     }
     for name in _LOGGER.findall(line[:_BEGINNING]):
-        found = next((one for one in loggers if name == one or name.startswith(f"{one}.")), None)
+        found = next(
+            (logger for logger in loggers if name == logger or name.startswith(f"{logger}.")), None
+        )
         if found:
             return loggers[found]
     return process

@@ -55,7 +55,7 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
             profile.set("profile_name", topic)
             profiles.append(profile)
         properties = _below(_below(profile, "propertiesPolicy"), "properties")
-        if any((one.findtext("name") or "").strip() == _PARTITIONS for one in properties):
+        if any((element.findtext("name") or "").strip() == _PARTITIONS for element in properties):
             raise RosError(f"it puts {topic} into a partition itself")
         added = ET.SubElement(properties, "property")
         ET.SubElement(added, "name").text = _PARTITIONS

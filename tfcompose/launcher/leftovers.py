@@ -88,18 +88,20 @@ def leftovers_of(pids: Iterable[int], run: str) -> list[Leftover]:
 
 def signal_leftovers(run: str, processes: Collection[str], number: signal.Signals) -> None:
     """Send the signal to what these processes, which have ended, left behind in this very run."""
-    for one in leftovers(run):
-        if one.process in processes:
-            _send(one, number)
+    for leftover in leftovers(run):
+        if leftover.process in processes:
+            _send(leftover, number)
 
 
 def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
     """Have them end, kill those that do not, and return those that are still there."""
     for number, wait_s in ((signal.SIGTERM, patience_s), (signal.SIGKILL, KILLED_WITHIN_S)):
-        for one in found:
-            _send(one, number)
+        for leftover in found:
+            _send(leftover, number)
         until = time.monotonic() + wait_s
-        while (found := [one for one in found if _is_there(one)]) and time.monotonic() < until:
+        while (
+            found := [leftover for leftover in found if _is_there(leftover)]
+        ) and time.monotonic() < until:
             time.sleep(0.02)
         if not found:
             break

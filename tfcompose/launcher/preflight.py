@@ -393,8 +393,8 @@ def _launch_command(
     file = _find_launch_file(process, package, name, env)
     if isinstance(file, NotFound):
         return file
-    arguments = dict(word.split(":=", 1) for word in argv[1:] if ":=" in word)
-    odd = [word for word in argv[1:] if ":=" not in word]
+    arguments = dict(argument.split(":=", 1) for argument in argv[1:] if ":=" in argument)
+    odd = [argument for argument in argv[1:] if ":=" not in argument]
     if odd:
         message = f"{process.name}: {odd[0]} is no argument of a launch file"
         return finding("TF902", message, None, help="give name: value, or name:=value")

@@ -141,8 +141,8 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     built_in = session.base if session else None
     commands, found = commands_of(plan, processes, plan_file, base, environment, built_in)
     if found:
-        for one in found:
-            report(FindingShown(one))
+        for finding in found:
+            report(FindingShown(finding))
         report(Ended(1))
         return 1
     with contextlib.ExitStack() as stack:

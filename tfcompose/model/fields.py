@@ -20,5 +20,5 @@ def documented(default: Any, about: str, *examples: Any) -> Any:
 def narrowed(kind: type[T], value: T, **changes: Any) -> T:
     """Return a ``kind`` with the fields of ``value``, of one of its subclasses, changed."""
     of: Any = kind
-    same = {one.name: getattr(value, one.name) for one in fields(of) if one.init}
+    same = {field.name: getattr(value, field.name) for field in fields(of) if field.init}
     return kind(**same | changes)

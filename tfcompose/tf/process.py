@@ -74,7 +74,7 @@ class Own:
     @property
     def is_of_several_computers(self) -> bool:
         """Whether a process of its robot names a computer."""
-        return any(one.host for one in self.plan.processes)
+        return any(process.host for process in self.plan.processes)
 
     @property
     def description(self) -> Path:

@@ -113,9 +113,9 @@ def _print(found: list[Finding], form: str) -> int:
 
 
 def _summary(found: list[Finding]) -> str:
-    errors = sum(one.severity == "error" for one in found)
+    errors = sum(finding.severity == "error" for finding in found)
     counts = ((errors, "error"), (len(found) - errors, "warning"))
-    return " and ".join(counted(n, word) for n, word in counts if n) or "nothing is wrong"
+    return " and ".join(counted(n, noun) for n, noun in counts if n) or "nothing is wrong"
 
 
 def _plan(arguments: Namespace) -> Plan | None:

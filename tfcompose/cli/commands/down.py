@@ -62,9 +62,9 @@ def _stop_leftovers(robot: str | None) -> int:
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
     place = chosen_run(robot, "down --leftovers", among=lambda: runtime_dirs(os.environ))
-    found = [one for one in leftovers(f"{place.name}:") if one.launcher is None]
-    for one in found:
-        print(f"stopping {one.pid}: {one.command}")
+    found = [leftover for leftover in leftovers(f"{place.name}:") if leftover.launcher is None]
+    for leftover in found:
+        print(f"stopping {leftover.pid}: {leftover.command}")
     rest = end(found)
     for one in rest:
         warn(f"{one.pid} is still running: {one.command}")

@@ -177,10 +177,10 @@ def graph_of_observers(
     """
     from tfcompose.compiler.draw import Arrow, Graph
 
-    edges = [one for observer in observers for one in observer.edges(observer.until_ns)]
-    children = {one.stream.child for one in edges}
+    edges = [edge for observer in observers for edge in observer.edges(observer.until_ns)]
+    children = {edge.stream.child for edge in edges}
     missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
-    arrows = [_arrow(one, poses=poses) for one in edges]
+    arrows = [_arrow(edge, poses=poses) for edge in edges]
     arrows += [
         Arrow(edge.parent, edge.child, edge.kind, owner=edge.node, detail="missing", pose="")
         for edge in missing

@@ -130,15 +130,16 @@ def codes(text: str) -> list[str]:
     from tfcompose.foundation.catalogue import CATALOGUE, absent_code
 
     beginnings = [one.strip() for one in text.split(",")]
-    for one in beginnings:
-        named = [CATALOGUE[code] for code in CATALOGUE if one and code.startswith(one)]
+    for beginning in beginnings:
+        named = [CATALOGUE[code] for code in CATALOGUE if beginning and code.startswith(beginning)]
         if not named:
             raise ArgumentTypeError(
-                absent_code(one) or f"there is no code {one}; tfcompose explain --table lists them"
+                absent_code(beginning)
+                or f"there is no code {beginning}; tfcompose explain --table lists them"
             )
         if not any(code.can_be_allowed for code in named):
             raise ArgumentTypeError(
-                f"{one} is reported always: without it a robot cannot be read or built"
+                f"{beginning} is reported always: without it a robot cannot be read or built"
             )
     return beginnings
 
@@ -193,7 +194,7 @@ def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[
     _print(cases, arguments, len(robots) + len(urdfs))
     if exit_code_of(found) == UNREADABLE:
         return UNREADABLE
-    return int(is_changed or any(one.severity in _failing(arguments) for one in found))
+    return int(is_changed or any(finding.severity in _failing(arguments) for finding in found))
 
 
 def _watch(arguments: Namespace, environment: Mapping[str, str]) -> int:
@@ -255,10 +256,12 @@ def _selected(found: list[Finding], arguments: Namespace) -> list[Finding]:
 
     select, ignore = tuple(arguments.select), tuple(arguments.ignore)
     return [
-        one
-        for one in found
-        if not CATALOGUE[one.code].can_be_allowed
-        or ((not select or one.code.startswith(select)) and not one.code.startswith(ignore))
+        finding
+        for finding in found
+        if not CATALOGUE[finding.code].can_be_allowed
+        or (
+            (not select or finding.code.startswith(select)) and not finding.code.startswith(ignore)
+        )
     ]
 
 

@@ -131,7 +131,7 @@ def other_plan(arguments: Namespace, plan: Plan) -> Plan | None:
 
 def _shape(plan: Plan) -> tuple[Mapping[str, str], Mapping[str, str]]:
     """Return the kinds of a plan's processes, and the owners of its edges."""
-    kinds = {one.name: one.kind for one in plan.processes}
+    kinds = {process.name: process.kind for process in plan.processes}
     return kinds, {edge.child: edge.owner for edge in plan.edges}
 
 
@@ -142,22 +142,23 @@ def of_other_plan(verdict: Verdict, running: Plan) -> Verdict:
     advice = "tfcompose verify --running compares with the plan that runs"
     nodes = [node for process in running.processes for node in process.nodes]
     found = list(verdict.found)
-    for index, one in enumerate(found):
-        if any(node in one.message for node in nodes):
-            found[index] = replace(one, help=advice)
+    for index, finding in enumerate(found):
+        if any(node in finding.message for node in nodes):
+            found[index] = replace(finding, help=advice)
     return replace(verdict, found=tuple(found))
 
 
 def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:
     """Print the verdicts and return the exit code."""
     failing = frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
-    found = [one for verdict in verdicts for one in verdict.found]
+    found = [finding for verdict in verdicts for finding in verdict.found]
     if arguments.format == "junit":
         from tfcompose.compiler.render.formats import render_junit
 
         holders = {None: "undeclared", "": "tree"}
         cases = [
-            (holders.get(one.owner) or str(one.owner), one.edge, one.found) for one in verdicts
+            (holders.get(verdict.owner) or str(verdict.owner), verdict.edge, verdict.found)
+            for verdict in verdicts
         ]
         sys.stdout.write(render_junit(plan.robot, cases, failing=failing, seconds=seconds))
     elif arguments.format == "json":
@@ -169,4 +170,4 @@ def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: 
 
         print_findings(found, sys.stdout)
         print(f"{plan.robot}: {summary(verdicts)}, in {arguments.bag or 'the running tree'}")
-    return int(any(one.severity in failing for one in found))
+    return int(any(finding.severity in failing for finding in found))

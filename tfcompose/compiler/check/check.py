@@ -122,11 +122,11 @@ def _at_shared_values(found: list[Finding]) -> list[Finding]:
     """
     by_place: dict[tuple[str, Span], list[Finding]] = {}
     single = []
-    for one in found:
-        if one.span is not None and one.code in _OF_VALUES:
-            by_place.setdefault((one.code, one.span), []).append(one)
+    for entry in found:
+        if entry.span is not None and entry.code in _OF_VALUES:
+            by_place.setdefault((entry.code, entry.span), []).append(entry)
         else:
-            single.append(one)
+            single.append(entry)
     shared = [
         replace(first, notes=(*first.notes, *(Note(other.message) for other in others)))
         for first, *others in by_place.values()
@@ -176,9 +176,9 @@ def silenced(
     ``rules`` holds for codes and names a severity, ``off``, or nothing, each with its place; an
     entry that is neither a code nor a name, or cannot be set, is a finding too.
     """
-    unknown = _unknown_rules({word: at for word, (_, at) in rules.items()})
+    unknown = _unknown_rules({name: at for name, (_, at) in rules.items()})
     return apply(
-        [*_with_severities(found, {word: level for word, (level, _) in rules.items()}), *unknown],
+        [*_with_severities(found, {name: level for name, (level, _) in rules.items()}), *unknown],
         allows,
     )
 
@@ -187,12 +187,12 @@ def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Findi
     """Return the findings that are not allowed, and the used comments with codes."""
     kept: list[Finding] = []
     used: Used = set()
-    for one in found:
-        allowing = [allow for allow in allows if _covers(allow, one)]
-        if allowing and can_be_allowed(one.code):
-            used.update((allow, one.code) for allow in allowing)
+    for entry in found:
+        allowing = [allow for allow in allows if _covers(allow, entry)]
+        if allowing and can_be_allowed(entry.code):
+            used.update((allow, entry.code) for allow in allowing)
         else:
-            kept.append(one)
+            kept.append(entry)
     return kept, used
 
 
@@ -203,29 +203,29 @@ def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list
     """
     levels = {
         code: level
-        for word, level in rules.items()
-        if (code := code_of(word)) and can_be_allowed(code)
+        for name, level in rules.items()
+        if (code := code_of(name)) and can_be_allowed(code)
     }
     result = []
-    for one in found:
-        match levels.get(one.code):
+    for entry in found:
+        match levels.get(entry.code):
             case "error" | "warning" as severity:
-                result.append(replace(one, severity=severity))
+                result.append(replace(entry, severity=severity))
             case None | "":  # as of an entry that sets a limit only
-                result.append(one)
+                result.append(entry)
     return result
 
 
 def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     """Return a finding for each entry of ``rules`` that is unknown or cannot be set."""
     found = []
-    for word, at in rules.items():
-        code = code_of(word)
+    for name, at in rules.items():
+        code = code_of(name)
         if code is None:
-            advice = absent_code(word) or did_you_mean(
-                word, similar_words(word), "write a code that lint prints, such as TF401"
+            advice = absent_code(name) or did_you_mean(
+                name, similar_words(name), "write a code that lint prints, such as TF401"
             )
-            found.append(finding("TF017", f"unknown code {word} under rules", at, help=advice))
+            found.append(finding("TF017", f"unknown code {name} under rules", at, help=advice))
         elif not can_be_allowed(code):
             found.append(
                 finding(

@@ -275,9 +275,9 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
         ]
         if wanted:
             wanted += [
-                (one.simulate.rate, f"{one.name} sends", one.at)
-                for one in robot.processes
-                if one.simulate and one.simulate.kind == "joints"
+                (process.simulate.rate, f"{process.name} sends", process.at)
+                for process in robot.processes
+                if process.simulate and process.simulate.kind == "joints"
             ]
         rate, what, at = max(wanted, default=(0.0, "", process.at), key=lambda each: each[0])
         if rate > most:

@@ -52,7 +52,9 @@ class _Views:
         if sensor.name not in self.of_sensors:
             is_placed = self.robot.links and _is_placed(self.robot, sensor)
             streams = different_streams(sensor) if is_placed else ()
-            self.of_sensors[sensor.name] = [view_of(self.around, sensor, one) for one in streams]
+            self.of_sensors[sensor.name] = [
+                view_of(self.around, sensor, stream) for stream in streams
+            ]
         return self.of_sensors[sensor.name]
 
 
@@ -116,9 +118,9 @@ def view_blocked(robot: Robot) -> Iterator[Finding]:
     limit = _limit(robot, "TF641")
     for sensor in robot.sensors:
         views = [
-            one
-            for one in _views(robot, sensor)
-            if not is_plane(one.optics) and not _sees_only_robot(robot, one)
+            view
+            for view in _views(robot, sensor)
+            if not is_plane(view.optics) and not _sees_only_robot(robot, view)
         ]
         worst = max(views, key=lambda one: one.blocked, default=None)
         if worst and worst.blocked > limit:
@@ -272,9 +274,9 @@ def _lowest(robot: Robot, name: str, pose: Pose, up: Vector) -> float:
 def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
     limit = _limit(robot, "TF645")
     active = [
-        (one, stream)
-        for one in robot.sensors
-        for stream in one.optics
+        (sensor, stream)
+        for sensor in robot.sensors
+        for stream in sensor.optics
         if stream.active and _is_light(stream)
     ]
     around = _views_of(robot).around

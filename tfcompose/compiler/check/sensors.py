@@ -369,7 +369,9 @@ def _addresses_used_twice(robot: Robot, found: set[str]) -> Iterator[Finding]:
 
 def _addresses(process: Process) -> dict[str, str]:
     """Return what the process's parameters and arguments say about where its device is."""
-    words = [match.groups() for word in process.argv if (match := _ARGUMENT.fullmatch(word))]
+    words = [
+        match.groups() for argument in process.argv if (match := _ARGUMENT.fullmatch(argument))
+    ]
     given = [*words, *((process.ros_nodes[0].flat_params if process.ros_nodes else {}).items())]
     named = ((key.rpartition(".")[2], str(value)) for key, value in given)
     return {key: value for key, value in named if value and _ADDRESSES.fullmatch(key)}

@@ -56,7 +56,9 @@ def _of_static_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     known = {robot.final(frame): frame for frame in robot.frames}
     parent, child = (known.get(name, name) for name in names)
     edge = robot.parent_edge(child)
-    if robot.excuses(child) or (edge and edge.owner not in {one.name for one in robot.processes}):
+    if robot.excuses(child) or (
+        edge and edge.owner not in {process.name for process in robot.processes}
+    ):
         return  # it was refused, or its owner was
     if edge is None:
         message = f"{process.name} publishes {parent} → {child}, which is not declared"

@@ -160,13 +160,13 @@ def _placed(
                 places[frame] = replace(place, x=place.x + shift, y=place.y + fall)
             areas += (
                 replace(
-                    one,
-                    x=one.x + shift,
-                    right=one.right + shift,
-                    top=one.top + fall,
-                    bottom=one.bottom + fall,
+                    area,
+                    x=area.x + shift,
+                    right=area.right + shift,
+                    top=area.top + fall,
+                    bottom=area.bottom + fall,
                 )
-                for one in block.areas
+                for area in block.areas
             )
             y += block.height
         height = max(height, y - ROW_GAP)

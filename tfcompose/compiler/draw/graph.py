@@ -100,7 +100,7 @@ def collapsed(graph: Graph) -> Graph:
         detail = f"{arrow.detail} +{count}".strip() if count else arrow.detail
         arrows.append(replace(arrow, detail=detail))
     groups = tuple(
-        replace(group, frames=tuple(one for one in group.frames if one in needed))
+        replace(group, frames=tuple(frame for frame in group.frames if frame in needed))
         for group in graph.groups
     )
     return replace(
@@ -143,7 +143,7 @@ def forest_of(graph: Graph) -> Forest:
 
     Children of the same group as their parent come first, so that a group stays together.
     """
-    group = {frame: index for index, one in enumerate(graph.groups) for frame in one.frames}
+    group = {frame: index for index, group in enumerate(graph.groups) for frame in group.frames}
     frames = graph.all_frames()
     first: dict[str, Arrow] = {}
     for arrow in graph.arrows:
@@ -158,7 +158,7 @@ def forest_of(graph: Graph) -> Forest:
             children.sort(key=lambda child, mine=mine: group.get(child) != mine)  # type: ignore[misc]
     order, up = _walk(frames, first, below)
     kept = {
-        child: [one for one in children if up.get(one) is first[one]]
+        child: [child for child in children if up.get(child) is first[child]]
         for child, children in below.items()
     }
     extra = tuple(arrow for arrow in graph.arrows if up.get(arrow.child) is not arrow)

@@ -179,7 +179,7 @@ def _at(target: Target, process: PlanProcess) -> PlanProcess:
     cwd = process.cwd and placed(process.cwd)
     return replace(
         process,
-        argv=tuple(placed(word) for word in process.argv),
+        argv=tuple(placed(argument) for argument in process.argv),
         env=env,
         cwd=cwd,
         component=component,

@@ -29,19 +29,19 @@ _FLAT_RAD = 1e-6
 def different_streams(sensor: MountedSensor) -> Iterator[Optics]:
     """Yield the sensor's streams; of those that see the same from the same frame, the first."""
     known = set()
-    for one in sensor.optics:
+    for stream in sensor.optics:
         sight = (
-            one.frame,
-            one.kind,
-            one.projection,
-            one.backward,
-            one.horizontal,
-            one.vertical,
-            one.diagonal,
+            stream.frame,
+            stream.kind,
+            stream.projection,
+            stream.backward,
+            stream.horizontal,
+            stream.vertical,
+            stream.diagonal,
         )
         if sight not in known:
             known.add(sight)
-            yield one
+            yield stream
 
 
 def is_plane(optics: Optics) -> bool:

@@ -38,7 +38,7 @@ def distances(
     )
     if len(where):
         np.minimum.at(found, rays, np.linalg.norm(where - origins[rays], axis=1))
-    return [float(one) for one in found]
+    return [float(distance) for distance in found]
 
 
 def sphere_around(path: str, scale: Vector) -> tuple[Vector, float]:

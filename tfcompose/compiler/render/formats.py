@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def render_json(found: Sequence[Finding]) -> str:
     """Return the findings as a JSON list; a place that is not known is null."""
-    return json.dumps([_entry(one) for one in found], indent=2, ensure_ascii=False) + "\n"
+    return json.dumps([_entry(finding) for finding in found], indent=2, ensure_ascii=False) + "\n"
 
 
 def _entry(found: Finding) -> dict[str, Any]:
@@ -47,7 +47,7 @@ def _place(span: Span | None) -> dict[str, Any]:
 
 def render_github(found: Sequence[Finding]) -> str:
     """Return the findings as workflow commands."""
-    return "".join(_annotation(one) for one in found)
+    return "".join(_annotation(finding) for finding in found)
 
 
 def _annotation(found: Finding) -> str:
@@ -79,7 +79,7 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 def render_sarif(found: Sequence[Finding], version: str) -> str:
     """Return the findings as one run of tfcompose, with the page of each code."""
-    codes = sorted({one.code for one in found})
+    codes = sorted({finding.code for finding in found})
     run = {
         "tool": {
             "driver": {
@@ -89,7 +89,7 @@ def render_sarif(found: Sequence[Finding], version: str) -> str:
             }
         },
         "columnKind": "unicodeCodePoints",
-        "results": [_result(one, codes.index(one.code)) for one in found],
+        "results": [_result(finding, codes.index(finding.code)) for finding in found],
     }
     return (
         json.dumps(
@@ -172,14 +172,14 @@ def render_junit(
     rows, failed, count = [], 0, 0
     for group, name, found in cases:
         count += 1
-        fatal = [one for one in found if one.severity in failing]
+        fatal = [finding for finding in found if finding.severity in failing]
         failed += bool(fatal)
         body = "".join(
             f'    <failure type="{one.code}"'
             f' message="{_xml(one.message)}">{_xml(_details(one))}</failure>\n'
             for one in fatal[:1]
         )
-        others = [*fatal[1:], *(one for one in found if one not in fatal)]
+        others = [*fatal[1:], *(finding for finding in found if finding not in fatal)]
         if others:
             body += f"    <system-out>{_xml(chr(10).join(map(_details, others)))}</system-out>\n"
         head = f'  <testcase classname="{_xml(f"{suite}.{group}")}" name="{_xml(name)}" time="0"'

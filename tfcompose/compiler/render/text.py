@@ -32,7 +32,7 @@ def render_text(
 
     ``line_of`` returns a line of a file (from 1), or None if it cannot be read.
     """
-    return "".join(_one(one, line_of, _Paint(colour=colour)) for one in found)
+    return "".join(_one(finding, line_of, _Paint(colour=colour)) for finding in found)
 
 
 class _Paint:
@@ -89,11 +89,11 @@ def _excerpt(
 
 def summary(found: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
     """Return the last line: counts of findings and files, and why warnings exit 0."""
-    errors = sum(one.severity == "error" for one in found)
+    errors = sum(finding.severity == "error" for finding in found)
     warnings = len(found) - errors
     where = f"in {counted(files, 'file')}"
     if not found:
         return f"no findings {where}\n"
-    parts = [counted(n, word) for n, word in ((errors, "error"), (warnings, "warning")) if n]
+    parts = [counted(n, noun) for n, noun in ((errors, "error"), (warnings, "warning")) if n]
     exits = "" if errors or warnings_fail else " (exit code 0; --fail-on warning makes it 1)"
     return f"{' and '.join(parts)} {where}{exits}\n"

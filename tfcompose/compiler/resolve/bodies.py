@@ -200,7 +200,9 @@ def with_colours(links: dict[str, Link]) -> dict[str, Link]:
         if material.name in COLOURS:
             known.setdefault(material.name, replace(material, rgba=(*COLOURS[material.name], 1.0)))
     bare = {
-        one.name for one in materials(links) if not (one.rgba or one.texture) and one.name in known
+        material.name
+        for material in materials(links)
+        if not (material.rgba or material.texture) and material.name in known
     }
     return {name: _coloured(link, known, bare) for name, link in links.items()} if bare else links
 

@@ -102,14 +102,14 @@ def _matches(
     Those the other way round only if there is none.
     """
     straight = [
-        _Match(one, inverted=False)
-        for one in entries
-        if one.parent in parents and one.child in children
+        _Match(entry, inverted=False)
+        for entry in entries
+        if entry.parent in parents and entry.child in children
     ]
     turned = [
-        _Match(one, inverted=True)
-        for one in entries
-        if one.child in parents and one.parent in children
+        _Match(entry, inverted=True)
+        for entry in entries
+        if entry.child in parents and entry.parent in children
     ]
     return list({(one.names, one.entry.pose): one for one in straight or turned}.values())
 
@@ -146,7 +146,7 @@ class _Calibrations:
         self, index: int, declared: CalibrationSpec, file: CalibrationFile, at: Span
     ) -> _Match | None:
         own_parents, inside = self._around(index)
-        nameless = [one for one in file.entries if one.parent is None]
+        nameless = [entry for entry in file.entries if entry.parent is None]
         if nameless:
             return _Match(
                 nameless[0], inverted=declared.parent in inside or declared.child in own_parents
@@ -180,7 +180,7 @@ class _Calibrations:
             ),
             None,
         )
-        shown = [one for one in file.entries if near in {one.child, one.parent}] or list(
+        shown = [entry for entry in file.entries if near in {entry.child, entry.parent}] or list(
             file.entries
         )
         notes = [Note(f"{entry.name} is defined here", entry.at) for entry in shown[:1]]
@@ -193,8 +193,10 @@ class _Calibrations:
         self.found.append(finding("TF612", message, at, help=advice, notes=notes))
 
     def _ambiguous(self, message: str, at: Span, matches: Sequence[_Match]) -> None:
-        notes = [Note(f"{one.entry.name} is defined here", one.entry.at) for one in matches[:4]]
-        names = {one.entry.name for one in matches}
+        notes = [
+            Note(f"{match.entry.name} is defined here", match.entry.at) for match in matches[:4]
+        ]
+        names = {match.entry.name for match in matches}
         advice = (
             "pick one with child: and parent:"
             if len(names) > 1

@@ -63,7 +63,7 @@ class _Claims:
         }:
             return process
         claimants = [self._node(process, node) for node in process.ros_nodes]
-        if all(one is not None for one in claimants):
+        if all(claimant is not None for claimant in claimants):
             self.known.add(process.name)
         nodes = []
         for node, claimant in zip(process.ros_nodes, claimants, strict=True):

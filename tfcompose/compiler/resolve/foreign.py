@@ -88,7 +88,9 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     )
     digest = hashlib.sha256(text.encode()).hexdigest()
     found = [
-        one for one in (*converted.of_elements, *converted.of_blocks) if one.severity == "error"
+        finding
+        for finding in (*converted.of_elements, *converted.of_blocks)
+        if finding.severity == "error"
     ]
     found += converted.of_files
     robot = replace(
@@ -236,7 +238,8 @@ def _refuse_broken(name: str, text: str, at: Span) -> None:
         read_block(text, at.file)
     except RejectedError as error:
         found = (
-            replace(one, span=at, message=f"block {name}: {one.message}") for one in error.findings
+            replace(finding, span=at, message=f"block {name}: {finding.message}")
+            for finding in error.findings
         )
         raise RejectedError(found) from None
 

@@ -20,14 +20,14 @@ def hosts_of(spec: RobotSpec) -> dict[str, Host]:
     """
     return {
         name: Host(
-            one.ssh or name,
-            one.port,
-            one.python,
-            one.setup,
-            one.node_selector,
+            host.ssh or name,
+            host.port,
+            host.python,
+            host.setup,
+            host.node_selector,
             at=spec.at_key(("hosts", name)),
         )
-        for name, one in spec.hosts.items()
+        for name, host in spec.hosts.items()
     }
 
 

@@ -48,8 +48,8 @@ def own_router(spec: RobotSpec) -> list[Process]:
     """Return the Zenoh router's process, unless the robot has one or needs none."""
     declared = spec.processes.get(ROUTER)
     runs_it = any(
-        one.run and (one.run.package, one.run.executable) == _PROGRAM
-        for one in spec.processes.values()
+        process.run and (process.run.package, process.run.executable) == _PROGRAM
+        for process in spec.processes.values()
     )
     if not is_own_router(ROUTER, declared, spec) or (runs_it and not declared):
         return []
@@ -94,9 +94,9 @@ def _with_router(robot: Robot) -> Robot:
 
 def _routers(robot: Robot) -> list[Process]:
     return [
-        one
-        for one in robot.processes
-        if one.name == ROUTER or (one.package, one.executable) == _PROGRAM
+        process
+        for process in robot.processes
+        if process.name == ROUTER or (process.package, process.executable) == _PROGRAM
     ]
 
 
@@ -170,7 +170,7 @@ def _wrong_routers(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:
     if not routers or robot.ros.router:
         return
     router = routers[0]
-    static = next((one.host for one in robot.processes if one.name == STATIC), None)
+    static = next((process.host for process in robot.processes if process.name == STATIC), None)
     home = router.host or static
     hosts = dict.fromkeys(
         process.host or static

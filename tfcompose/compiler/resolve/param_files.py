@@ -145,9 +145,11 @@ class _ParamFiles:
             text = self.draft.read(path)
             loaded = load_params(text, path)
         except RejectedError as error:
-            self.found += [replace(one, notes=(*one.notes, note)) for one in error.findings]
+            self.found += [
+                replace(finding, notes=(*finding.notes, note)) for finding in error.findings
+            ]
             return None
-        self.found += [replace(one, notes=(*one.notes, note)) for one in loaded.found]
+        self.found += [replace(finding, notes=(*finding.notes, note)) for finding in loaded.found]
         self.digests[path] = hashlib.sha256(text.encode()).hexdigest()
         self._known[path] = loaded
         return path, loaded
@@ -159,8 +161,8 @@ _ANY = "/**"
 
 def _add_sections(sections: dict[str, dict[str, Any]], content: ParamsFile) -> None:
     """Add a file's sections as rcl does: each name keeps the place where it came first."""
-    for one in content.nodes:
-        sections[one.name] = _laid_over(sections.get(one.name, {}), one.params)
+    for node in content.nodes:
+        sections[node.name] = _laid_over(sections.get(node.name, {}), node.params)
 
 
 def _nothing(

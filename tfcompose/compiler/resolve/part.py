@@ -201,10 +201,14 @@ def subtree(robot: Robot, root: str) -> Robot:
         links={name: link for name, link in robot.links.items() if name in frames},
         processes=tuple(process for process in robot.processes if process.name not in unused),
         claims=tuple(
-            one for one in robot.claims if {one.parent, one.child} <= frames or one.child == root
+            claim
+            for claim in robot.claims
+            if {claim.parent, claim.child} <= frames or claim.child == root
         ),
         sensors=sensors,
         base=root,
         hardware=tuple(filter(None, (with_joints(one, joints) for one in robot.hardware))),
-        blocks=tuple(filter(None, (within(one, robot, frames, joints) for one in robot.blocks))),
+        blocks=tuple(
+            filter(None, (within(block, robot, frames, joints) for block in robot.blocks))
+        ),
     )

@@ -66,14 +66,14 @@ def _robot_of(part: PartEntry, draft: Draft, resolve: Resolve) -> tuple[Robot, f
         if part.declared.spec is not None:
             validated = _validated(part, part.declared.spec, draft, draft.read)
             inner, findings = resolve(validated, draft.library, draft.read, draft.disk, draft)
-            part.found += [_noted(one, part) for one in (*validated.found, *findings)]
+            part.found += [_noted(finding, part) for finding in (*validated.found, *findings)]
             return inner.robot, frozenset()
         made = foreign(part, draft.packages, draft.read)
     except RejectedError as error:
-        raise RejectedError([_noted(one, part) for one in error.findings]) from None
+        raise RejectedError([_noted(finding, part) for finding in error.findings]) from None
     for file in made.files:
         draft.collected.notes.setdefault(file, []).append(_note(part))
-    part.found += [_noted(one, part) for one in made.found]
+    part.found += [_noted(finding, part) for finding in made.found]
     return made.robot, made.implied
 
 

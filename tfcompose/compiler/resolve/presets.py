@@ -139,7 +139,7 @@ _OWN = "tfcompose help presets shows how to write one"
 def _no_preset(name: str, library: Library, span: Span) -> Finding:
     names = library.names
     vendor = name.partition("/")[0]
-    same = [one for one in names if one.startswith(f"{vendor}/")]
+    same = [name for name in names if name.startswith(f"{vendor}/")]
     there = (
         f"of {vendor} there is {', '.join(same)}"
         if same

@@ -229,7 +229,7 @@ def check_launch_nodes(draft: Draft) -> Iterator[Finding]:
             yield finding("TF332", message, edge.owner_at or edge.at, help=advice)
 
 
-_FIELDS = frozenset(one.name for one in fields(Process) if one.init)
+_FIELDS = frozenset(field.name for field in fields(Process) if field.init)
 
 
 def how(declared: StartedSpec | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:

@@ -82,7 +82,7 @@ def renamed(robot: Robot, names: Names) -> Robot:
         hardware=tuple(_hardware(hardware, names, again) for hardware in robot.hardware),
         blocks=tuple(_blocks(robot, names)),
         zones=tuple(_zone(zone, robot, names) for zone in robot.zones),
-        source_numbers=tuple(_numbers(one, names) for one in robot.source_numbers),
+        source_numbers=tuple(_numbers(number, names) for number in robot.source_numbers),
     )
 
 
@@ -138,8 +138,10 @@ def _joint(joint: Joint, names: Names) -> Joint:
 def _hardware(hardware: Hardware, names: Names, again: dict[str, str]) -> Hardware:
     """Return the hardware with sensors and gpios under names that no other part has."""
     inside = (
-        replace(one, name=names.joint(one.name), params=_params(one.params, again))
-        for one in hardware.components
+        replace(
+            component, name=names.joint(component.name), params=_params(component.params, again)
+        )
+        for component in hardware.components
     )
     params = _params(hardware.params, again)
     return replace(
@@ -204,7 +206,7 @@ def _sensor(sensor: MountedSensor, names: Names) -> MountedSensor:
         frames=tuple(map(names.frame, sensor.frames)),
         driver_frames=tuple(map(names.frame, sensor.driver_frames)),
         driver=names.process(sensor.driver) if sensor.driver else "",
-        optics=tuple(replace(one, frame=names.frame(one.frame)) for one in sensor.optics),
+        optics=tuple(replace(stream, frame=names.frame(stream.frame)) for stream in sensor.optics),
     )
 
 

@@ -29,11 +29,11 @@ _KINDS = {
 def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
     """Return the limits that the file sets, in SI by code."""
     limits = {}
-    for word, setting in spec.rules.items():
-        code = code_of(word)
+    for name, setting in spec.rules.items():
+        code = code_of(name)
         if code is None or not isinstance(setting, RuleSpec) or setting.limit is None:
             continue
-        place = spec.at(("rules", word, "limit"))
+        place = spec.at(("rules", name, "limit"))
         known = CATALOGUE[code].limit
         if known is None:
             others = ", ".join(one.code for one in CATALOGUE.values() if one.limit)

@@ -182,8 +182,12 @@ def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
 
     None where it had some, and none is left.
     """
-    left = tuple(one for one in hardware.components if one.kind != "joint" or one.name in joints)
-    had_joints = any(one.kind == "joint" for one in hardware.components)
+    left = tuple(
+        component
+        for component in hardware.components
+        if component.kind != "joint" or component.name in joints
+    )
+    had_joints = any(component.kind == "joint" for component in hardware.components)
     return (
         replace(hardware, components=left)
         if not had_joints or any(one.kind == "joint" for one in left)
@@ -243,11 +247,11 @@ def _hardware(element: Element, block: Block) -> Hardware:
     plugin = inner.all("plugin")[0]
     places = dict(zip(map(id, element.walk()), block.places, strict=True))
     components = [
-        replace(_component(one), at=places[id(one)])
-        for one in element.children
-        if one.tag in _KINDS
+        replace(_component(child), at=places[id(child)])
+        for child in element.children
+        if child.tag in _KINDS
     ]
-    if len({(one.kind, one.name) for one in components}) != len(components):
+    if len({(component.kind, component.name) for component in components}) != len(components):
         raise _UnsupportedError
     _only(plugin)
     return Hardware(
@@ -266,7 +270,7 @@ def _component(element: Element) -> HardwareComponent:
     attributes = _only(element, "name", tags=("param", *_INTERFACES))
     command, state = (tuple(_interface(one) for one in element.all(tag)) for tag in _INTERFACES)
     for interfaces in (command, state):
-        if len({one.name for one in interfaces}) != len(interfaces):
+        if len({interface.name for interface in interfaces}) != len(interfaces):
             raise _UnsupportedError
     return HardwareComponent(
         element.tag,

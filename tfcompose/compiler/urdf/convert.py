@@ -124,7 +124,11 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
     frames = {link: element.at_value("name") for link, element in links.items()}
     names = {edge.joint_name: None for edge in edges}
     referring = (element for element in root.children if element.tag in REFERRING)
-    unknown = (one for element in referring for one in unknown_references(element, frames, names))
+    unknown = (
+        reference
+        for element in referring
+        for reference in unknown_references(element, frames, names)
+    )
     robot = Robot(
         name=name,
         file=file,
@@ -429,7 +433,7 @@ class _Bodies:
 
     @cached_property
     def _described_names(self) -> list[str]:
-        return [name for name, (one, *_) in self._elements.items() if one.children]
+        return [name for name, (element, *_) in self._elements.items() if element.children]
 
     def _named(self, name: str) -> Material | None:
         if name not in self._materials:

@@ -380,7 +380,7 @@ def _placed(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Findi
         begins = [
             *begins,
             *((macro.file, macro.line) for _, macro in inner),
-            *((one, 0) for one in stop.files[::-1]),
+            *((file, 0) for file in stop.files[::-1]),
         ]
         busy = _mark(*stop.at) if stop.at else found.span
         at = next(

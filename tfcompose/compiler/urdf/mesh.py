@@ -76,7 +76,7 @@ def _facing_alike(mesh: Any) -> Any:
     outward = np.sign(volumes[np.abs(volumes).argmax()])
     others = np.flatnonzero(volumes * outward < 0)
     solid = corners[volumes[body] * outward > 0]
-    apart = [one for one in others if not _is_within(corners[body == one][0, 0], solid)]
+    apart = [other for other in others if not _is_within(corners[body == other][0, 0], solid)]
     if not apart:
         return mesh
     turned, faces = np.isin(body, apart), mesh.faces.copy()

@@ -172,10 +172,12 @@ def _of_link(
         if len(found) != len(meant):
             yield f"it has {len(found)} {tag} elements, not {len(meant)}"
             continue
-        for one, (shape, (kind, values, pose)) in zip(found, meant, strict=True):
-            if _form(getattr(one.geometry, kind)) != values or _is_moved(one.origin, pose):
+        for element, (shape, (kind, values, pose)) in zip(found, meant, strict=True):
+            if _form(getattr(element.geometry, kind)) != values or _is_moved(element.origin, pose):
                 yield f"a {kind} of its {tag} differs"
-            if tag == "visual" and _paint(one.material) != _meant_paint(shape.material, target):
+            if tag == "visual" and _paint(element.material) != _meant_paint(
+                shape.material, target
+            ):
                 yield f"the material of a {kind} differs"
 
 

@@ -210,7 +210,9 @@ class UrdfWriter:
         for tag, values in named:
             if values:
                 lines.append(
-                    _element(tag, {one.name: getattr(values, one.name) for one in fields(values)})
+                    _element(
+                        tag, {field.name: getattr(values, field.name) for field in fields(values)}
+                    )
                 )
         if mimic is not None:
             multiplier, offset = number(joint.multiplier), number(joint.offset)

@@ -365,7 +365,7 @@ def _reason(chain: list[Any]) -> str:
     if isinstance(root, OSError):
         words = [f"{root.strerror}: {root.filename}"]
     else:
-        heads = [str(one.args[0]) for one in chain[:-1] if one.args and one.args[0]]
+        heads = [str(error.args[0]) for error in chain[:-1] if error.args and error.args[0]]
         own = (
             str(root)
             if hasattr(root, "suffix") or "line" in str(root)
@@ -378,9 +378,9 @@ def _reason(chain: list[Any]) -> str:
 
 def _suffixes(chain: list[Any]) -> list[str]:
     return [
-        " ".join(str(one.suffix).split())
-        for one in reversed(chain[:-1])
-        if getattr(one, "suffix", None)
+        " ".join(str(error.suffix).split())
+        for error in reversed(chain[:-1])
+        if getattr(error, "suffix", None)
     ]
 
 

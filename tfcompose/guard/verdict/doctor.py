@@ -89,7 +89,7 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
 
 def diagnose(state: TreeState) -> list[Finding]:
     """Return everything that is wrong, errors first, else in the order of the checks."""
-    found = [one for diagnosis in DIAGNOSES for one in diagnosis(state)]
+    found = [finding for diagnosis in DIAGNOSES for finding in diagnosis(state)]
     return sorted(dict.fromkeys(found), key=lambda one: one.severity)
 
 

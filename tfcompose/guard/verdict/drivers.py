@@ -241,7 +241,7 @@ def _not_taken(
     node: str, name: str, wanted: Value, found: Value | None, drives: tuple[Driven, ...]
 ) -> Finding:
     plan = f"the plan wrote {name}: {json.dumps(wanted)}"
-    of = "".join(f" for {one.sensor} ({one.preset})" for one in drives[:1])
+    of = "".join(f" for {drive.sensor} ({drive.preset})" for drive in drives[:1])
     if found is None:
         advice = (
             "is it a version of the node that has another switch, or another node of that name?"

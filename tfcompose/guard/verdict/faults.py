@@ -205,7 +205,9 @@ def fault_finding(group: FaultGroup, place: Span | None = None) -> Finding:
 
 
 def _not_owner(group: FaultGroup) -> tuple[str, str]:
-    owners = {f"{one.edge.owner} ({one.edge.node})": None for one in group.faults if one.edge}
+    owners = {
+        f"{fault.edge.owner} ({fault.edge.node})": None for fault in group.faults if fault.edge
+    }
     verb = "the owner is" if len(owners) == 1 else "the owners are"
     message = f"{group.edges} {group.are} published by {group.first.who}; {verb} "
     return message + ", ".join(owners), _leave_out_help(group)

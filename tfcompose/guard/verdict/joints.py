@@ -149,7 +149,7 @@ def _namespace(topic: str) -> str:
 
 
 def _transformers(state: TreeState, topic: TopicState) -> list[str]:
-    writers = {one.node for one in state.publishers if one.node}
+    writers = {publisher.node for publisher in state.publishers if publisher.node}
     return [node for node in topic.readers if node in writers]
 
 

@@ -82,7 +82,7 @@ def flood(node: str, where: str, transforms: int, hertz: float | None) -> Findin
 
 def flooded(state: TreeState) -> Iterator[Finding]:
     """A node publishes more edges than are kept."""
-    named = {one.gid: one for one in state.publishers}
+    named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.beyond.items():
         one = named.get(gid) if gid is not None else None
         node = one.node if one and one.node else NAMELESS
@@ -254,19 +254,24 @@ def both_topics(state: TreeState) -> Iterator[Finding]:
 
 def volatile_static(state: TreeState) -> Iterator[Finding]:
     """Fixed frames are sent so that no listener can receive them."""
-    for one in state.publishers:
-        if one.static and not one.latched and one.node and one.type in {"", TF_MESSAGE}:
+    for publisher in state.publishers:
+        if (
+            publisher.static
+            and not publisher.latched
+            and publisher.node
+            and publisher.type in {"", TF_MESSAGE}
+        ):
             owned = (
-                [edge.name for edge in state.plan.edges if edge.node == one.node]
+                [edge.name for edge in state.plan.edges if edge.node == publisher.node]
                 if state.plan
                 else []
             )
-            yield volatile_publisher(one.node, one.topic or state.topics[1], owned)
+            yield volatile_publisher(publisher.node, publisher.topic or state.topics[1], owned)
 
 
 def volatile_reader(state: TreeState) -> Iterator[Finding]:
     """A node listens to fixed frames so that it misses those that were sent before it came."""
-    if state.volatile_readers and any(one.static for one in state.publishers):
+    if state.volatile_readers and any(publisher.static for publisher in state.publishers):
         listen = "listens" if len(state.volatile_readers) == 1 else "listen"
         message = (
             f"{listed(state.volatile_readers)} {listen} to {state.topics[1]} with durability"
@@ -282,9 +287,11 @@ def volatile_reader(state: TreeState) -> Iterator[Finding]:
 
 def best_effort(state: TreeState) -> Iterator[Finding]:
     """Frames are sent best effort, and listeners ask for reliable."""
-    for one in state.publishers:
-        if not one.reliable and one.node and one.type in {"", TF_MESSAGE}:
-            yield best_effort_publisher(one.node, one.topic or state.topics[one.static])
+    for publisher in state.publishers:
+        if not publisher.reliable and publisher.node and publisher.type in {"", TF_MESSAGE}:
+            yield best_effort_publisher(
+                publisher.node, publisher.topic or state.topics[publisher.static]
+            )
 
 
 def other_type(state: TreeState) -> Iterator[Finding]:
@@ -306,7 +313,7 @@ def other_type(state: TreeState) -> Iterator[Finding]:
 
 def unreadable(state: TreeState) -> Iterator[Finding]:
     """Bytes come that are no TFMessage."""
-    named = {one.gid: one for one in state.publishers}
+    named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.malformed.items():
         one = named.get(gid) if gid is not None else None
         node, topic = (
@@ -325,7 +332,7 @@ def unreadable(state: TreeState) -> Iterator[Finding]:
 
 def many_static(state: TreeState) -> Iterator[Finding]:
     """So many nodes publish fixed frames that listeners lose some."""
-    fixed = [one for one in state.publishers if one.static]
+    fixed = [publisher for publisher in state.publishers if publisher.static]
     if len(fixed) >= MOST_STATIC:
         nodes = sorted({one.node for one in fixed if one.node})
         message = (

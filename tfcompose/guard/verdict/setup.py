@@ -101,7 +101,9 @@ def other_settings(state: TreeState) -> Iterator[Finding]:
             f" {', '.join(settings)}, "
         )
         message += f"and here {' and '.join(here)}"
-        notes = [Note(f"pid {one.pid}: {one.command}") for one in processes[:MOST_PROCESSES]]
+        notes = [
+            Note(f"pid {process.pid}: {process.command}") for process in processes[:MOST_PROCESSES]
+        ]
         more = len(processes) - len(notes)
         notes += [Note(f"and {more} more")] if more else []
         advice = (

@@ -323,13 +323,13 @@ def _stamp_finding(
 def host_clock_off(state: TreeState) -> Iterator[Finding]:
     """The clock of another machine is not this one's."""
     machines: dict[tuple[bool, str], tuple[float, list[str]]] = {}
-    for one in state.publishers:
-        skew = state.skews_s.get(one.gid)
-        if skew is None or -SLOW_S < skew < SKEW_S or not one.node:
+    for publisher in state.publishers:
+        skew = state.skews_s.get(publisher.gid)
+        if skew is None or -SLOW_S < skew < SKEW_S or not publisher.node:
             continue
-        known = machines.setdefault((skew > 0, one.where), (skew, []))[1]
-        if one.node not in known:
-            known.append(one.node)
+        known = machines.setdefault((skew > 0, publisher.where), (skew, []))[1]
+        if publisher.node not in known:
+            known.append(publisher.node)
     for (ahead, where), (skew, nodes) in machines.items():
         there = f" {where}" if where else ""
         if ahead:

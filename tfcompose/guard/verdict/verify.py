@@ -97,7 +97,7 @@ class _Comparison:
     def __post_init__(self) -> None:
         self._relays = relays_of(self.plan)
         present = {
-            node for one in self.state.edges if one.present is not False for node in one.nodes
+            node for edge in self.state.edges if edge.present is not False for node in edge.nodes
         }
         others = stand_ins(self.plan)
         # The stock nodes that may send an edge in its owner's place, where that is not there; by
@@ -111,8 +111,8 @@ class _Comparison:
     @cached_property
     def by_child(self) -> dict[str, list[EdgeState]]:
         found: dict[str, list[EdgeState]] = {}
-        for one in self.state.edges:
-            found.setdefault(one.child, []).append(one)
+        for edge in self.state.edges:
+            found.setdefault(edge.child, []).append(edge)
         return found
 
     @cached_property
@@ -141,11 +141,11 @@ class _Comparison:
 
     def undeclared(self) -> Iterator[Difference]:
         planned = {edge.child for edge in self.plan.edges}
-        for one in self.state.edges:
-            stream = one.stream
+        for edge in self.state.edges:
+            stream = edge.stream
             if stream.child in planned or self.plan.may_be_undeclared(stream.parent, stream.child):
                 continue
-            yield self._faulty("TF803", None, one)
+            yield self._faulty("TF803", None, edge)
 
     def _fault(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
         stream = one.stream
@@ -191,9 +191,9 @@ class _Comparison:
             if one.nodes == (edge.node,) and one.present and edge.may_hang_on(one.parent):
                 namesakes.setdefault(one.stream.gid, one)
         of_kind = [
-            one
-            for one in namesakes.values()
-            if one.stream.static == next(iter(namesakes.values())).stream.static
+            namesake
+            for namesake in namesakes.values()
+            if namesake.stream.static == next(iter(namesakes.values())).stream.static
         ]
         for other in of_kind[1:]:
             yield self._faulty("TF801", edge, other, namesake=True)
@@ -257,8 +257,8 @@ def _times(edge: PlanEdge, one: EdgeState, *, simulated: bool) -> Iterator[Diffe
 
 def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
     """Return what to do about an edge that never came."""
-    planned = {one.child for one in plan.edges}
-    strangers = [one.child for one in state.edges if one.child not in planned]
+    planned = {edge.child for edge in plan.edges}
+    strangers = [edge.child for edge in state.edges if edge.child not in planned]
     meant = did_you_mean(edge.child, strangers)
     if meant or state.recorded:
         return meant
@@ -282,8 +282,8 @@ def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
 def grouped(found: Iterable[Difference]) -> list[list[Difference]]:
     """Return those that are reported together, in the order in which the first of each came."""
     groups: dict[tuple[object, ...], list[Difference]] = {}
-    for one in found:
-        groups.setdefault(_key(one), []).append(one)
+    for finding in found:
+        groups.setdefault(_key(finding), []).append(finding)
     return list(groups.values())
 
 
@@ -373,9 +373,9 @@ def _fault_finding(group: Group, state: TreeState, plan: Plan, place: Span | Non
         return found
     gids = {one.live.stream.gid for one in group if one.live}
     others = [
-        one
-        for one in state.publishers
-        if one.node in faults[0].nodes and one.gid not in gids and one.where
+        publisher
+        for publisher in state.publishers
+        if publisher.node in faults[0].nodes and publisher.gid not in gids and publisher.where
     ]
     notes = [Note(f"{one.node} runs {one.where}") for one in others]
     return replace(found, notes=(*found.notes, *dict.fromkeys(notes)))
@@ -411,7 +411,7 @@ def differs_from_plan(state: TreeState) -> Iterator[Finding]:
     if state.plan is None or not (state.edges or state.publishers):
         return  # nobody publishes at all, which is another finding
     found = [
-        one for one in differences(state, state.plan) if one.code != SELF
+        difference for difference in differences(state, state.plan) if difference.code != SELF
     ]  # found for every edge, planned or not
     for group in grouped(found):
         yield group_finding(group, state, state.plan)
@@ -447,14 +447,14 @@ def verify(
             if edge.child in found:
                 found[edge.child] += rejected_transforms(edge)
                 found[edge.child] += _wrong_times(edge, state, part)
-        for one in differences(state, part, tolerance):
+        for difference in differences(state, part, tolerance):
             # The parts of a plan differ in their edges only; a process is looked up in the whole.
-            place = (places or {}).get(one.edge.child) if one.edge else None
-            reported = group_finding([one], state, plan, place, slow_is="error")
-            if one.edge is None and one.live is not None:
-                extra.append(Verdict(one.live.name, None, (reported,)))
-            elif one.edge is not None:
-                found[one.edge.child].append(reported)
+            place = (places or {}).get(difference.edge.child) if difference.edge else None
+            reported = group_finding([difference], state, plan, place, slow_is="error")
+            if difference.edge is None and difference.live is not None:
+                extra.append(Verdict(difference.live.name, None, (reported,)))
+            elif difference.edge is not None:
+                found[difference.edge.child].append(reported)
         # An edge that its owner hands over has one parent after the other, and closes no loop.
         switched = {edge.child for edge in part.edges if edge.switched}
         lasting = tuple(edge for edge in state.edges if edge.child not in switched)
@@ -464,9 +464,11 @@ def verify(
             *volatile_static(state),
         )
         extra += [Verdict(listed(state.topics), "", (one,)) for one in in_all]
-    sent = list(dict.fromkeys(one for each in observers.values() for one in each.sent_joints))
+    sent = list(dict.fromkeys(joint for each in observers.values() for joint in each.sent_joints))
     of_joints = (*sent_twice(sent), *unknown_joints(sent, planned_joints(plan)))
-    extra += [Verdict(listed({each.topic for each in sent}), "", (one,)) for one in of_joints]
+    extra += [
+        Verdict(listed({each.topic for each in sent}), "", (finding,)) for finding in of_joints
+    ]
     return [
         *(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges),
         *extra,
@@ -511,8 +513,8 @@ def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
 
 def summary(verdicts: Sequence[Verdict]) -> str:
     """Return one line: how many edges are as expected, and how many are not declared."""
-    planned = [one for one in verdicts if one.owner]
+    planned = [verdict for verdict in verdicts if verdict.owner]
     right = sum(not one.found for one in planned)
-    extra = sum(one.owner is None for one in verdicts)
+    extra = sum(verdict.owner is None for verdict in verdicts)
     more = f", {extra} that nobody declared" if extra else ""
     return f"{right} of {len(planned)} edges as expected{more}"

@@ -157,7 +157,9 @@ class JointSource:
         for index, (rest, sweep) in enumerate(self._moves):
             if sweep:
                 own[index] = swept(sweep, rest, time_s)
-        return own + [one.multiplier * own[one.column] + one.offset for one in self._mimics]
+        return own + [
+            mimic.multiplier * own[mimic.column] + mimic.offset for mimic in self._mimics
+        ]
 
 
 def circle(radius: float, speed: float, time_s: float) -> Pose:

@@ -62,7 +62,12 @@ def load_request(
     """
     component = process.component
     container = next(
-        (one for one in plan.processes if component and one.name == component.container), None
+        (
+            process
+            for process in plan.processes
+            if component and process.name == component.container
+        ),
+        None,
     )
     if component is None or container is None or not container.nodes or not process.nodes:
         raise ValueError(f"the plan does not say which container loads {process.name}")

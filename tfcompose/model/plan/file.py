@@ -51,7 +51,7 @@ def write_plan(plan: Plan) -> str:
 def _data(value: Any) -> Any:
     """Return a value of a plan as JSON has it."""
     if is_dataclass(value):
-        held = {one: getattr(value, one.name) for one in fields(value)}
+        held = {field: getattr(value, field.name) for field in fields(value)}
         return {one.name: _data(part) for one, part in held.items() if part != _default(one)}
     if isinstance(value, dict):
         return {key: _data(part) for key, part in value.items()}
@@ -154,7 +154,9 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
             yield f"{name} is ready at {_shown(ready.text)}, not a regular expression: {error}"
     yield from _wrong_components(plan)
     poses = {edge.name: edge.pose for edge in plan.edges}
-    poses |= {one.name: one.simulate.pose for one in plan.processes if one.simulate}
+    poses |= {
+        process.name: process.simulate.pose for process in plan.processes if process.simulate
+    }
     yield from (
         f"the pose of {name} has a quaternion of length {norm(pose.quat_xyzw):g}, not 1"
         for name, pose in poses.items()
@@ -200,7 +202,11 @@ def _wrong_order(plan: Plan) -> Iterator[str]:
 def _wrong_files(plan: Plan) -> Iterator[str]:
     files = (
         plan.description,
-        *(file for one in plan.processes for file in (one.params_file, one.description)),
+        *(
+            file
+            for process in plan.processes
+            for file in (process.params_file, process.description)
+        ),
     )
     for file in dict.fromkeys(filter(None, files)):
         path = PurePosixPath(file)

@@ -28,7 +28,7 @@ def hosts_of(plan: Plan) -> tuple[str, ...]:
 
 def without_host(plan: Plan) -> tuple[str, ...]:
     """Return what the machine starts that the plan does not name."""
-    own = (one for one in plan.processes if one.kind not in ("external", "guard"))
+    own = (process for process in plan.processes if process.kind not in ("external", "guard"))
     return tuple(process.name for process in own if process.host is None)
 
 
@@ -50,7 +50,7 @@ def share_of(plan: Plan, host: str | None, machine: str) -> Plan | Finding:
         return finding("TF819", message, None, help=f"{did_you_mean(host, hosts, known)}")
     if not hosts:
         return plan
-    watched = next((one.host for one in plan.processes if one.kind == "guard"), None)
+    watched = next((process.host for process in plan.processes if process.kind == "guard"), None)
     if plan.guard.mode == "strict" and watched is not None:
         message = (
             f"guard: strict passes on by each machine's guard, and that of {plan.robot} is on"
@@ -96,7 +96,7 @@ def describe_share(plan: Plan) -> tuple[str, ...]:
 
 def _share(plan: Plan, host: str | None) -> Plan:
     processes = tuple(_here(plan, process, host) for process in plan.processes)
-    watched = next((one.host for one in plan.processes if one.kind == "guard"), None)
+    watched = next((process.host for process in plan.processes if process.kind == "guard"), None)
     guard = replace(plan.guard, mode="off") if watched not in (None, host) else plan.guard
     edges = (
         tuple(_edge_on_host(plan, edge, host) for edge in plan.edges)

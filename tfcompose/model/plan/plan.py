@@ -556,7 +556,11 @@ class Plan:
         """Return what is known of one of the nodes publishing the edge by default, or None."""
         ends = (parent, child)
         return next(
-            (one for one in self.claims if one.node in nodes and (one.parent, one.child) == ends),
+            (
+                claim
+                for claim in self.claims
+                if claim.node in nodes and (claim.parent, claim.child) == ends
+            ),
             None,
         )
 
@@ -590,7 +594,9 @@ class Plan:
         guards = process.kind == "guard"
         edges = self.edges if guards else self.edges_of(process.name)
         fence = (self.robot, self.guard.fence) if self.guard.mode == "strict" else None
-        unplaced = {one.name for one in self.processes if guards and one.kind == "static"}
+        unplaced = {
+            process.name for process in self.processes if guards and process.kind == "static"
+        }
         anywhere = [
             *(replace(edge, source=_NOWHERE) for edge in edges if edge.owner not in unplaced),
             *(
@@ -609,7 +615,7 @@ class Plan:
         """
         static = f"{process.name.removesuffix('joints')}static"
         return process.kind == "static" or (
-            process.kind == "joints" and all(one.name != static for one in self.processes)
+            process.kind == "joints" and all(process.name != static for process in self.processes)
         )
 
 

@@ -25,8 +25,8 @@ def plan_schema() -> dict[str, Any]:
     for name, described in classes.items():
         described["description"] = inspect.cleandoc(described.get("description", ""))
         kind = getattr(plan, name, None)
-        for one in fields(kind) if is_dataclass(kind) else ():
-            described["properties"][one.name] |= one.metadata
+        for field in fields(kind) if is_dataclass(kind) else ():
+            described["properties"][field.name] |= field.metadata
     classes["Plan"]["required"].insert(0, "version")
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "tfcompose plan"}
     return head | schema

@@ -259,8 +259,8 @@ class Robot:
             ),
             base=self.base and final(self.base),
             claims=tuple(
-                replace(one, parent=final(one.parent), child=final(one.child))
-                for one in self.claims
+                replace(claim, parent=final(claim.parent), child=final(claim.child))
+                for claim in self.claims
             ),
             guard=replace(self.guard, allow=allow),
         )

@@ -119,7 +119,7 @@ class ArgSpec(Checked):
         Empty where there is neither a choice nor a bound.
         """
         if self.choices:
-            return tuple(as_given(one) for one in self.choices)
+            return tuple(as_given(choice) for choice in self.choices)
         if self.kind == "int" and (self.min is not None or self.max is not None):
             try:
                 known = {
@@ -168,9 +168,9 @@ class ArgSpec(Checked):
         """
         value = self.typed(given)
         if self.choices:
-            choices = [self.typed(one) for one in self.choices]
+            choices = [self.typed(choice) for choice in self.choices]
             if value not in choices:
-                words = [as_given(one) for one in self.choices]
+                words = [as_given(choice) for choice in self.choices]
                 raise ArgError(
                     "TF106",
                     f"{shown(given)} is not one of the choices",

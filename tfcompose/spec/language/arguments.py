@@ -36,7 +36,7 @@ def combinations(
     else:
         rows = _pairwise([alternatives[name] for name in names])
     found = [dict(zip(names, row, strict=True)) for row in rows]
-    return [first, *(one for one in found if one != first)][:MOST]
+    return [first, *(combination for combination in found if combination != first)][:MOST]
 
 
 def _pairwise(values: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:

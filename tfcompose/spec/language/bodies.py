@@ -183,7 +183,7 @@ class LinkSpec(MountKeys):
         if not isinstance(inertial, dict) or not MASSES & inertial.keys():
             return
         shapes = [data[key] for key in ("visual", "collision") if key in data]
-        if all(one in ([], "same") for one in shapes) and (
+        if all(shape in ([], "same") for shape in shapes) and (
             "inertia" not in inertial or "density" in inertial
         ):
             advice = "give a visual or a collision shape, or mass and inertia: {ixx, iyy, izz}"

@@ -283,7 +283,9 @@ class CalibrationFile:
 
 def unreadable(file: str, form: str, at: Span, found: Iterable[Finding]) -> CalibrationFile:
     """Return what a file says that cannot be read: nothing, and why."""
-    return CalibrationFile(file, form, (), tuple(_inside("TF610", one, file, at) for one in found))
+    return CalibrationFile(
+        file, form, (), tuple(_inside("TF610", finding, file, at) for finding in found)
+    )
 
 
 def _inside(code: str, found: Finding, file: str, at: Span) -> Finding:
@@ -302,7 +304,7 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
         kind, documents = load_calibration(text, file)
     except RejectedError as error:
         return unreadable(file, form, at, _without_text(error.findings, text))
-    wrong = [one for document in documents for one in document.found]
+    wrong = [finding for document in documents for finding in document.found]
     if wrong:
         wrong = _without_text(wrong, text)
         return CalibrationFile(
@@ -393,12 +395,12 @@ class _FormatReader:
         """Return what is at a path as the model, or None after noting what is wrong with it."""
         made, refusals = read(model, data)
         missing: set[Path] = set()
-        for one in refusals:
-            if one.code == "TF102" and one.path in missing:
+        for refusal in refusals:
+            if refusal.code == "TF102" and refusal.path in missing:
                 continue  # one of several keys tells what the mapping should have been
-            missing.add(one.path)
-            at = (*path, *one.path[1:]) if model is MatrixFile else (*path, *one.path)
-            self._refused(replace(one, path=at, on_key=False))
+            missing.add(refusal.path)
+            at = (*path, *refusal.path[1:]) if model is MatrixFile else (*path, *refusal.path)
+            self._refused(replace(refusal, path=at, on_key=False))
         return None if refusals else made
 
     def refuse(self, path: Path, message: str, advice: str = "") -> None:
@@ -552,13 +554,13 @@ class _FormatReader:
         ``where`` is each argument's place among the words.
         """
         made, refusals = read(model, _DEFAULTS[model] | given)
-        for one in refusals:
+        for refusal in refusals:
             path = (
-                (index, where[str(one.path[0])])
-                if one.path and str(one.path[0]) in where
+                (index, where[str(refusal.path[0])])
+                if refusal.path and str(refusal.path[0]) in where
                 else (index,)
             )
-            self._refused(replace(one, path=path, on_key=False))
+            self._refused(replace(refusal, path=path, on_key=False))
         return made.pose if made and not refusals else None
 
 

@@ -195,7 +195,11 @@ def _examples(field: FieldInfo, form: dict[str, Any]) -> list[Any]:
     Where a key has several forms it shows a mapping as one word.
     """
     examples = examples_of(field)
-    return [one for one in examples if not isinstance(one, dict)] if "anyOf" in form else examples
+    return (
+        [example for example in examples if not isinstance(example, dict)]
+        if "anyOf" in form
+        else examples
+    )
 
 
 def _exclude(

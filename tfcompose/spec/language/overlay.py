@@ -495,7 +495,7 @@ class _Includer:
             return load_named(self.read(file), file)
         except RejectedError as error:
             raise RejectedError(
-                [*source.found, *(_included(one, at) for one in error.findings)]
+                [*source.found, *(_included(finding, at) for finding in error.findings)]
             ) from None
 
 

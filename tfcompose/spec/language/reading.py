@@ -108,7 +108,11 @@ def read(
         refusals += _refusals(model, new, data)
         rest = _without(
             rest,
-            [_culprit(path, one) for path, one in errors if not one.get("ctx", {}).get("keeps")],
+            [
+                _culprit(path, error)
+                for path, error in errors
+                if not error.get("ctx", {}).get("keeps")
+            ],
             gone,
         )
     return None, refusals
@@ -200,7 +204,7 @@ def _refusals(
     model: type[Spec], errors: list[tuple[Path, ErrorDetails]], data: Any
 ) -> list[SpecRefusal]:
     """Return what pydantic refused in one turn, in this project's words."""
-    unknown = [path for path, one in errors if one["type"] in UNKNOWN_KEYS]
+    unknown = [path for path, error in errors if error["type"] in UNKNOWN_KEYS]
     meant = Counter((path[:-1], _slip(model, path)) for path in unknown)
     refusals = []
     for path, error in errors:
@@ -375,7 +379,7 @@ def _as_mapping(model: type[Spec], path: Path, value: Any) -> str:
     around = mapping_at(model, path[:-1])
     field = fields_of(around).get(str(path[-1])) if around else None
     example = (
-        next((one for one in field.examples or [] if isinstance(one, dict)), None)
+        next((example for example in field.examples or [] if isinstance(example, dict)), None)
         if field
         else None
     )

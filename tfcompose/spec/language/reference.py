@@ -110,7 +110,7 @@ def keys() -> list[str]:
     kinds = dict.fromkeys(kind for _, kind in walk(model_of("robot")))
     return [
         *dict.fromkeys(name for kind in kinds for name in fields_of(kind)),
-        *(_title(one).lower() for one in kinds),
+        *(_title(kind).lower() for kind in kinds),
     ]
 
 

@@ -153,7 +153,7 @@ def inherited(of: type, name: str) -> Any:
 
     Default and description stay.
     """
-    base = next(one for one in dataclasses.fields(of) if one.name == name)
+    base = next(field for field in dataclasses.fields(of) if field.name == name)
     return dataclasses.field(
         default=base.default, default_factory=base.default_factory, metadata=base.metadata
     )
@@ -197,8 +197,8 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
     else:
         hints = get_type_hints(kind, include_extras=True)
         fields = {
-            one.name: FieldInfo.from_annotated_attribute(hints[one.name], one)
-            for one in dataclasses.fields(kind)
+            field.name: FieldInfo.from_annotated_attribute(hints[field.name], field)
+            for field in dataclasses.fields(kind)
         }
     names = dict.fromkeys(name for one in kind.__mro__ for name in inspect.get_annotations(one))
     return {fields[name].alias or name: fields[name] for name in names if name in fields}

@@ -93,7 +93,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     source = done.source
     nulls = _nulls(source)
     data = variables.compute(source.data, done.scopes)
-    already = [*(one.path for one in nulls), *variables.uncomputed]
+    already = [*(null.path for null in nulls), *variables.uncomputed]
     spec, refusals = read(robot_model(source.data), data, already)
     own = _findings([*nulls, *variables.refusals, *refusals], source)
     found = (
@@ -105,7 +105,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     if spec is None:
         raise RejectedError(found)
     spec.carry(source)
-    refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
+    refused = frozenset([*already, *done.refused, *(refusal.path for refusal in refusals)])
     entries = {_entry(path) for path in refused}
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
     from_outside = {"args given": args, "environment": variables.environment}
@@ -144,7 +144,7 @@ def validate_file(
         RejectedError: with every finding, if anything is wrong with it.
     """
     nulls = _nulls(source)
-    spec, refused = read(kind, source.data, [one.path for one in nulls])
+    spec, refused = read(kind, source.data, [null.path for null in nulls])
     refusals = [*nulls, *refused]
     if spec is not None and not refusals:
         refusals = list(check(spec))
@@ -163,11 +163,11 @@ def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[s
     for section, word in sorted(validated.broken):
         if section == "rules" and (code := code_of(word)) and can_be_allowed(code):
             yield word, "off"
-    for word, setting in validated.spec.rules.items():
+    for name, setting in validated.spec.rules.items():
         is_limited = isinstance(setting, RuleSpec) and setting.limit is not None
         yield (
-            word,
-            "off" if is_limited and code_of(word) not in (*limits, None) else level_of(setting),
+            name,
+            "off" if is_limited and code_of(name) not in (*limits, None) else level_of(setting),
         )
 
 
@@ -212,4 +212,4 @@ def _findings(refusals: Iterable[SpecRefusal], source: Source) -> list[Finding]:
 
     What stands in an anchor is refused wherever an alias names it.
     """
-    return list(dict.fromkeys(one.finding(source) for one in refusals))
+    return list(dict.fromkeys(refusal.finding(source) for refusal in refusals))

@@ -466,8 +466,8 @@ def forest(
     A frame with several parents is drawn below that of the newest message, as in tf2.
     """
     by_child: dict[str, list[EdgeState]] = {}
-    for one in edges:
-        by_child.setdefault(one.child, []).append(one)
+    for edge in edges:
+        by_child.setdefault(edge.child, []).append(edge)
     for some in by_child.values():
         some.sort(key=lambda one: (one.present is False, -one.stream.arrivals.last_ns))
     parents = {

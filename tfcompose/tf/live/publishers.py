@@ -190,9 +190,11 @@ class Publishers:
     def update(self, publishers: Sequence[Publisher]) -> None:
         """Take who is in the graph now."""
         self.queried = True
-        self.present = {one.gid: one for one in publishers}
+        self.present = {publisher.gid: publisher for publisher in publishers}
         self.known |= {
-            one.gid: one for one in publishers if one.node is not None or one.gid not in self.known
+            publisher.gid: publisher
+            for publisher in publishers
+            if publisher.node is not None or publisher.gid not in self.known
         }
         forget_oldest(self.known, self.present)
 

@@ -245,7 +245,7 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
             nodes=tuple(name for name in nodes(node) if not _is_tool(name, robot)),
             graph=tuple(graph.values()),
             settings=own_settings(),
-            processes=tuple(RosProcess(*one) for one in ros_processes()),
+            processes=tuple(RosProcess(*process) for process in ros_processes()),
         )
         return [
             replace(view.state(common), plan=plan)

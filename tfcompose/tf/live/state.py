@@ -165,7 +165,10 @@ class TreeState:
 
     def where(self, edge: EdgeState) -> str:
         """Return the machine and process of an edge's publisher, empty if unknown."""
-        return next((one.where for one in self.publishers if one.gid == edge.stream.gid), "")
+        return next(
+            (publisher.where for publisher in self.publishers if publisher.gid == edge.stream.gid),
+            "",
+        )
 
     def typed(self, type_: str) -> list[TopicState]:
         """Return the topics of that type."""

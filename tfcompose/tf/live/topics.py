@@ -261,7 +261,7 @@ class TFGraph:
     def publishers(self) -> list[Publisher]:
         """Return the current publishers on the topics and on remapped ones."""
         found = self._publishers()
-        present = {one.gid for one in found}
+        present = {publisher.gid for publisher in found}
         for known in (self._where, self._ours, self._public):
             forget_oldest(known, present)
         return found

@@ -53,11 +53,13 @@ class _TopicFeed:
             observer.take(rows, static=message.static, gid=gid, received_ns=message.received_ns)
         moving, fixed = self._topics
         publishers = [
-            _publisher(one, static=static)
+            _publisher(publisher, static=static)
             for topic, static in ((fixed, True), (moving, False))
-            for one in self._graph.publishers(topic)
+            for publisher in self._graph.publishers(topic)
         ]
-        observer.take_graph(publishers, sorted({one.node for one in publishers if one.node}))
+        observer.take_graph(
+            publishers, sorted({publisher.node for publisher in publishers if publisher.node})
+        )
 
 
 def _publisher(token: TokenOfPublisher, *, static: bool) -> Publisher:

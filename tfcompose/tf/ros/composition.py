@@ -121,5 +121,7 @@ class Container:
             node_namespace=namespace or "/",
             remap_rules=[f"{old}:={new}" for old, new in request.remap.items()],
             parameters=[parameter(*one) for one in component.params.items()],
-            extra_arguments=[parameter(*one) for one in component.extra_arguments.items()],
+            extra_arguments=[
+                parameter(*argument) for argument in component.extra_arguments.items()
+            ],
         )

@@ -83,8 +83,14 @@ def writers(node: Node, topic: str) -> list[GraphPublisher]:
     if _tokens:
         found = _tokens[0].publishers(node.resolve_topic_name(topic))
         return [
-            GraphPublisher(one.gid, one.node, one.durability, one.reliability, one.type)
-            for one in found
+            GraphPublisher(
+                endpoint.gid,
+                endpoint.node,
+                endpoint.durability,
+                endpoint.reliability,
+                endpoint.type,
+            )
+            for endpoint in found
         ]
     return _sorted(node.get_publishers_info_by_topic(topic))
 
@@ -183,9 +189,16 @@ def is_offered(node: Node, service: str) -> bool:
         f"rq{service}Request", no_mangle=True
     )  # its name in DDS
     own = next(
-        (one.gid for one in writers(node, "/parameter_events") if one.node == own_name(node)), b""
+        (
+            writer.gid
+            for writer in writers(node, "/parameter_events")
+            if writer.node == own_name(node)
+        ),
+        b"",
     )
-    return not found or not all(has_ended(bytes(one.endpoint_gid[:16]), own) for one in found)
+    return not found or not all(
+        has_ended(bytes(endpoint.endpoint_gid[:16]), own) for endpoint in found
+    )
 
 
 def own_name(node: Node) -> str:

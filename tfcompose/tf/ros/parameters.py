@@ -71,7 +71,8 @@ class ParameterReader:
         # rclcpp answers nothing at all where it does not have one of them.
         found = dict.fromkeys(self._parameters)
         return found | {
-            name: _value(one) for name, one in zip(self._parameters, response.values, strict=False)
+            name: _value(parameter)
+            for name, parameter in zip(self._parameters, response.values, strict=False)
         }
 
 

@@ -309,8 +309,8 @@ class MessageLayout:
                 return None
             self._rows = (
                 _unpacking(data, "7d")[1],
-                [one for one, _ in self.edges],
-                [one for _, one in self.edges],
+                [edge for edge, _ in self.edges],
+                [edge for _, edge in self.edges],
             )
         layout, parents, children = self._rows
         try:

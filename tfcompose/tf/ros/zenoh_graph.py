@@ -177,7 +177,9 @@ class ZenohGraph:
         """Return who publishes on the topic now, by its full name, sorted by node and id."""
         with self._lock:
             self._take()
-            found = [one for one in self._publishers.values() if one.topic == topic]
+            found = [
+                publisher for publisher in self._publishers.values() if publisher.topic == topic
+            ]
         return sorted(found, key=lambda one: (one.node, one.gid))
 
     def node_of(self, gid: bytes) -> str | None:
@@ -187,7 +189,14 @@ class ZenohGraph:
         """
         with self._lock:
             self._take()
-            return next((one.node for one in self._publishers.values() if one.gid == gid), None)
+            return next(
+                (
+                    publisher.node
+                    for publisher in self._publishers.values()
+                    if publisher.gid == gid
+                ),
+                None,
+            )
 
     def close(self) -> None:
         """End the subscription."""
@@ -235,8 +244,8 @@ class ZenohTF:
 
     def close(self) -> None:
         """End the subscriptions."""
-        for one in self._subscribers:
-            one.undeclare()
+        for subscriber in self._subscribers:
+            subscriber.undeclare()
 
     def _take(self, sample: zenoh.Sample, *, static: bool) -> None:
         attachment = attachment_of(bytes(sample.attachment)) if sample.attachment else None

@@ -563,7 +563,9 @@ class Agent:
         folders = sorted(
             (self.base / "releases").iterdir(), key=lambda path: path.stat().st_mtime, reverse=True
         )
-        for folder in [one for one in folders if one.name not in kept][max(KEPT - len(kept), 0) :]:
+        for folder in [folder for folder in folders if folder.name not in kept][
+            max(KEPT - len(kept), 0) :
+        ]:
             shutil.rmtree(folder, ignore_errors=True)
 
 

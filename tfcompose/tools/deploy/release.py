@@ -143,11 +143,11 @@ def packed(robot: Robot, wheels: Path | None = None) -> Release:
     top = Path.cwd().as_posix()
     draft = _Packing(top=top)
     plan_of(robot.with_final_names(), draft)
-    for one in assets(robot):
-        draft.address(one)
+    for asset in assets(robot):
+        draft.address(asset)
     for part in robot.parts:
-        for one in assets(part.robot):
-            draft.address(one)
+        for asset in assets(part.robot):
+            draft.address(asset)
     files = _with_named(draft.places)
     places = _places(files, draft.places)
     target = _Packing(top=top, folder=".", places={file: places[file] for file in draft.places})

@@ -177,7 +177,7 @@ class Rollout:
 
     async def _decide_who_follows(self, plan: Plan) -> None:
         """Find out which hosts can go on while they change, which all of them have to allow."""
-        changing = [one for one in self.shares if one.changes() and one.state["release"]]
+        changing = [share for share in self.shares if share.changes() and share.state["release"]]
         texts = await asyncio.gather(
             *(one.host.ask("texts", paths=[PLAN], any_size=True) for one in changing)
         )
@@ -332,7 +332,7 @@ class Rollout:
                 back to.
         """
         begun = time.monotonic()
-        changing = [one for one in self.shares if one.changes()]
+        changing = [share for share in self.shares if share.changes()]
         anew = [one for one in changing if not one.follows]
         try:
             await self._all(lambda one: self._ask(one, "stop"), anew)
@@ -370,7 +370,7 @@ class Rollout:
             states = await self._all(self._waiting(seconds))
             missing = [one for some in map(self._missing, self.shares, states) for one in some]
             if not missing:
-                hosts = listed([one.name for one in self.shares], NAMED_AT_MOST)
+                hosts = listed([share.name for share in self.shares], NAMED_AT_MOST)
                 return f"{counted(len(self._edges()), 'edge')} live on {hosts}"
             if left <= seconds or any(state["failed"] for state in states):
                 raise RejectedError(missing)
@@ -400,7 +400,7 @@ class Rollout:
             raise RejectedError(found)
 
     def _edges(self) -> list[str]:
-        plan, names = self.target.plan, {one.name for one in self.shares}
+        plan, names = self.target.plan, {share.name for share in self.shares}
         own = {process.name for process in plan.processes if process.host in names}
         return [edge.name for edge in plan.edges if self.target.is_complete or edge.owner in own]
 
@@ -446,7 +446,7 @@ class Rollout:
     async def _back(self, shares: Sequence[Share]) -> list[Note]:
         """Let these hosts go back, whatever becomes of the others, and return what each says."""
         answers = await asyncio.gather(
-            *(one.host.ask("back") for one in shares), return_exceptions=True
+            *(share.host.ask("back") for share in shares), return_exceptions=True
         )
         notes = []
         for share, answer in zip(shares, answers, strict=True):

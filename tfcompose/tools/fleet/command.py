@@ -134,7 +134,7 @@ def _read(file: str) -> tuple[FleetSpec | None, list[Finding]]:
 
 
 def _lint_code(found: list[Finding]) -> int:
-    errors = [one for one in found if one.severity == "error"]
+    errors = [finding for finding in found if finding.severity == "error"]
     return exit_code_of(errors) if errors else 0
 
 
@@ -189,12 +189,12 @@ def _report(observer: FleetObserver, arguments: Namespace) -> int:
         from dataclasses import asdict
         from json import dumps
 
-        print(dumps({"robots": [asdict(one) for one in robots]}, ensure_ascii=False))
+        print(dumps({"robots": [asdict(robot) for robot in robots]}, ensure_ascii=False))
     else:
         from tfcompose.cli.tables import Table
 
         print("\n".join(Table(right=frozenset({2})).lines([_HEAD, *map(_row, robots)])))
-    return 0 if all(one.state == "live" for one in robots) else FAILED
+    return 0 if all(robot.state == "live" for robot in robots) else FAILED
 
 
 def _row(one: FleetRobotStatus) -> tuple[str, ...]:

@@ -100,7 +100,7 @@ def _unknown_edges(
     Where entries of the robot were refused, or a key stands twice, nobody knows which edges it was
     meant to have.
     """
-    if robot.broken or any(one.code == "TF003" for one in section.spec.spans.found):
+    if robot.broken or any(finding.code == "TF003" for finding in section.spec.spans.found):
         return []
     edges = {(robot.final(edge.parent), robot.final(edge.child)) for edge in robot.edges}
     named = [f"{parent} → {child}" for parent, child in edges]

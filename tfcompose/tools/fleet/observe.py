@@ -164,23 +164,24 @@ class FleetObserver:
         """
         needed = self._between(target, source)
         is_shared = {target, source} <= self._parents.keys() | set(self._parents.values())
-        for one in self.status():
-            edges = [edge for edge in one.edges if edge.child in needed]
-            if edges and one.age_s is None and is_shared:
+        for robot in self.status():
+            edges = [edge for edge in robot.edges if edge.child in needed]
+            if edges and robot.age_s is None and is_shared:
                 raise StaleError(
-                    f"{one.robot} is {one.state}: nothing came from it (tfcompose fleet doctor)"
+                    f"{robot.robot} is {robot.state}: nothing came from it"
+                    " (tfcompose fleet doctor)"
                 )
-            if edges and one.age_s is not None and one.age_s > STALE_S:
-                raise StaleError(f"the link to {one.robot} is stale")
+            if edges and robot.age_s is not None and robot.age_s > STALE_S:
+                raise StaleError(f"the link to {robot.robot} is stale")
             for edge in edges:
                 if edge.stale:
-                    raise StaleError(f"{edge.parent} → {edge.child} of {one.robot} is stale")
+                    raise StaleError(f"{edge.parent} → {edge.child} of {robot.robot} is stale")
         return self.buffer.latest(target, source)
 
     def findings(self) -> Iterator[Finding]:
         """Yield what is wrong now."""
-        for one in self.status():
-            yield from problems_of(one)
+        for robot in self.status():
+            yield from problems_of(robot)
 
     def _between(self, target: str, source: str) -> set[str]:
         """Return the children of the fleet's edges that are between two frames."""

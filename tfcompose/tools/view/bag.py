@@ -103,9 +103,9 @@ class Recorded:
     def __init__(self, path: str, topics: Iterable[Topics]) -> None:
         self.observers = {pair: RecordingObserver() for pair in topics}
         follow(BagFeed(path, self.observers), Stop())
-        begins = [one.begun_ns for one in self.observers.values() if one.begun_ns]
+        begins = [observer.begun_ns for observer in self.observers.values() if observer.begun_ns]
         self.begin_ns = min(begins, default=0)
-        self.end_ns = max((one.last_ns for one in self.observers.values()), default=0)
+        self.end_ns = max((observer.last_ns for observer in self.observers.values()), default=0)
 
     @property
     def length_s(self) -> float:
@@ -128,7 +128,9 @@ class BagTree(ShownTree):
         self.at_s = 0.0
         self._recorded = recorded
         self._rows: dict[str, tuple[_Track, int, Row]] = {}
-        states = {topics: state_of(one, topics) for topics, one in recorded.observers.items()}
+        states = {
+            topics: state_of(observer, topics) for topics, observer in recorded.observers.items()
+        }
         self.judgement: Judgement = PlanJudge(robot, plan, tolerance).judge(states, lambda _: True)
         self._rates = {
             self._pictures.name(edge.child): edge.timing.rate

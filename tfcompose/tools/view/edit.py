@@ -156,7 +156,9 @@ def change_of(
     """
     mount = mount_of(robot, source, child)
     tolerance = ROUNDING / max(1.0, norm(mount.child_from_place.xyz))
-    computed = {one.path: one.numbers for one in robot.source_numbers if not one.in_part}
+    computed = {
+        number.path: number.numbers for number in robot.source_numbers if not number.in_part
+    }
     return _MountEditor(mount, source, texts, tolerance, computed).of(
         mount.given(parent_from_child)
     )

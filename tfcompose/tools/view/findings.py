@@ -25,7 +25,7 @@ def findings_html(found: Sequence[Finding], none: str = "") -> str:
 
     ``none`` is what to say where there are none.
     """
-    lines = [_line(one) for one in found[:MOST]] or [escape(none)]
+    lines = [_line(finding) for finding in found[:MOST]] or [escape(none)]
     return paragraphs([*lines, *([f"and {len(found) - MOST} more"] if len(found) > MOST else [])])
 
 

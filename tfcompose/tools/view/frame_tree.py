@@ -60,7 +60,7 @@ class FrameTree:
         self._open_levels = 1
         while (
             levels.count(self._open_levels + 1)
-            and sum(one <= self._open_levels + 1 for one in levels) <= _OPEN_ROWS
+            and sum(level <= self._open_levels + 1 for level in levels) <= _OPEN_ROWS
         ):
             self._open_levels += 1
 

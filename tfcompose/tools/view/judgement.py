@@ -43,7 +43,7 @@ class Judgement:
         return frozenset(
             frame
             for frame, found in self.of_frame.items()
-            if any(one.severity == "error" for one in found)
+            if any(finding.severity == "error" for finding in found)
         )
 
     @property

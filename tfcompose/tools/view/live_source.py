@@ -209,7 +209,7 @@ class LiveSource(SceneSource):
         status = _status(self._plan.robot)
         if status is None:
             return f"no robot {self._plan.robot} runs here", []
-        used = self._meter.usage([one.pid for one in status.processes if one.pid])
+        used = self._meter.usage([process.pid for process in status.processes if process.pid])
         columns = [HEAD.index(name) for name in _COLUMNS]
         table = [HEAD, *(row(process, used) for process in status.processes)]
         rows = [[cells[column] for column in columns] for cells in table]
@@ -242,7 +242,9 @@ def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
     def others() -> list[str]:
         name = "" if ids_say_who(node) else node.get_fully_qualified_name()
         found = {
-            one.node for one in writers(node, topic) if one.gid not in own and one.node != name
+            writer.node
+            for writer in writers(node, topic)
+            if writer.gid not in own and writer.node != name
         }
         unnamed = [name for name in found if name.endswith(UNKNOWN_NODE)]
         return sorted([*(found - set(unnamed)), *(NAMELESS for _ in unnamed)])

@@ -130,7 +130,9 @@ class Pictures:
             meant[row] = row_of(self._meant(child, pose_of(self._local[row].tolist())))
         placed = self._in_fixed(in_roots, self._forest.in_roots(meant))
         frames = self._forest.below(set(off))
-        return {one: pose_of(placed[self._forest.index[one]].tolist()) for one in sorted(frames)}
+        return {
+            frame: pose_of(placed[self._forest.index[frame]].tolist()) for frame in sorted(frames)
+        }
 
     def _meant(self, child: str, live: Pose) -> Pose:
         """Return where the robot has the frame in its parent.

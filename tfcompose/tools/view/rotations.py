@@ -45,7 +45,7 @@ def rpy_near(rotation: Quaternion, old: Vector, tolerance: float) -> Vector:
 
     def changes(rpy: Vector) -> tuple[int, float]:
         differences = [abs(new - was) for new, was in zip(rpy, old, strict=True)]
-        return sum(one > tolerance for one in differences), sum(differences)
+        return sum(difference > tolerance for difference in differences), sum(differences)
 
     return min(_all_rpy(rotation, old), key=changes)
 

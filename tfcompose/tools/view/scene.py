@@ -180,7 +180,7 @@ class RobotScene:
                 handle.on_click(lambda _, frame=frame: self.clicked(frame))
                 corners = itertools.product(*mesh.bounds.T.tolist())
                 self._corners.setdefault(frame, []).extend(
-                    (shape.pose @ Pose(one)).xyz for one in corners
+                    (shape.pose @ Pose(corner)).xyz for corner in corners
                 )
         return handles
 
@@ -297,7 +297,7 @@ class RobotScene:
 
     def _label(self) -> None:
         for frame in [
-            one for one in self._labels if not (self._names_all or one == self._selected)
+            label for label in self._labels if not (self._names_all or label == self._selected)
         ]:
             self._labels.pop(frame).remove()
         for index, (frame, pose) in enumerate(self._at.items()):

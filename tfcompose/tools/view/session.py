@@ -117,7 +117,8 @@ class Session:
         mount = mount_of(robot, source, child)
         if mount.edge.sensor and not mount.edge.given and not mount.data:
             holder = next(
-                (one.mount for one in robot.sensors if one.name == mount.edge.sensor), child
+                (sensor.mount for sensor in robot.sensors if sensor.name == mount.edge.sensor),
+                child,
             )
             return mount_of(robot, source, holder)
         return mount
@@ -159,8 +160,8 @@ class Session:
             elif change.edits:
                 texts |= _with(texts, change)
                 state = self.compiled(texts)
-        before = Counter((one.code, one.message) for one in self.state.errors)
-        refused = tuple(one for one in state.errors if not before[one.code, one.message])
+        before = Counter((error.code, error.message) for error in self.state.errors)
+        refused = tuple(error for error in state.errors if not before[error.code, error.message])
         if refused:
             return Saved(refused=refused, elsewhere=tuple(elsewhere.values()))
         diff = ""

@@ -246,7 +246,7 @@ class TreePanel:
         if choices.search.strip():
             count = f"{len(self.tree.matches(choices.search))} of {count}"
         does = ("open all", "close all", "show all") if hidden else ("open all", "close all")
-        buttons = (f'<button data-does="{one}">{one}</button>' for one in does)
+        buttons = (f'<button data-does="{action}">{action}</button>' for action in does)
         header = f"<header>{' · '.join([count, *buttons])}</header>"
         placed = _PLACED.replace("SCROLLS", str(scrolls).lower()).replace("ROBOT", self._robot)
         tree = f'<div role="tree">{rows}</div>{placed}'

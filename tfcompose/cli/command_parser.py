@@ -24,9 +24,15 @@ class Parser(ArgumentParser):
 
         advice = f"{self.prog} --help lists what there is"
         if message.startswith("unrecognized arguments"):
-            words = [word.partition("=")[0] for word in message.split() if word.startswith("-")]
+            options = [
+                token.partition("=")[0] for token in message.split() if token.startswith("-")
+            ]
             known = [text for action in self._actions for text in action.option_strings]
-            near = [match for word in words for match in difflib.get_close_matches(word, known, 1)]
+            near = [
+                match
+                for option in options
+                for match in difflib.get_close_matches(option, known, 1)
+            ]
             advice = f"did you mean {near[0]}?" if near else advice
         fail(f"{self.prog.partition(' ')[2]}: {message}; {advice}", UNREADABLE)
 
@@ -35,15 +41,15 @@ class Parser(ArgumentParser):
 
         It may stand anywhere on the command line.
         """
-        words = list(args or ())
+        argv = list(args or ())
         takes_given = any(action.dest == "given" for action in self._actions)
-        given = [word for word in words if _GIVEN.match(word)] if takes_given else []
-        rest = [word for word in words if word not in given]
+        settings = [argument for argument in argv if _GIVEN.match(argument)] if takes_given else []
+        rest = [argument for argument in argv if argument not in settings]
         arguments = super().parse_intermixed_args(rest, namespace)
         if takes_given:
             from tfcompose.cli.options import pairs
 
-            arguments.given = pairs([*given, *arguments.given], ":=")
+            arguments.given = pairs([*settings, *arguments.given], ":=")
         return arguments
 
     def lacks_option(self, argv: Iterable[str]) -> bool:

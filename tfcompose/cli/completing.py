@@ -156,7 +156,7 @@ def _section(name: str, argv: Sequence[str]) -> list[str]:
         section = load(read_text(file), file).data.get(name)
     except RejectedError:
         return []
-    return [str(one) for one in section] if isinstance(section, dict) else []
+    return [str(name) for name in section] if isinstance(section, dict) else []
 
 
 def _profiles(argv: Sequence[str]) -> list[str]:

@@ -229,13 +229,9 @@ class Console:
 
     @_write.register
     def _(self, notice: Waiting) -> None:
-        for one in notice.missing:
-            self._say(
-                self._paint(
-                    f"waiting for {one.owner} ({one.node}): {listed(one.edges, NAMED_AT_MOST)}",
-                    YELLOW,
-                )
-            )
+        for owner in notice.missing:
+            edges = listed(owner.edges, NAMED_AT_MOST)
+            self._say(self._paint(f"waiting for {owner.owner} ({owner.node}): {edges}", YELLOW))
 
     @_write.register
     def _(self, notice: FindingShown) -> None:

@@ -49,19 +49,19 @@ def topics() -> dict[str, str]:
     return TOPICS | {name: topic.about for name, (_, topic) in of_tools.items()}
 
 
-def page(word: str, commands: Mapping[str, CommandModule]) -> str | None:
+def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
     """Return the page of a topic, a command's options with its page, or what a key means.
 
     None if there is none.
     """
-    if word in commands:
-        options, about = _options(word, commands[word]), _about(word, commands[word])
+    if name in commands:
+        options, about = _options(name, commands[name]), _about(name, commands[name])
         return f"{options}\n{about}" if about else options
-    if word in topics():
-        return topic(word)
+    if name in topics():
+        return topic(name)
     from tfcompose.spec.language.reference import key_page
 
-    return key_page(word)
+    return key_page(name)
 
 
 def for_terminal(markdown: str, columns: int) -> str:
@@ -81,11 +81,11 @@ def for_terminal(markdown: str, columns: int) -> str:
     return f"{options}{begin[:1]}" + "\n".join(lines) + "\n"
 
 
-def topic(word: str) -> str:
+def topic(name: str) -> str:
     """Return the page of a topic as Markdown, with what the code knows."""
-    tool, _ = installed().topics().get(word, (None, None))
-    text = _read(word, FOLDER if tool is None else tool.topic_folder)
-    more = _GENERATED.get(word)
+    tool, _ = installed().topics().get(name, (None, None))
+    text = _read(name, FOLDER if tool is None else tool.topic_folder)
+    more = _GENERATED.get(name)
     return f"{text}\n{more()}" if more else text
 
 
@@ -103,8 +103,8 @@ def _about(name: str, command: CommandModule) -> str:
     return _read(name, FOLDER)
 
 
-def _read(word: str, folder: Path) -> str:
-    file = folder / f"{word}.md"
+def _read(name: str, folder: Path) -> str:
+    file = folder / f"{name}.md"
     return _COMMENT.sub("", file.read_text("utf-8")) if file.is_file() else ""
 
 

@@ -172,10 +172,10 @@ def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
     return {name: value.replace(folder, "${tfcompose}/ros") for name, value in sorted(env.items())}
 
 
-def _quoted(word: str) -> str:
-    plain = word.replace("${", "").replace("}", "").replace("_", "").replace("-", "")
+def _quoted(argument: str) -> str:
+    plain = argument.replace("${", "").replace("}", "").replace("_", "").replace("-", "")
     return (
-        word
+        argument
         if plain and all(c.isalnum() or c in "/.:=@%+," for c in plain)
-        else "'" + word.replace("'", "'\\''") + "'"
+        else "'" + argument.replace("'", "'\\''") + "'"
     )

@@ -39,8 +39,8 @@ def lines_of(
     coloured: bool = False,
 ) -> list[str]:
     """Return a summary line and a table of edges and publishers, fitted to the width."""
-    several = _several(edges)
-    rows = [HEADS, *(_row(state, several) for state in edges)]
+    contested = _several(edges)
+    rows = [HEADS, *(_row(state, contested) for state in edges)]
     table = TABLE.lines(rows, width, coloured=coloured) if edges else []
     return [_summary(edges, observer, now_ns), *table]
 
@@ -77,7 +77,7 @@ def not_kept(observer: TreeObserver) -> str:
     return f"{counted(sum(observer.beyond.values()), 'transform')} of further edges{by} not kept"
 
 
-def _row(state: EdgeState, several: set[str]) -> tuple[str, ...]:
+def _row(state: EdgeState, contested: set[str]) -> tuple[str, ...]:
     stream, timing = state.stream, state.timing
     remarks = []
     if stream.rejected is not None:
@@ -87,7 +87,7 @@ def _row(state: EdgeState, several: set[str]) -> tuple[str, ...]:
             else ""
         )
         remarks.append(f"{some}refused: {stream.rejected.text}")
-    if stream.child in several and state.present is not False:
+    if stream.child in contested and state.present is not False:
         remarks.append("not the only one")
     if state.present is False:
         remarks.append("publisher left")

@@ -98,7 +98,7 @@ class Fixer:
         return path in map(_path, self.files) and is_file(path)
 
     def _findings(self, files: Iterable[str]) -> list[Finding]:
-        return [one for file in files for one in self.lint(file, self.read)]
+        return [finding for file in files for finding in self.lint(file, self.read)]
 
     def _sound(self, file: str, kept: list[Finding], todo: list[Finding]) -> list[Finding]:
         """Return ``kept`` and the fixes of ``todo`` that are sound with it, found by halving."""
@@ -113,7 +113,9 @@ class Fixer:
 
     def _is_sound(self, file: str, fixed: list[Finding]) -> bool:
         """Whether with these edits the findings are gone, and no others have come."""
-        files = dict.fromkeys([file, *(edit.span.file for one in fixed for edit in one.edits)])
+        files = dict.fromkeys(
+            [file, *(edit.span.file for finding in fixed for edit in finding.edits)]
+        )
         before, texts = _counted(self._findings(files)), self._edited(fixed)
         if texts is None:
             return False
@@ -121,7 +123,7 @@ class Fixer:
         after = _counted(self._findings(files))
         self.texts = old
         come = after - before
-        if any(one.code == _NO_YAML for one in fixed):
+        if any(finding.code == _NO_YAML for finding in fixed):
             # What is found in a file that can be read now was there before.
             come = Counter({key: count for key, count in come.items() if key[0] == _NO_YAML})
         return not come and not _counted(fixed) - (before - after)
@@ -129,7 +131,7 @@ class Fixer:
     def _edited(self, fixed: list[Finding]) -> dict[str, str] | None:
         """Return the new texts by file, or None where edits meet."""
         by_file: dict[str, dict[Edit, None]] = {}
-        for edit in (edit for one in fixed for edit in one.edits):
+        for edit in (edit for finding in fixed for edit in finding.edits):
             by_file.setdefault(edit.span.file, {})[edit] = None
         texts = {
             _path(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()

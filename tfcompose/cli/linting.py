@@ -219,14 +219,16 @@ def _named(every: Sequence[Combination], where: Sequence[int]) -> str:
     for size in (2, 1):
         for names in subsets(first, size):
             matching = {
-                i for i, one in enumerate(every) if all(one[name] == first[name] for name in names)
+                i
+                for i, combination in enumerate(every)
+                if all(combination[name] == first[name] for name in names)
             }
             if matching <= inside and len(matching) >= covered:
                 best, covered = {name: first[name] for name in names}, len(matching)
-    words = " ".join(f"{name}:={value}" for name, value in best.items())
+    settings = " ".join(f"{name}:={value}" for name, value in best.items())
     others = len(inside) - covered
     more = f", and in {others} other combination{'s' * (others > 1)} of args" if others else ""
-    return f"with {words}{more}"
+    return f"with {settings}{more}"
 
 
 #: What makes findings of several variants the same one: code, message and place.

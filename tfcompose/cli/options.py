@@ -82,18 +82,25 @@ def add_trust(parser: ArgumentParser) -> None:
     )
 
 
-def pairs(words: list[str], between: str) -> dict[str, str]:
+def pairs(arguments: list[str], between: str) -> dict[str, str]:
     """Return words such as NAME:=VALUE, or NAME=VALUE, by name.
 
     Raises:
         SystemExit: after saying that one is not such a word.
     """
     wrong = next(
-        (word for word in words if not word.partition(between)[0] or between not in word), None
+        (
+            argument
+            for argument in arguments
+            if not argument.partition(between)[0] or between not in argument
+        ),
+        None,
     )
     if wrong is not None:
         fail(f"{wrong} is not NAME{between}VALUE", UNREADABLE)
-    return {name: value for name, _, value in (word.partition(between) for word in words)}
+    return {
+        name: value for name, _, value in (argument.partition(between) for argument in arguments)
+    }
 
 
 def add_frames(parser: ArgumentParser) -> None:
@@ -157,13 +164,13 @@ def tolerance(text: str) -> Offset:
     from tfcompose.foundation.geometry import Offset
     from tfcompose.guard.verdict.publishers import SAME_POSE
 
-    given: dict[bool, float] = {}
+    bounds: dict[bool, float] = {}
     for part in text.split(","):
         match = _QUANTITY.fullmatch(part.strip())
-        if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in given:
+        if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in bounds:
             raise ArgumentTypeError(f"{text} is not a tolerance, such as 2mm or 2mm,0.5deg")
-        given[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
-    return Offset(given.get(False, SAME_POSE.xyz_m), given.get(True, SAME_POSE.rot_rad))
+        bounds[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
+    return Offset(bounds.get(False, SAME_POSE.xyz_m), bounds.get(True, SAME_POSE.rot_rad))
 
 
 def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> None:

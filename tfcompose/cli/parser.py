@@ -145,27 +145,27 @@ def _refuse_path(error: OSError) -> int:
     return UNREADABLE
 
 
-def _main(words: list[str]) -> int:
+def _main(argv: list[str]) -> int:
     if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion, which runs the program
         from tfcompose.cli.completing import complete
 
         complete(all_commands())
-    command = words[0] if words else ""
-    if command in {"-h", "--help"} or words == ["help"]:
+    command = argv[0] if argv else ""
+    if command in {"-h", "--help"} or argv == ["help"]:
         sys.stdout.write(help_text())
         return 0
     if command in {"-V", "--version"}:
         sys.stdout.write(f"tfcompose {__version__}\n")
         return 0
     module = find_command(command) if command else None
-    return _unknown(command) if module is None else _run(command, module, words[1:])
+    return _unknown(command) if module is None else _run(command, module, argv[1:])
 
 
-def _run(name: str, command: CommandModule, words: list[str]) -> int:
+def _run(name: str, command: CommandModule, argv: list[str]) -> int:
     gc.set_threshold(200_000, 50, 1000)  # a large build makes much, and little of it is garbage
     with RememberedInterrupt():
         try:
-            code = _run_command(name, command, words)
+            code = _run_command(name, command, argv)
         except BaseException:
             # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load.
             if take_interrupt():
@@ -174,18 +174,18 @@ def _run(name: str, command: CommandModule, words: list[str]) -> int:
     return INTERRUPTED if take_interrupt() else code
 
 
-def _run_command(name: str, command: CommandModule, words: list[str]) -> int:
+def _run_command(name: str, command: CommandModule, argv: list[str]) -> int:
     try:
         parser = command_parser(name, command)
         if not {"-h", "--help"}.isdisjoint(
-            words
+            argv
         ):  # argparse would say nothing of a reader that is gone
             tool_commands.add_all_options(name, parser)
             sys.stdout.write(parser.format_help())
             return 0
-        options = tool_commands.add_options(name, parser, words)
+        options = tool_commands.add_options(name, parser, argv)
         parser.set_defaults(commands=all_commands)  # for commands that are about commands
-        arguments = parser.parse_args(words)
+        arguments = parser.parse_args(argv)
         if getattr(arguments, "show_args", False):
             from tfcompose.cli.args import show_args
 

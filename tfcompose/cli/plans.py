@@ -67,9 +67,9 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
         arguments.profiles
         or arguments.overlays
         or arguments.settings
-        or any(getattr(arguments, one) for one in more)
+        or any(getattr(arguments, option) for option in more)
     ):
-        *options, last = ["--profile", "--overlay", "--set", *(f"--{one}" for one in more)]
+        *options, last = ["--profile", "--overlay", "--set", *(f"--{option}" for option in more)]
         fail(
             f"a built plan takes no {', '.join(options)} and {last}: these options are for"
             " building it",

@@ -90,7 +90,7 @@ def text(preset: dict[str, Any], columns: int | None = None) -> str:
     if preset["body"]:
         parts.append(f"body\n  {_body_text(preset['body'])}")
     if preset["optics"]:
-        parts.append("optics\n" + _table([_optics_text(one) for one in preset["optics"]]))
+        parts.append("optics\n" + _table([_optics_text(stream) for stream in preset["optics"]]))
     parts.append("driver\n" + (_driver_text(preset) if preset["driver"] else "  none known"))
     if preset["topics"]:
         parts.append("messages\n" + _table([_topic(topic) for topic in preset["topics"]]))
@@ -205,8 +205,8 @@ def _optics(optics: PresetOptics, preset: PresetSpec) -> dict[str, Any]:
     """Return what is known of the stream, in SI; its frame is there always."""
     keys = tuple(key for key in PresetOptics.model_fields if key != "source")
     sources = [
-        {"of": list(one.of), "where": one.where, "quality": one.quality}
-        for one in optics.source or ()
+        {"of": list(source.of), "where": source.where, "quality": source.quality}
+        for source in optics.source or ()
     ]
     return _shown(optics, preset, keys) | ({"source": sources} if sources else {})
 
@@ -366,14 +366,14 @@ def _degrees(sector: Sequence[float]) -> str:
 
 def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
     parts = [
-        f"{word} {_degrees(optics[word])}" for word in ("horizontal", "vertical") if word in optics
+        f"{key} {_degrees(optics[key])}" for key in ("horizontal", "vertical") if key in optics
     ]
     if "diagonal" in optics:
         parts.append(f"diagonal {number(round(math.degrees(optics['diagonal']), 3))} deg")
     parts += [optics["projection"]] if "projection" in optics else []
     parts += ["along -z"] if "backward" in optics else []
     parts += [f"{' x '.join(map(str, optics['resolution']))} px"] if "resolution" in optics else []
-    parts += [f"{optics[word]} {word}" for word in ("channels", "samples") if word in optics]
+    parts += [f"{optics[key]} {key}" for key in ("channels", "samples") if key in optics]
     if "near" in optics or "far" in optics:
         near = number(optics["near"]) if "near" in optics else "?"
         far = number(optics["far"]) if "far" in optics else "?"
@@ -393,9 +393,9 @@ def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
     """
     given: dict[tuple[str, str], list[str]] = {}
     for optics in streams:
-        for one in optics.get("source", ()):
-            keys = given.setdefault((one["where"], one["quality"]), [])
-            keys.append(f"{optics['stream']} {', '.join(one['of'])}")
+        for source in optics.get("source", ()):
+            keys = given.setdefault((source["where"], source["quality"]), [])
+            keys.append(f"{optics['stream']} {', '.join(source['of'])}")
     return [
         f"  {where} ({quality.replace('_', ' ')}): {'; '.join(keys)}"
         for (where, quality), keys in given.items()
@@ -414,7 +414,7 @@ _ROLE = re.compile(r"\{(\w+)\}")
 def node_rows() -> list[dict[str, str]]:
     """Return all presets of nodes as rows of a list, by package."""
     known = sorted(
-        ((name, node_preset(name)) for name in node_preset_names()), key=lambda one: one[1].package
+        ((name, node_preset(name)) for name in node_preset_names()), key=lambda row: row[1].package
     )
     return [
         {

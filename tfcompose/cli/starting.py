@@ -131,7 +131,7 @@ def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
     if found:
         reject([_with_profiles(finding, arguments) for finding in found])
     odd = (other_middleware(os.environ, plan.ros), other_distro(os.environ, plan.ros))
-    print_findings([one for one in odd if one], sys.stderr)
+    print_findings([finding for finding in odd if finding], sys.stderr)
 
 
 def _run(
@@ -192,9 +192,9 @@ def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
     profiles = _profiles_that_start(arguments)
     if not profiles:
         return found
-    words = "".join(f" --profile {name}" for name in arguments.profiles)
+    options = "".join(f" --profile {name}" for name in arguments.profiles)
     advice = (
-        f"to start without them: tfcompose up {arguments.file}{words} --profile"
+        f"to start without them: tfcompose up {arguments.file}{options} --profile"
         f" {' or '.join(profiles)}"
     )
     return replace(found, help="; ".join(filter(None, (found.help, advice))))

@@ -55,16 +55,16 @@ class Table:
         return [indent + self._line(row, widths, colour) for row in rows]
 
     def _fit(self, widths: dict[int, int], width: int) -> None:
-        for column in [one for one, wide in widths.items() if not wide]:
+        for column in [column for column, wide in widths.items() if not wide]:
             del widths[column]
         least = {
             column: min(wide, self.least.get(column, wide)) for column, wide in widths.items()
         }
-        for column in [one for one in self.spare if one in widths]:
+        for column in [column for column in self.spare if column in widths]:
             if _excess(least, width) <= 0:
                 break
             del widths[column], least[column]
-        for column in [one for one in self.least if one in widths]:
+        for column in [column for column in self.least if column in widths]:
             widths[column] = max(widths[column] - max(_excess(widths, width), 0), least[column])
 
     def _line(

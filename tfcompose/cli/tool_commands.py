@@ -121,10 +121,10 @@ _SYNONYMS = {
 }
 
 
-def instead_of(word: str) -> str:
+def instead_of(name: str) -> str:
     """Return advice for a word that other programs have for a command; empty if none has."""
     of_tools = (pair for _, command in installed().commands() for pair in command.synonyms)
-    command = (_SYNONYMS | dict(of_tools)).get(word)
+    command = (_SYNONYMS | dict(of_tools)).get(name)
     return f"that is tfcompose {command}" if command else ""
 
 

@@ -259,8 +259,11 @@ def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Fi
         inside = replace(target, folder=posixpath.join(target.folder, folder))
         for name, full in ((DESCRIPTION, True), (STOCK_DESCRIPTION, False)):
             path = folder + name
-            several = differences(described_robot, texts[path], inside, full=full)
-            found += [finding("TF910", f"{path}: {one}", None, help=advice) for one in several]
+            differences_of = differences(described_robot, texts[path], inside, full=full)
+            found += [
+                finding("TF910", f"{path}: {difference}", None, help=advice)
+                for difference in differences_of
+            ]
     return found
 
 

@@ -208,8 +208,10 @@ class FindingsReport:
         if time.monotonic() < self._due:
             return
         self._due = time.monotonic() + FINDINGS_EVERY_S
-        found = [one for source in self._sources for one in source()]
-        worst = tuple(sorted(dict.fromkeys(found), key=lambda one: one.severity)[:MOST_FINDINGS])
+        found = [finding for source in self._sources for finding in source()]
+        worst = tuple(
+            sorted(dict.fromkeys(found), key=lambda finding: finding.severity)[:MOST_FINDINGS]
+        )
         if worst != self._reported:
             self._reported = worst
             self._emit(CurrentFindings(worst))

@@ -123,7 +123,7 @@ class Components:
 
     def _check_loaded(self, name: str, container: Container) -> None:
         """Take what a container has, which was asked for the last time, and ask again."""
-        loaded = [one for one in self._loaded.values() if one[1].container == name]
+        loaded = [entry for entry in self._loaded.values() if entry[1].container == name]
         there, is_there = container.list.answer(), container.list.is_there
         for order, request in loaded if there or not is_there else ():
             is_absent = there is None or request.node not in there.full_node_names
@@ -165,11 +165,11 @@ class Components:
         if not job.step:
             return not self._begins(job, container, now, "look")
         if job.step == "load" and (answer := container.load.answer()) is not None:
-            words = answer.error_message or "it does not say why"
+            reason = answer.error_message or "it does not say why"
             why = (
                 ""
                 if answer.success
-                else f"{container.name} did not load {job.request.what}: {words}"
+                else f"{container.name} did not load {job.request.what}: {reason}"
             )
             self._loaded_or_not(job, order, why)
             return True

@@ -117,15 +117,15 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) 
     for owner in dict.fromkeys(edge.edge.owner for edge in edges):
         owned = [edge for edge in edges if edge.edge.owner == owner]
         # Not seen yet is worse than fine, and better than silent.
-        worst = max((_level(one) for one in owned), key=[OK, WARN, STALE, ERROR].index)
-        number = sum(_level(one) == worst for one in owned)
+        worst = max((_level(edge) for edge in owned), key=[OK, WARN, STALE, ERROR].index)
+        number = sum(_level(edge) == worst for edge in owned)
         summary = f"{number} of {len(owned)} edges: {_NAMES[worst]}"
         lines.append(
             Status(
                 f"tfcompose {robot}: {owner}",
                 worst,
                 summary,
-                [(one.edge.name, one.text) for one in owned],
+                [(edge.edge.name, edge.text) for edge in owned],
             )
         )
     return lines

@@ -63,9 +63,9 @@ class FloodReader:
         try:
             while (spent := time.thread_time() - begun) < SLICE_S:
                 for _ in range(_TOGETHER):
-                    one = next(self._rest)
-                    if one.child.removeprefix("/") in self._children:
-                        self._found.append(one)
+                    transform = next(self._rest)
+                    if transform.child.removeprefix("/") in self._children:
+                        self._found.append(transform)
         except (StopIteration, ValueError):  # it is read, or as much of it as can be
             spent = time.thread_time() - begun
             self._data = None

@@ -140,17 +140,17 @@ class LifecycleDriver:
     def check(self) -> None:
         """Drive each node that is due one step further, and print what has changed."""
         now = time.monotonic()
-        for one in self._nodes:
-            if now < one.due:
+        for node in self._nodes:
+            if now < node.due:
                 continue
-            is_there, observed = one.node.check(now)
-            one.due = now + CHECK_EVERY_S
-            if one.node.answers and observed != one.reported:
-                one.reported = observed
+            is_there, observed = node.node.check(now)
+            node.due = now + CHECK_EVERY_S
+            if node.node.answers and observed != node.reported:
+                node.reported = observed
                 say(observed)
             if is_there:
-                one.due = now + ASK_AGAIN_S
-                one.node.ask_again()
+                node.due = now + ASK_AGAIN_S
+                node.node.ask_again()
 
 
 def _some(what: str, names: list[str], wanted: str) -> str:
@@ -205,7 +205,7 @@ class Switches:
     @property
     def answered(self) -> list[str]:
         """The nodes that have answered and have not left since."""
-        return [one.node for one in self._nodes if one.done]
+        return [node.node for node in self._nodes if node.done]
 
     def recall(self, answered: Collection[str]) -> None:
         """Ask these no more, unless they leave: the guard before this one has.
@@ -213,8 +213,8 @@ class Switches:
         Those that are not found yet, too.
         """
         self._finds_until = time.monotonic() + FINDING_S
-        for one in self._nodes:
-            one.done = one.node in answered
+        for node in self._nodes:
+            node.done = node.node in answered
 
     def check(self) -> None:
         """Take the answers that have come and send the requests that are due, without blocking."""
@@ -222,26 +222,26 @@ class Switches:
         if not self._nodes or now < self._due:
             return
         self._due = now + _CHECK_SWITCHES_EVERY_S
-        for one in self._nodes:
-            self._at(one, now)
+        for node in self._nodes:
+            self._at(node, now)
 
-    def _at(self, one: _NodeSwitches, now: float) -> None:
-        if not one.reader.is_there:
-            one.since, one.done = None, one.done and now < self._finds_until
+    def _at(self, node: _NodeSwitches, now: float) -> None:
+        if not node.reader.is_there:
+            node.since, node.done = None, node.done and now < self._finds_until
             return
-        if one.done:
+        if node.done:
             return
-        if one.since is None:
-            one.since = one.due = now
-        found = one.reader.take()
+        if node.since is None:
+            node.since = node.due = now
+        found = node.reader.take()
         if found is None:
-            if now >= one.due:
-                one.reader.ask(now)
-        elif None in found.values() and now - one.since < DECLARED_WITHIN_S:
-            one.due = now + AGAIN_EVERY_S
+            if now >= node.due:
+                node.reader.ask(now)
+        elif None in found.values() and now - node.since < DECLARED_WITHIN_S:
+            node.due = now + AGAIN_EVERY_S
         else:
-            one.done = True
-            for wrong in not_taken(one.node, one.wanted, found, one.drives):
+            node.done = True
+            for wrong in not_taken(node.node, node.wanted, found, node.drives):
                 self._emit(FindingShown(wrong))
 
 

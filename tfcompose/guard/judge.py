@@ -134,10 +134,10 @@ class Judge:
         """Take who publishes on /tf and /tf_static now, and return what that means."""
         self._senders.update(publishers)
         events = [*self._recheck(now), *self._publishers.wrong_settings(publishers)]
-        for one in self._publishers.leaving_the_fence(publishers, self._senders, now):
+        for report in self._publishers.leaving_the_fence(publishers, self._senders, now):
             # What it has sent is reported first: it can be stopped for this before that is due.
-            events += self.ledger.report(now, at_once=one.gid)
-            events += self._publishers.unfenced(one, remapped=self.remapped)
+            events += self.ledger.report(now, at_once=report.gid)
+            events += self._publishers.unfenced(report, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
             events += self.live.static_writers(
                 {

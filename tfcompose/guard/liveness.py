@@ -281,11 +281,11 @@ class Liveness:
             self._waiting[track.edge.owner].difference_update(edge.child for edge in track.edges)
         for track in self._parted(self._planned(memory.slow)):
             track.slow = True
-        for one in memory.silent:
-            for track in self._parted(self._planned(one.children)):
-                track.silent, track.silent_since, track.last = True, one.since, one.since
+        for name in memory.silent:
+            for track in self._parted(self._planned(name.children)):
+                track.silent, track.silent_since, track.last = True, name.since, name.since
                 self._note_wrong(
-                    WrongEdges(list(track.edges), partial(silent, silence_s=now - one.since))
+                    WrongEdges(list(track.edges), partial(silent, silence_s=now - name.since))
                 )
         self._complete = not any(self._waiting.values())
 

@@ -160,7 +160,9 @@ class TopicWatch:
         strangers = self._take(fenced, now)  # first: it is passed on
         public = list(self.data.take_public())
         if self._by_partition:
-            self._graph.hear_public(one.received.gid for one in public if one.received.gid)
+            self._graph.hear_public(
+                message.received.gid for message in public if message.received.gid
+            )
         strangers |= self._take(public, now)
         declared = self._flood.read(now)  # after the others, which wait for nothing
         if declared is not None:
@@ -188,12 +190,12 @@ class TopicWatch:
 
         Return whether that was so.
         """
-        taken = [_with_id(one) for one in data]
-        strangers = {one.received.gid for one in taken} - self._known.keys()
+        messages = [_with_id(message) for message in data]
+        strangers = {message.received.gid for message in messages} - self._known.keys()
         self._known |= dict.fromkeys(strangers)
         if strangers:  # who sends once and goes is in the graph for a moment only
             self._ask_graph(now)
-        self._judge([message for one in taken for message in self._take_one(one, now)], now)
+        self._judge([message for one in messages for message in self._take_one(one, now)], now)
         return bool(strangers)
 
     def _judge(self, read: Iterable[tuple[JudgedMessage, Message]], now: float) -> None:

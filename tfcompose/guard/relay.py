@@ -124,8 +124,8 @@ class Relay:
         Not every sender latches all that it has sent.
         """
         return {
-            f"{_LATCHED}{gid.hex()}": [one.process, b64encode(one.data).decode()]
-            for gid, one in self._fixed.items()
+            f"{_LATCHED}{gid.hex()}": [sender.process, b64encode(sender.data).decode()]
+            for gid, sender in self._fixed.items()
         }
 
     def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:

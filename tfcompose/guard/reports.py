@@ -121,19 +121,19 @@ class PublisherReports:
             for found in self._once(publisher, wrong)
         ]
 
-    def _wrong_settings(self, one: Publisher) -> Iterator[Finding]:
-        if one.node is None:
+    def _wrong_settings(self, publisher: Publisher) -> Iterator[Finding]:
+        if publisher.node is None:
             return
-        topic = one.topic or GLOBAL[one.static]
-        if one.static and not one.latched:
+        topic = publisher.topic or GLOBAL[publisher.static]
+        if publisher.static and not publisher.latched:
             owned = [
                 edge.name
                 for edge in self._plan.edges
-                if edge.node == one.node and edge.kind == "static"
+                if edge.node == publisher.node and edge.kind == "static"
             ]
-            yield volatile_publisher(one.node, topic, owned)
-        if not one.reliable:
-            yield best_effort_publisher(one.node, topic)
+            yield volatile_publisher(publisher.node, topic, owned)
+        if not publisher.reliable:
+            yield best_effort_publisher(publisher.node, topic)
 
     def leaving_the_fence(
         self, publishers: Sequence[Publisher], senders: Senders, now: float
@@ -150,23 +150,34 @@ class PublisherReports:
             and publisher.fenced is False
             and not self._is_known(_UNFENCED, publisher)
         ]
-        since = {one.gid: self._silent_since.get(one.gid, now) for one in outside}
+        since = {
+            publisher.gid: self._silent_since.get(publisher.gid, now) for publisher in outside
+        }
         self._silent_since = since
         return [
-            one
-            for one in outside
-            if senders.sender(one.gid) or now - since[one.gid] >= UNFENCED_SILENT_S
+            publisher
+            for publisher in outside
+            if senders.sender(publisher.gid) or now - since[publisher.gid] >= UNFENCED_SILENT_S
         ]
 
-    def unfenced(self, one: Publisher, *, remapped: bool) -> list[Unfenced]:
+    def unfenced(self, publisher: Publisher, *, remapped: bool) -> list[Unfenced]:
         """Return the finding for one of these; the fence may be of remappings."""
-        topic = one.topic or GLOBAL[one.static]
-        if one.unmarked:
-            found = unmarked(one.node or "", topic, one.where, remapped=remapped)
+        topic = publisher.topic or GLOBAL[publisher.static]
+        if publisher.unmarked:
+            found = unmarked(publisher.node or "", topic, publisher.where, remapped=remapped)
         else:
-            found = unfenced(one.node or "", one.process, topic, one.profile, remapped=remapped)
-        process = "" if one.unmarked else one.process
-        return [Unfenced(new.found, process, one.unmarked) for new in self._once(one, found)]
+            found = unfenced(
+                publisher.node or "",
+                publisher.process,
+                topic,
+                publisher.profile,
+                remapped=remapped,
+            )
+        process = "" if publisher.unmarked else publisher.process
+        return [
+            Unfenced(new.found, process, publisher.unmarked)
+            for new in self._once(publisher, found)
+        ]
 
     def floods(
         self, senders: Senders, flooders: dict[bytes | None, Flood], now: float
@@ -211,13 +222,13 @@ class PublisherReports:
         ``missing`` are names of fixed edges that did not come, by the node, of which others came.
         """
         found = []
-        for one in senders.present.values() if missing else ():
-            edges, sender = missing.get(one.node or ""), senders.sender(one.gid)
-            if not (one.node and one.static and edges and sender):
+        for publisher in senders.present.values() if missing else ():
+            edges, sender = missing.get(publisher.node or ""), senders.sender(publisher.gid)
+            if not (publisher.node and publisher.static and edges and sender):
                 continue
             first = sender.first_sequence
             if 1 < first < UNCOUNTED and now - sender.first_received >= ALL_HEARD_S:
-                found += self._once(one, replaced_latched(one.node, first - 1, edges))
+                found += self._once(publisher, replaced_latched(publisher.node, first - 1, edges))
         return found
 
     def memory(self) -> tuple[tuple[str, str], ...]:
@@ -228,13 +239,13 @@ class PublisherReports:
         """Take this as reported by the guard before."""
         self._reported = {(code, bytes.fromhex(gid)): None for code, gid in memory}
 
-    def _is_known(self, code: str, one: Publisher) -> bool:
-        return (code, one.gid) in self._reported
+    def _is_known(self, code: str, publisher: Publisher) -> bool:
+        return (code, publisher.gid) in self._reported
 
-    def _once(self, one: Publisher, found: Finding) -> list[FindingShown]:
-        if self._is_known(found.code, one):
+    def _once(self, publisher: Publisher, found: Finding) -> list[FindingShown]:
+        if self._is_known(found.code, publisher):
             return []
-        self._reported[found.code, one.gid] = None
+        self._reported[found.code, publisher.gid] = None
         if len(self._reported) > MOST_REPORTED:
             del self._reported[next(iter(self._reported))]
         return [FindingShown(found)]

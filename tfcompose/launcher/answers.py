@@ -60,30 +60,30 @@ def status(state: State, now: float) -> RobotStatus:
         silent=tuple(
             edge.name for edge in state.plan.edges if edge.child in state.silent & state.live
         ),
-        processes=tuple(_process(state, one, now) for one in state.tracked.values()),
+        processes=tuple(_process(state, tracked, now) for tracked in state.tracked.values()),
         findings=state.findings,
     )
 
 
-def _process(state: State, one: Tracked, now: float) -> ProcessStatus:
-    owned = [child for _, child in one.process.owns]
+def _process(state: State, tracked: Tracked, now: float) -> ProcessStatus:
+    owned = [child for _, child in tracked.process.owns]
     return ProcessStatus(
-        name=one.process.name,
-        kind=one.process.kind,
-        host=one.process.host,
-        state=one.state,
-        detail=one.detail,
-        required=one.process.required,
-        failed=bool(one.failed) or one.state == "fatal",
-        ready=one.ready,
-        waits=waits_for(state, one),
-        seen=one.observed,
-        pid=one.pid,
-        uptime=round(now - one.began, 3) if one.state in ("running", "stopping") else None,
-        restarts=one.restarts,
+        name=tracked.process.name,
+        kind=tracked.process.kind,
+        host=tracked.process.host,
+        state=tracked.state,
+        detail=tracked.detail,
+        required=tracked.process.required,
+        failed=bool(tracked.failed) or tracked.state == "fatal",
+        ready=tracked.ready,
+        waits=waits_for(state, tracked),
+        seen=tracked.observed,
+        pid=tracked.pid,
+        uptime=round(now - tracked.began, 3) if tracked.state in ("running", "stopping") else None,
+        restarts=tracked.restarts,
         edges=len(owned),
         live=sum(child in state.live and child not in state.silent for child in owned),
-        nodes=one.process.nodes,
+        nodes=tracked.process.nodes,
     )
 
 

@@ -198,7 +198,7 @@ class Children:
         self._close_guard_pipes()
         if self._run_id:
             marked = leftovers(self._run_id)
-            others = self._descendants().keys() - {one.pid for one in marked}
+            others = self._descendants().keys() - {child.pid for child in marked}
             end(marked + leftovers_of(others, self._run_id), 1.0)
         self._strays.clear()
         self._update_reaper()

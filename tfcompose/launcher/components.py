@@ -23,51 +23,54 @@ if TYPE_CHECKING:
 
 def component_answered(step: Transition, event: ComponentState) -> None:
     """Take what a container has answered to the last order about a component."""
-    one, why = step.state.tracked[event.process], event.why
+    tracked, why = step.state.tracked[event.process], event.why
     match event.state:
-        case "loaded" if one.state == "starting":
+        case "loaded" if tracked.state == "starting":
             container = (
-                one.process.component and step.state.tracked[one.process.component.container]
+                tracked.process.component
+                and step.state.tracked[tracked.process.component.container]
             )
             step.enter(
                 event.process, "running", pid=container.pid if container else None, began=step.now
             )
             order_gate(step, step.state.tracked[event.process])
-        case "not loaded" if one.state == "starting":
+        case "not loaded" if tracked.state == "starting":
             _ended(
                 step,
-                replace(one, since=step.now),
+                replace(tracked, since=step.now),
                 why,
-                f"{one.process.name} could not be started: {why}",
+                f"{tracked.process.name} could not be started: {why}",
             )
-        case "unloaded" if one.state == "running":
-            _ended(step, one, why, f"{one.process.name} has ended: {why}")
-        case "unloaded" if one.state == "stopping" and step.state.stop:
+        case "unloaded" if tracked.state == "running":
+            _ended(step, tracked, why, f"{tracked.process.name} has ended: {why}")
+        case "unloaded" if tracked.state == "stopping" and step.state.stop:
             step.enter(event.process, "stopped", why)
-        case "unloaded" if one.state == "stopping":
-            left(step, one, why or "unloaded")
+        case "unloaded" if tracked.state == "stopping":
+            left(step, tracked, why or "unloaded")
         case _:
             pass
 
 
-def _ended(step: Transition, one: Tracked, why: str, message: str) -> None:
+def _ended(step: Transition, tracked: Tracked, why: str, message: str) -> None:
     """Take a component that was not loaded, or is not there any more.
 
     It is loaded again, or has failed.
     """
-    name = one.process.name
+    name = tracked.process.name
     if step.state.stop:
         step.enter(name, "stopped", why)
         return
-    lose_edges(step, one)
-    one = step.state.tracked[name]
-    if one.leaving:
-        left(step, one, why)
-    elif one.process.restart == "no":
+    lose_edges(step, tracked)
+    tracked = step.state.tracked[name]
+    if tracked.leaving:
+        left(step, tracked, why)
+    elif tracked.process.restart == "no":
         step.enter(name, "fatal", why)
         step.fail_process(name, finding("TF808", message, None))
     else:
-        schedule_restart(step, one, why, lambda when: finding("TF808", f"{message}{when}", None))
+        schedule_restart(
+            step, tracked, why, lambda when: finding("TF808", f"{message}{when}", None)
+        )
 
 
 def order_components(step: Transition) -> None:
@@ -75,14 +78,14 @@ def order_components(step: Transition) -> None:
 
     It has to hear first who is absent: it forgets what it was ordered about those.
     """
-    for name, one in step.state.tracked.items():
-        if one.process.component and one.state in (
+    for name, tracked in step.state.tracked.items():
+        if tracked.process.component and tracked.state in (
             "starting",
             "running",
         ):  # it watches over those that run
-            step.actions.append(Order(ComponentOrder(name, one.order, "load", again=True)))
-        elif one.process.component and one.state == "stopping":
-            step.actions.append(Order(ComponentOrder(name, one.order, "unload")))
+            step.actions.append(Order(ComponentOrder(name, tracked.order, "load", again=True)))
+        elif tracked.process.component and tracked.state == "stopping":
+            step.actions.append(Order(ComponentOrder(name, tracked.order, "unload")))
 
 
 #: What may be a logger's name: ROS writes it in brackets, in a line's beginning.

@@ -45,10 +45,14 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
             raise RosError(f"it begins with <{root.tag}>, not with <dds>")
         profiles = ET.SubElement(root, "profiles")
     names = WRITERS if kind == "data_writer" else READERS
-    known = [one for one in root.iter() if one.tag in names]
-    default = next((one for one in known if one.get("is_default_profile") == "true"), None)
+    known = [element for element in root.iter() if element.tag in names]
+    default = next(
+        (element for element in known if element.get("is_default_profile") == "true"), None
+    )
     for topic in dict.fromkeys(topics):
-        profile = next((one for one in known if one.get("profile_name") == topic), None)
+        profile = next(
+            (element for element in known if element.get("profile_name") == topic), None
+        )
         if profile is None:
             profile = ET.Element(kind) if default is None else deepcopy(default)
             profile.attrib.pop("is_default_profile", None)

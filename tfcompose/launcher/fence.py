@@ -72,10 +72,10 @@ def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
             process,
             remap=rules | {old: new for old, new in process.remap.items() if old not in rules},
         )
-    words = [word for old, new in rules.items() for word in ("-r", f"{old}:={new}")]
+    arguments = [argument for old, new in rules.items() for argument in ("-r", f"{old}:={new}")]
     at = process.argv.index("--ros-args") if "--ros-args" in process.argv else len(process.argv)
     return replace(
-        process, argv=(*process.argv[:at], "--ros-args", *words, *process.argv[at + 1 :])
+        process, argv=(*process.argv[:at], "--ros-args", *arguments, *process.argv[at + 1 :])
     )
 
 

@@ -98,7 +98,7 @@ def _schedule_refusal(name: str, schedule: Schedule) -> Finding | None:
         lacking = set(schedule.cpus)
     if not lacking:
         return None
-    message = f"{name} cannot run on {', '.join(f'CPU {one}' for one in sorted(lacking))}"
+    message = f"{name} cannot run on {', '.join(f'CPU {cpu}' for cpu in sorted(lacking))}"
     return finding("TF911", message, None, help="CPUs count from 0; lscpu lists them")
 
 

@@ -23,13 +23,13 @@ def generate_launch_description() -> LaunchDescription:
 
     The file in a group that sets namespace, remappings and simulated time.
     """
-    given = json.loads(os.environ["TFCOMPOSE_LAUNCH"])
-    group = [PushRosNamespace(given["namespace"])] if given["namespace"] else []
-    group += [SetRemap(old, new) for old, new in given["remap"].items()]
-    if given["sim_time"]:
+    settings = json.loads(os.environ["TFCOMPOSE_LAUNCH"])
+    group = [PushRosNamespace(settings["namespace"])] if settings["namespace"] else []
+    group += [SetRemap(old, new) for old, new in settings["remap"].items()]
+    if settings["sim_time"]:
         group.append(SetParameter("use_sim_time", value=True))
-    source = AnyLaunchDescriptionSource(given["file"])
+    source = AnyLaunchDescriptionSource(settings["file"])
     group.append(
-        IncludeLaunchDescription(source, launch_arguments=list(given["arguments"].items()))
+        IncludeLaunchDescription(source, launch_arguments=list(settings["arguments"].items()))
     )
     return LaunchDescription([GroupAction(group)])

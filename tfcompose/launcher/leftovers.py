@@ -72,8 +72,8 @@ def leftovers(run: str) -> list[Leftover]:
     found = []
     for pid in procfs.pids():
         with contextlib.suppress(OSError):
-            if pid != os.getpid() and (one := _marked(pid, run)):
-                found.append(one)
+            if pid != os.getpid() and (leftover := _marked(pid, run)):
+                found.append(leftover)
     return found
 
 
@@ -136,20 +136,20 @@ def _launcher(mark: str) -> int | None:
     return None
 
 
-def _send(one: Leftover, number: int) -> None:
+def _send(leftover: Leftover, number: int) -> None:
     """Send the signal to that very process, and to no other that was given its number since."""
     with contextlib.suppress(OSError):
-        descriptor = os.pidfd_open(one.pid)
+        descriptor = os.pidfd_open(leftover.pid)
         try:
-            if _is_there(one):
+            if _is_there(leftover):
                 signal.pidfd_send_signal(descriptor, number)
         finally:
             os.close(descriptor)
 
 
-def _is_there(one: Leftover) -> bool:
+def _is_there(leftover: Leftover) -> bool:
     try:
-        stat = procfs.stat(one.pid)
+        stat = procfs.stat(leftover.pid)
     except OSError:
         return False
-    return stat.began == one.began and stat.state != "Z"
+    return stat.began == leftover.began and stat.state != "Z"

@@ -97,11 +97,13 @@ def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, .
 def wake_time(state: State) -> float | None:
     """Return when the machine next has something to do by itself: then it wants a ``Tick``."""
     times, due = state.times, []
-    for one in state.tracked.values():
-        if one.state == "backoff":
-            due.append(one.since + backoff_s(times, one.process, one.failures))
-        firmer = firmer_at(times, one)
-        gate = [at for at in (firmer, opens_at(one), late_at(state, one)) if at is not None]
+    for tracked in state.tracked.values():
+        if tracked.state == "backoff":
+            due.append(tracked.since + backoff_s(times, tracked.process, tracked.failures))
+        firmer = firmer_at(times, tracked)
+        gate = [
+            at for at in (firmer, opens_at(tracked), late_at(state, tracked)) if at is not None
+        ]
         due += gate if state.stop is None else gate[: firmer is not None]
     if state.stop is None and state.begun is not None:
         if state.clear is None:
@@ -154,8 +156,8 @@ def _requested_or_reported(step: Transition, event: Event) -> None:
 
 
 def _not_started(step: Transition, name: str, why: str) -> None:
-    one = step.state.tracked[name]
-    step.enter(name, "fatal", why, order=one.order if one.began else 0)
+    tracked = step.state.tracked[name]
+    step.enter(name, "fatal", why, order=tracked.order if tracked.began else 0)
     step.fail_process(name, not_started(name, why))
 
 
@@ -368,7 +370,7 @@ def _settle(step: Transition) -> None:
     if step.state.stop is None:
         _go_on(step)
     send_due_signals(step)
-    if step.state.stop and not any(one.alive for one in step.state.tracked.values()):
+    if step.state.stop and not any(tracked.alive for tracked in step.state.tracked.values()):
         step.finish(step.state.stop.exit_code)
 
 
@@ -376,13 +378,18 @@ def _go_on(step: Transition) -> None:
     check_gates(step)
     _kill_a_guard_that_hangs(step)
     give_up_waiting(step)
-    for name, one in step.state.tracked.items():
-        if one.state not in ("stopped", "backoff"):
+    for name, tracked in step.state.tracked.items():
+        if tracked.state not in ("stopped", "backoff"):
             continue
         may_start = step.state.clear is not None or name in _before_clear(step.state)
-        fresh = one.state == "stopped" and one.wanted and may_start and not unmet(step.state, one)
-        again = one.state == "backoff" and step.now >= one.since + backoff_s(
-            step.state.times, one.process, one.failures
+        fresh = (
+            tracked.state == "stopped"
+            and tracked.wanted
+            and may_start
+            and not unmet(step.state, tracked)
+        )
+        again = tracked.state == "backoff" and step.now >= tracked.since + backoff_s(
+            step.state.times, tracked.process, tracked.failures
         )
         if fresh or again:
             step.start(name)
@@ -398,9 +405,9 @@ def _go_on(step: Transition) -> None:
                 )
             )
         )
-    tracked = step.state.tracked.values()
     if step.state.stop is None and all(
-        one.failed or one.state in ("exited", "expected") for one in tracked
+        tracked.failed or tracked.state in ("exited", "expected")
+        for tracked in step.state.tracked.values()
     ):
         step.finish(1 if step.state.given_up else 0)
 

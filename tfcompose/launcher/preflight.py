@@ -243,8 +243,8 @@ def filled_in(
 ) -> tuple[str, ...]:
     """Return the process's ``argv`` with the placeholders replaced; both paths are absolute."""
     is_ours = process.argv[:1] == (PROGRAM,)
-    start, words = (HERE, process.argv[1:]) if is_ours else ((), process.argv)
-    return (*start, *(_filled(word, process, plan_file, build_dir) for word in words))
+    start, argv = (HERE, process.argv[1:]) if is_ours else ((), process.argv)
+    return (*start, *(_filled(argument, process, plan_file, build_dir) for argument in argv))
 
 
 def own_env(
@@ -284,13 +284,13 @@ class NotFound:
 
 def not_found(missing: Sequence[NotFound]) -> Finding:
     """Return the one finding for all programs that were not found."""
-    what = ", ".join(f"{one.program} of {one.process}" for one in missing)
+    what = ", ".join(f"{program.program} of {program.process}" for program in missing)
     message = f"{len(missing)} executables were not found: {what}"
     if len(missing) == 1:
         message = f"the executable {what} was not found"
-    places = dict.fromkeys(place for one in missing for place in one.places)
-    paths = ["looked in the folders of PATH"] if any(one.path for one in missing) else []
-    advice = dict.fromkeys(part for one in missing for part in one.advice if part)
+    places = dict.fromkeys(place for program in missing for place in program.places)
+    paths = ["looked in the folders of PATH"] if any(program.path for program in missing) else []
+    advice = dict.fromkeys(part for program in missing for part in program.advice if part)
     return finding(
         "TF810",
         message,
@@ -301,31 +301,31 @@ def not_found(missing: Sequence[NotFound]) -> Finding:
 
 
 def executable_of(
-    process: PlanProcess, word: str, folder: Path, env: Mapping[str, str]
+    process: PlanProcess, argument: str, folder: Path, env: Mapping[str, str]
 ) -> str | NotFound:
     """Return the path of the program that ``word`` means, or what is missing.
 
     A relative path is looked up in ``folder``, a bare name on the PATH of ``env``.
     """
-    ros = _ROS_EXECUTABLE.fullmatch(word)
+    ros = _ROS_EXECUTABLE.fullmatch(argument)
     if ros:
         return _in_package(process, ros[1], ros[2], env)
-    if "/" in word:
-        path = folder / word
+    if "/" in argument:
+        path = folder / argument
         if _can_run(path):
             return str(path)
-        relative = f"${{file({word})}} is relative to the robot file, wherever up is called"
-        advice = () if word.startswith("/") else (relative,)
-        return NotFound(process.name, word, (_why_not(path),), advice=advice)
+        relative = f"${{file({argument})}} is relative to the robot file, wherever up is called"
+        advice = () if argument.startswith("/") else (relative,)
+        return NotFound(process.name, argument, (_why_not(path),), advice=advice)
     path_variable = env.get("PATH", os.defpath)
-    return shutil.which(word, path=path_variable) or NotFound(
+    return shutil.which(argument, path=path_variable) or NotFound(
         process.name,
-        word,
+        argument,
         (),
         path_variable,
         (
-            f"install {word}, or write its path",
-            f"a node of a package is run: {{package: …, executable: {word}}}",
+            f"install {argument}, or write its path",
+            f"a node of a package is run: {{package: …, executable: {argument}}}",
         ),
     )
 
@@ -371,9 +371,9 @@ def _why_not(path: Path) -> str:
 # Launch files.
 
 
-def _is_launch(word: str) -> bool:
+def _is_launch(argument: str) -> bool:
     """Return whether the word means a launch file."""
-    return _LAUNCH.fullmatch(word) is not None
+    return _LAUNCH.fullmatch(argument) is not None
 
 
 def _launch_command(

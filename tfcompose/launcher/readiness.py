@@ -31,29 +31,29 @@ _NAMED_AT_MOST = 4
 # Before the start: ``after``.
 
 
-def unmet(state: State, one: Tracked) -> tuple[tuple[str, StartCondition], ...]:
+def unmet(state: State, tracked: Tracked) -> tuple[tuple[str, StartCondition], ...]:
     """Return the processes that this one still waits for, each with what it is to be."""
     return tuple(
         (name, what)
-        for name, what in one.process.after.items()
+        for name, what in tracked.process.after.items()
         if not _is_met(state.tracked[name], what)
     )
 
 
-def unmet_in_words(state: State, one: Tracked) -> str:
+def unmet_in_words(state: State, tracked: Tracked) -> str:
     """Return what a process that was not started waits for.
 
     "slam to be ready and map to be done", or "".
     """
-    return " and ".join(f"{name} to be {what}" for name, what in unmet(state, one))
+    return " and ".join(f"{name} to be {what}" for name, what in unmet(state, tracked))
 
 
 def give_up_waiting(step: Transition) -> None:
     """Have those fail that wait for what cannot come any more."""
-    for name, one in step.state.tracked.items():
-        if one.state != "stopped" or not one.wanted or one.failed:
+    for name, tracked in step.state.tracked.items():
+        if tracked.state != "stopped" or not tracked.wanted or tracked.failed:
             continue
-        for other, what in unmet(step.state, one):
+        for other, what in unmet(step.state, tracked):
             found = step.state.tracked[other]
             if found.failed or found.state == "exited":
                 why = "has failed" if found.failed else "has ended"
@@ -86,9 +86,9 @@ def has_own_gate(process: PlanProcess) -> bool:
     return process.ready is not None or bool(process.lifecycle)
 
 
-def order_gate(step: Transition, one: Tracked) -> None:
+def order_gate(step: Transition, tracked: Tracked) -> None:
     """Tell the guard what to watch for, and which nodes to bring into their states."""
-    process, kind = one.process, gate_of(one.process)
+    process, kind = tracked.process, gate_of(tracked.process)
     ready = process.ready
     by_edges = kind == "edges" and ready is not None
     if step.state.guard is None or not (
@@ -109,89 +109,100 @@ def order_gate(step: Transition, one: Tracked) -> None:
 
 def open_gate(step: Transition, name: str, observed: str = "") -> None:
     """Note that the process is ready."""
-    one = step.state.tracked[name]
-    if one.ready:
+    tracked = step.state.tracked[name]
+    if tracked.ready:
         return
-    step.track(name, replace(one, ready=True, ready_since=step.now, observed=observed, late=False))
-    if gate_of(one.process) == "edges" and has_own_gate(one.process):
+    step.track(
+        name, replace(tracked, ready=True, ready_since=step.now, observed=observed, late=False)
+    )
+    if gate_of(tracked.process) == "edges" and has_own_gate(tracked.process):
         step.actions.append(Order(Gate(name)))  # the guard need not watch it any more
-    if has_own_gate(one.process):
+    if has_own_gate(tracked.process):
         step.notify(ProcessReady(name, observed, step.since_begin))
 
 
 def check_gates(step: Transition) -> None:
     """Open the gates that no guard watches, and report those that are late."""
-    for name, one in step.state.tracked.items():
-        if one.ready or not _is_awaited(one):
+    for name, tracked in step.state.tracked.items():
+        if tracked.ready or not _is_awaited(tracked):
             continue
-        kind, ready = gate_of(one.process), one.process.ready
-        if one.state != "starting" and (
+        kind, ready = gate_of(tracked.process), tracked.process.ready
+        if tracked.state != "starting" and (
             kind == "started" or (kind in _GUARDED and step.state.guard is None)
         ):
             open_gate(step, name, "started")
         elif (
             kind == "time"
             and ready
-            and one.state != "starting"
-            and step.now >= one.began + ready.number
+            and tracked.state != "starting"
+            and step.now >= tracked.began + ready.number
         ):
             open_gate(step, name, f"{ready.number:g} s have passed")
-        elif not one.late and (due := late_at(step.state, one)) is not None and step.now >= due:
-            step.track(name, replace(one, late=True))
-            found = _late(step.state, one, due - one.began)
+        elif (
+            not tracked.late
+            and (due := late_at(step.state, tracked)) is not None
+            and step.now >= due
+        ):
+            step.track(name, replace(tracked, late=True))
+            found = _late(step.state, tracked, due - tracked.began)
             step.update(reported=step.state.reported | {found.code})
             step.actions.append(NotifyLate(name, found))
 
 
-def late_at(state: State, one: Tracked) -> float | None:
+def late_at(state: State, tracked: Tracked) -> float | None:
     """Return when the process is late; None if it may take its time."""
-    if one.ready or one.late or not _is_awaited(one):
+    if tracked.ready or tracked.late or not _is_awaited(tracked):
         return None
-    ready = one.process.ready
-    if one.state != "starting" and (
-        not has_own_gate(one.process) or (ready and ready.kind == "time")
+    ready = tracked.process.ready
+    if tracked.state != "starting" and (
+        not has_own_gate(tracked.process) or (ready and ready.kind == "time")
     ):
         return None
     timeout_s = ready.timeout_s if ready else None
-    return one.began + (state.times.ready_s if timeout_s is None else timeout_s)
+    return tracked.began + (state.times.ready_s if timeout_s is None else timeout_s)
 
 
-def _is_awaited(one: Tracked) -> bool:
+def _is_awaited(tracked: Tracked) -> bool:
     """Return whether it is expected to become ready by itself.
 
     Of a component, whether its container was asked.
     """
-    return one.state in ("running", "expected") or (
-        one.state == "starting" and one.process.component is not None
+    return tracked.state in ("running", "expected") or (
+        tracked.state == "starting" and tracked.process.component is not None
     )
 
 
-def opens_at(one: Tracked) -> float | None:
+def opens_at(tracked: Tracked) -> float | None:
     """Return when a gate opens by itself."""
-    ready = one.process.ready
+    ready = tracked.process.ready
     waits = (
-        not one.ready and one.state in ("running", "expected") and ready and ready.kind == "time"
+        not tracked.ready
+        and tracked.state in ("running", "expected")
+        and ready
+        and ready.kind == "time"
     )
-    return one.began + ready.number if waits and ready else None
+    return tracked.began + ready.number if waits and ready else None
 
 
-def waits_for(state: State, one: Tracked) -> str:
+def waits_for(state: State, tracked: Tracked) -> str:
     """Return what a process is still without, in words; "" if it is ready, or is not to run."""
     if (
-        one.state == "stopped"
-        and one.wanted
-        and not one.failed
-        and (others := unmet_in_words(state, one))
+        tracked.state == "stopped"
+        and tracked.wanted
+        and not tracked.failed
+        and (others := unmet_in_words(state, tracked))
     ):
         return f"waits for {others}"
-    if one.ready or not _is_awaited(one):
+    if tracked.ready or not _is_awaited(tracked):
         return ""
-    if one.state == "starting" and one.process.component:
-        return f"{one.process.component.container} has not answered"
-    ready = one.process.ready
+    if tracked.state == "starting" and tracked.process.component:
+        return f"{tracked.process.component.container} has not answered"
+    ready = tracked.process.ready
     text = ready.text if ready else ""
     missing = [
-        edge.name for edge in state.plan.edges_of(one.process.name) if edge.child not in state.live
+        edge.name
+        for edge in state.plan.edges_of(tracked.process.name)
+        if edge.child not in state.live
     ]
     return {
         "topic": f"nobody publishes {text}",
@@ -201,12 +212,14 @@ def waits_for(state: State, one: Tracked) -> str:
         "exit": "it still runs",
         "time": f"{ready.number if ready else 0:g} s have not passed",
         "edges": f"nobody published {listed(missing, _NAMED_AT_MOST)}",
-    }.get(gate_of(one.process), "")
+    }.get(gate_of(tracked.process), "")
 
 
-def _late(state: State, one: Tracked, seconds: float) -> Finding:
-    notes = [Note(f"seen instead: {one.observed}")] if one.observed else []
-    message = f"{one.process.name} is not ready after {seconds:g} s: {waits_for(state, one)}"
+def _late(state: State, tracked: Tracked, seconds: float) -> Finding:
+    notes = [Note(f"seen instead: {tracked.observed}")] if tracked.observed else []
+    message = (
+        f"{tracked.process.name} is not ready after {seconds:g} s: {waits_for(state, tracked)}"
+    )
     return finding("TF817", message, None, notes=notes)
 
 
@@ -217,8 +230,12 @@ def is_ready(state: State) -> bool:
     """Return whether every process that is wanted is ready, or done, and every edge live."""
     if state.clear is None or state.stop or state.awaited:
         return False
-    wanted = [one for one in state.tracked.values() if one.wanted and not one.failed]
-    return all((one.ready and not one.leaving) or one.state == "exited" for one in wanted)
+    wanted = [
+        tracked for tracked in state.tracked.values() if tracked.wanted and not tracked.failed
+    ]
+    return all(
+        (tracked.ready and not tracked.leaving) or tracked.state == "exited" for tracked in wanted
+    )
 
 
 def report_progress(step: Transition) -> None:
@@ -232,16 +249,16 @@ def _report_started(step: Transition) -> None:
     if (
         state.all_started
         or state.clear is None
-        or any(one.state == "starting" for one in state.tracked.values())
+        or any(tracked.state == "starting" for tracked in state.tracked.values())
     ):
         return
     step.update(all_started=True)
     waiting = tuple(
         name
-        for name, one in state.tracked.items()
-        if one.state == "stopped" and one.wanted and not one.failed
+        for name, tracked in state.tracked.items()
+        if tracked.state == "stopped" and tracked.wanted and not tracked.failed
     )
-    started = sum(one.order > 0 for one in state.tracked.values())
+    started = sum(tracked.order > 0 for tracked in state.tracked.values())
     step.notify(AllStarted(started, waiting, step.since_begin))
 
 
@@ -252,8 +269,12 @@ def _report_ready(step: Transition) -> None:
         return
     step.update(all_ready=True)
     rows = []
-    for name, one in state.tracked.items():
-        if one.wanted and not one.failed and (one.began >= begun or state.replanned == 0.0):
-            started = None if one.state == "expected" else one.began - begun
-            rows.append(StartRow(name, started, (one.ready_since or one.since) - begun))
+    for name, tracked in state.tracked.items():
+        if (
+            tracked.wanted
+            and not tracked.failed
+            and (tracked.began >= begun or state.replanned == 0.0)
+        ):
+            started = None if tracked.state == "expected" else tracked.began - begun
+            rows.append(StartRow(name, started, (tracked.ready_since or tracked.since) - begun))
     step.notify(AllReady(tuple(rows), step.now - begun, state.given_up))

@@ -225,9 +225,9 @@ def _dir(name: str, base: Path, env: Mapping[str, str]) -> RuntimeDir:
 
 
 def _runtime_folder(env: Mapping[str, str]) -> Path:
-    given = env.get("XDG_RUNTIME_DIR") or str(USERS / str(os.getuid()))
-    if given.startswith("/") and _is_ours(Path(given)):
-        folder = Path(given) / "tfcompose"
+    base = env.get("XDG_RUNTIME_DIR") or str(USERS / str(os.getuid()))
+    if base.startswith("/") and _is_ours(Path(base)):
+        folder = Path(base) / "tfcompose"
     else:
         folder = _temporary_folder()
     try:
@@ -267,7 +267,9 @@ def make_private(folder: Path) -> None:
     Raises:
         OSError: if it cannot be made.
     """
-    for missing in reversed([one for one in (folder, *folder.parents) if not one.exists()]):
+    for missing in reversed(
+        [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    ):
         if missing.parent == USERS:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(missing))
         missing.mkdir(mode=0o700, exist_ok=True)

@@ -167,15 +167,15 @@ class State:
     def components_of(self, container: str) -> tuple[Tracked, ...]:
         """Return the components of a container, in the order of the plan."""
         return tuple(
-            one
-            for one in self.tracked.values()
-            if one.process.component and one.process.component.container == container
+            tracked
+            for tracked in self.tracked.values()
+            if tracked.process.component and tracked.process.component.container == container
         )
 
     @property
     def given_up(self) -> tuple[str, ...]:
         """The processes that have failed, and without which the run goes on."""
-        return tuple(name for name, one in self.tracked.items() if one.failed)
+        return tuple(name for name, tracked in self.tracked.items() if tracked.failed)
 
 
 def initial(plan: Plan, times: Times | None = None) -> State:
@@ -230,13 +230,13 @@ class Transition:
         pid = changes.pop("pid", None)
         before = self.state.tracked[name]
         entered = replace(before, state=state, since=self.now, detail=detail, failed=())
-        one = replace(entered, pid=pid, **changes)  # type: ignore[arg-type]
-        self.track(name, one)
-        self.notify(ProcessState(name, state, one.pid, detail))
+        tracked = replace(entered, pid=pid, **changes)  # type: ignore[arg-type]
+        self.track(name, tracked)
+        self.notify(ProcessState(name, state, tracked.pid, detail))
 
     def start(self, name: str) -> None:
         """Have the process started."""
-        order = 1 + max(one.order for one in self.state.tracked.values())
+        order = 1 + max(tracked.order for tracked in self.state.tracked.values())
         before = self.state.tracked[name]
         again = before.order > 0
         component = before.process.component
@@ -259,8 +259,8 @@ class Transition:
 
     def fail_process(self, name: str, found: Finding) -> None:
         """Report that the process failed for good, and stop everything if it is required."""
-        one = self.state.tracked[name]
-        if one.process.required is not False:
+        tracked = self.state.tracked[name]
+        if tracked.process.required is not False:
             self.fail(found)
         elif self.state.stop is None:
             advice = (
@@ -269,7 +269,8 @@ class Transition:
             )
             self.report(replace(found, severity="warning", help=advice))
             self.track(
-                name, replace(one, failed=(found.message, *(note.message for note in found.notes)))
+                name,
+                replace(tracked, failed=(found.message, *(note.message for note in found.notes))),
             )
 
     def fail(self, found: Finding) -> None:
@@ -288,16 +289,16 @@ class Transition:
             return
         self.update(stop=stop)
         self.notify(Stopping(reason))
-        for name, one in self.state.tracked.items():
-            if one.state == "backoff":
+        for name, tracked in self.state.tracked.items():
+            if tracked.state == "backoff":
                 self.enter(name, "stopped")
 
     def finish(self, exit_code: int) -> None:
         """End: nothing runs any more."""
         self.update(finished=True)
-        failed = [one for one in self.state.tracked.values() if one.failed]
+        failed = [tracked for tracked in self.state.tracked.values() if tracked.failed]
         failed.sort(
-            key=lambda one: (one.order == 0, one.since)
+            key=lambda tracked: (tracked.order == 0, tracked.since)
         )  # what was not started waited for another
         self.notify(Ended(exit_code, self.state.because or (failed[0].failed if failed else ())))
         self.actions.append(Finish(exit_code))

@@ -54,26 +54,26 @@ def process_exited(step: Transition, event: Exited) -> None:
 
 def _take_end(step: Transition, event: Exited) -> None:
     name, how = event.name, how_ended(event.returncode)
-    one = step.state.tracked[name]
+    tracked = step.state.tracked[name]
     if step.state.stop:
         step.enter(name, "stopped", how)
         return
-    if name == step.state.guard and step.state.clear is not None and not one.leaving:
-        _guard_exited(step, one, event)
+    if name == step.state.guard and step.state.clear is not None and not tracked.leaving:
+        _guard_exited(step, tracked, event)
         return
-    before = one
-    lose_edges(step, one)
-    one = step.state.tracked[name]
-    if one.leaving:
-        left(step, one, how)
+    before = tracked
+    lose_edges(step, tracked)
+    tracked = step.state.tracked[name]
+    if tracked.leaving:
+        left(step, tracked, how)
         return
-    process, ready = one.process, one.process.ready
-    meant = int(ready.number) if ready and ready.kind == "exit" else 0
-    done = event.returncode == meant and process.kind == "run"
+    process, ready = tracked.process, tracked.process.ready
+    expected = int(ready.number) if ready and ready.kind == "exit" else 0
+    done = event.returncode == expected and process.kind == "run"
     if name != step.state.guard and (
         process.restart == "always" or (process.restart == "on-failure" and not done)
     ):
-        _restart_after(step, one, event)
+        _restart_after(step, tracked, event)
         return
     step.enter(name, "exited", how)
     # What others wait for has come, and does not go with the process.
@@ -98,17 +98,17 @@ def _is_to_end(state: State, process: PlanProcess) -> bool:
     """
     ends = process.ready is not None and process.ready.kind == "exit"
     return ends or any(
-        one.process.after.get(process.name) == "done" for one in state.tracked.values()
+        tracked.process.after.get(process.name) == "done" for tracked in state.tracked.values()
     )
 
 
-def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:
+def _guard_exited(step: Transition, tracked: Tracked, event: Exited) -> None:
     """Have a guard that died follow itself.
 
     What it reported holds, and the next one is given its memory.
     """
     if not step.state.memory:
-        lose_edges(step, one)
+        lose_edges(step, tracked)
     unwatched = step.now if step.state.unwatched is None else step.state.unwatched
     step.update(unwatched=unwatched)
     _restart_after(step, step.state.tracked[event.name], event)
@@ -116,16 +116,16 @@ def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:
         step.report(guard_lost(event.name, event, strict=step.state.plan.guard.mode == "strict"))
 
 
-def lose_edges(step: Transition, one: Tracked) -> None:
+def lose_edges(step: Transition, tracked: Tracked) -> None:
     """Take the edges of a process as not live: it has ended, or is about to."""
-    state, name = step.state, one.process.name
-    step.track(name, replace(one, ready=False, ready_since=None, observed="", late=False))
+    state, name = step.state, tracked.process.name
+    step.track(name, replace(tracked, ready=False, ready_since=None, observed="", late=False))
     if name == state.guard:
         # A strict guard's memory holds what it latched, also for one that is restarted by request.
         memory = state.memory if state.plan.guard.mode == "strict" else {}
         step.update(live=frozenset(), complete=not state.plan.edges, memory=memory)
-    elif one.process.owns:
-        live = state.live - {child for _, child in one.process.owns}
+    elif tracked.process.owns:
+        live = state.live - {child for _, child in tracked.process.owns}
         step.update(
             live=live, complete=False, reminded=None if state.reminded is None else step.now
         )
@@ -138,63 +138,65 @@ def lose_components(step: Transition, container: str) -> None:
 
     Those that are wanted come again when it is ready again.
     """
-    for one in step.state.components_of(container):
-        if one.alive or one.state == "backoff":
-            lose_edges(step, one)
+    for tracked in step.state.components_of(container):
+        if tracked.alive or tracked.state == "backoff":
+            lose_edges(step, tracked)
             if (
-                not one.process.owns and step.state.guard is not None
+                not tracked.process.owns and step.state.guard is not None
             ):  # what was ordered holds for that container
-                step.actions.append(Order(Absent(one.process.name)))
-            one = step.state.tracked[one.process.name]  # noqa: PLW2901 (the same, without its edges)
+                step.actions.append(Order(Absent(tracked.process.name)))
+            tracked = step.state.tracked[tracked.process.name]  # noqa: PLW2901 (the same, without its edges)
             left(
                 step,
-                replace(one, leaving=one.leaving or ("again" if one.wanted else "stop")),
+                replace(
+                    tracked, leaving=tracked.leaving or ("again" if tracked.wanted else "stop")
+                ),
                 f"with {container}",
             )
 
 
-def left(step: Transition, one: Tracked, how: str) -> None:
+def left(step: Transition, tracked: Tracked, how: str) -> None:
     """Take a process that was meant to end as ended.
 
     It stays so, is started again, or leaves the plan.
     """
-    name = one.process.name
-    step.track(name, one)
+    name = tracked.process.name
+    step.track(name, tracked)
     step.enter(name, "stopped", how, level=0, failures=0)
-    if one.leaving == "drop":
+    if tracked.leaving == "drop":
         step.update(
             tracked={other: each for other, each in step.state.tracked.items() if other != name}
         )
     else:
         step.track(
-            name, replace(step.state.tracked[name], leaving="", wanted=one.leaving == "again")
+            name, replace(step.state.tracked[name], leaving="", wanted=tracked.leaving == "again")
         )
 
 
-def _restart_after(step: Transition, one: Tracked, event: Exited) -> None:
+def _restart_after(step: Transition, tracked: Tracked, event: Exited) -> None:
     schedule_restart(
         step,
-        one,
+        tracked,
         how_ended(event.returncode),
         lambda when: ended_by_itself(event.name, event.returncode, when, event.last_lines),
     )
 
 
 def schedule_restart(
-    step: Transition, one: Tracked, how: str, failure: Callable[[str], Finding]
+    step: Transition, tracked: Tracked, how: str, failure: Callable[[str], Finding]
 ) -> None:
     """Have a process started again after a while, unless it was too often.
 
     ``failure`` makes the finding then.
     """
-    name, times = one.process.name, step.state.times
-    most = one.process.restart_limit
-    failures = 1 if step.now - one.since >= times.steady_s else one.failures + 1
+    name, times = tracked.process.name, step.state.times
+    most = tracked.process.restart_limit
+    failures = 1 if step.now - tracked.since >= times.steady_s else tracked.failures + 1
     if failures > most:
         step.enter(name, "fatal", how)
         step.fail_process(name, failure(f", after {counted(most, 'restart')}"))
         return
-    delay = backoff_s(times, one.process, failures)
+    delay = backoff_s(times, tracked.process, failures)
     step.enter(
         name, "backoff", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures
     )
@@ -205,26 +207,26 @@ def schedule_restart(
 
 def refusal(state: State, name: str, verb: Verb) -> str | None:
     """Return why this cannot be done with that process, in one sentence; None if it can."""
-    one = state.tracked.get(name)
-    if one is None:
+    tracked = state.tracked.get(name)
+    if tracked is None:
         advice = did_you_mean(name, state.tracked, f"it has {', '.join(state.tracked)}")
         return f"the plan has no process {name}; {advice}"
     if state.stop:
         return "everything is being stopped"
-    if one.state == "expected":
+    if tracked.state == "expected":
         return f"{name} is external, and started and stopped elsewhere"
     if name == state.guard and verb != "restart":
         return (
             f"{name} watches the others and is not stopped alone; tfcompose up --guard off judges"
             " nobody"
         )
-    if verb == "start" and one.alive and one.leaving != "stop":
-        return f"{name} runs already, with pid {one.pid}"
+    if verb == "start" and tracked.alive and tracked.leaving != "stop":
+        return f"{name} runs already, with pid {tracked.pid}"
     if (
         verb == "stop"
-        and not one.alive
-        and one.state != "backoff"
-        and not (one.state == "stopped" and one.wanted)
+        and not tracked.alive
+        and tracked.state != "backoff"
+        and not (tracked.state == "stopped" and tracked.wanted)
     ):
         return f"{name} is not running"
     return None
@@ -234,14 +236,14 @@ def process_requested(step: Transition, request: ProcessRequest) -> None:
     """Stop, start or restart one process."""
     if refusal(step.state, request.name, request.do):
         return
-    one = step.state.tracked[request.name]
+    tracked = step.state.tracked[request.name]
     stays = request.do == "stop"
-    if one.alive:
+    if tracked.alive:
         step.track(
-            request.name, replace(one, leaving="stop" if stays else "again", wanted=not stays)
+            request.name, replace(tracked, leaving="stop" if stays else "again", wanted=not stays)
         )
         return
-    if one.state != "stopped":
+    if tracked.state != "stopped":
         step.enter(request.name, "stopped", failures=0)
     step.track(request.name, replace(step.state.tracked[request.name], wanted=not stays))
 
@@ -270,10 +272,10 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
     )
     if state.guard is not None and not before[state.guard].alive:
         step.update(memory={}, live=frozenset())  # the next one begins anew, with the new plan
-    gone = {name: one for name, one in before.items() if name not in step.state.tracked}
-    for name, one in gone.items():
-        if one.alive:
-            step.track(name, replace(one, leaving="drop", wanted=False))
+    gone = {name: tracked for name, tracked in before.items() if name not in step.state.tracked}
+    for name, tracked in gone.items():
+        if tracked.alive:
+            step.track(name, replace(tracked, leaving="drop", wanted=False))
     guard = step.state.guard
     if guard is not None and guard not in event.changed and step.state.tracked[guard].alive:
         step.actions.append(Order(Reread(event.file)))
@@ -286,15 +288,15 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
 
 def _taken_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked:
     process = event.plan.process(name)
-    one = before.get(name)
+    tracked = before.get(name)
     rests: StateName = "expected" if process.kind == "external" else "stopped"
-    if one is None:
+    if tracked is None:
         return Tracked(process, rests)
     if name not in event.changed:
-        return replace(one, process=process)
-    if one.alive and rests == "stopped":
-        return replace(one, process=process, leaving="again", wanted=True)
-    return Tracked(process, rests, order=one.order)
+        return replace(tracked, process=process)
+    if tracked.alive and rests == "stopped":
+        return replace(tracked, process=process, leaving="again", wanted=True)
+    return Tracked(process, rests, order=tracked.order)
 
 
 # What requests that everything stops.
@@ -365,75 +367,79 @@ def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
 
 def send_due_signals(step: Transition) -> None:
     """Signal ending processes in reverse order of start, escalating if needed."""
-    alive = [one for one in step.state.tracked.values() if one.alive]
-    for name in [one.process.name for one in sorted(alive, key=lambda one: -one.order)]:
-        one = step.state.tracked.get(name)
-        if one is None or not one.alive:  # it went with its container
+    alive = [tracked for tracked in step.state.tracked.values() if tracked.alive]
+    for name in [
+        tracked.process.name for tracked in sorted(alive, key=lambda tracked: -tracked.order)
+    ]:
+        tracked = step.state.tracked.get(name)
+        if tracked is None or not tracked.alive:  # it went with its container
             continue
-        level = _due_level(step.state, one, step.now)
-        if one.process.component:
-            _end_component(step, one, level, one.process.component.container)
+        level = _due_level(step.state, tracked, step.now)
+        if tracked.process.component:
+            _end_component(step, tracked, level, tracked.process.component.container)
             continue
-        if one.state == "starting" or level <= one.level:
+        if tracked.state == "starting" or level <= tracked.level:
             continue
-        signals = stop_signals(one.process)
-        if one.level == 0 and one.leaving:
-            lose_edges(step, one)
+        signals = stop_signals(tracked.process)
+        if tracked.level == 0 and tracked.leaving:
+            lose_edges(step, tracked)
             lose_components(step, name)
         step.actions.append(Kill(name, signals[level - 1]))
-        before = f"still there after {signals[one.level - 1].name}: " if one.level else ""
-        step.enter(name, "stopping", before + signals[level - 1].name, pid=one.pid, level=level)
+        before = f"still there after {signals[tracked.level - 1].name}: " if tracked.level else ""
+        step.enter(
+            name, "stopping", before + signals[level - 1].name, pid=tracked.pid, level=level
+        )
 
 
-def _end_component(step: Transition, one: Tracked, level: int, container: str) -> None:
+def _end_component(step: Transition, tracked: Tracked, level: int, container: str) -> None:
     """Have a component unloaded, if it is time.
 
     Where everything is stopped, it ends with its container.
     """
-    name, state = one.process.name, step.state
+    name, state = tracked.process.name, step.state
     if level and state.stop and state.tracked[container].state != "expected":
         step.enter(name, "stopped", f"with {container}")
-    if level <= one.level or not step.state.tracked[name].alive:
+    if level <= tracked.level or not step.state.tracked[name].alive:
         return
-    lose_edges(step, one)
-    step.actions.append(Order(ComponentOrder(name, one.order, "unload")))
-    step.enter(name, "stopping", "unloaded", pid=one.pid, level=1)
+    lose_edges(step, tracked)
+    step.actions.append(Order(ComponentOrder(name, tracked.order, "unload")))
+    step.enter(name, "stopping", "unloaded", pid=tracked.pid, level=1)
 
 
-def firmer_at(times: Times, one: Tracked) -> float | None:
+def firmer_at(times: Times, tracked: Tracked) -> float | None:
     """Return when the next signal is due.
 
     The plan's time counts for each, or else the launcher's.
     """
-    if one.state != "stopping" or not 0 < one.level < len(stop_signals(one.process)):
+    if tracked.state != "stopping" or not 0 < tracked.level < len(stop_signals(tracked.process)):
         return None
-    rule, kills = one.process.stop, one.level + 1 == len(stop_signals(one.process))
+    rule, kills = tracked.process.stop, tracked.level + 1 == len(stop_signals(tracked.process))
     own = rule.kill_timeout_s if kills and rule.kill_timeout_s is not None else rule.timeout_s
-    default = times.interrupt_s if one.level == 1 else times.terminate_s
-    return one.since + (default if own is None else own)
+    default = times.interrupt_s if tracked.level == 1 else times.terminate_s
+    return tracked.since + (default if own is None else own)
 
 
-def _due_level(state: State, one: Tracked, now: float) -> int:
+def _due_level(state: State, tracked: Tracked, now: float) -> int:
     """Return how many of its ``stop_signals`` the process should have been sent by now.
 
     The first is due when nothing runs that waits for the process, or when it alone is to end; each
     further one a while after the one before. A second signal to the launcher makes the second due
     at once, everywhere, and a third the third.
     """
-    due = firmer_at(state.times, one)
-    level = one.level + 1 if due is not None and now >= due else one.level
-    if level == 0 and (one.leaving or (state.stop and not _is_needed(state, one))):
+    due = firmer_at(state.times, tracked)
+    level = tracked.level + 1 if due is not None and now >= due else tracked.level
+    if level == 0 and (tracked.leaving or (state.stop and not _is_needed(state, tracked))):
         level = 1
     if state.stop and state.stop.signals > 1:
         level = max(level, state.stop.signals)
-    return min(level, len(stop_signals(one.process)))
+    return min(level, len(stop_signals(tracked.process)))
 
 
-def _is_needed(state: State, one: Tracked) -> bool:
-    others = [other for other in state.tracked.values() if other.alive and other is not one]
-    if one.process.name == state.guard:
+def _is_needed(state: State, tracked: Tracked) -> bool:
+    others = [other for other in state.tracked.values() if other.alive and other is not tracked]
+    if tracked.process.name == state.guard:
         return bool(others)
     return any(
-        one.process.name in other.process.after and other.process.name != state.guard
+        tracked.process.name in other.process.after and other.process.name != state.guard
         for other in others
     )

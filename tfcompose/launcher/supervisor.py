@@ -136,7 +136,9 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     what the run has on this machine besides its processes. Must be called in the main thread.
     """
     state = initial(plan, times)
-    processes = [one.process for one in state.tracked.values() if one.state != "expected"]
+    processes = [
+        tracked.process for tracked in state.tracked.values() if tracked.state != "expected"
+    ]
     base = os.environ if base_env is None else base_env
     built_in = session.base if session else None
     commands, found = commands_of(plan, processes, plan_file, base, environment, built_in)
@@ -222,7 +224,9 @@ class _Supervisor:
         if self._state.clear is not None or self._state.stop:
             return
         own = [
-            one.process for one in self._state.tracked.values() if one.process.kind in _PREPARED
+            tracked.process
+            for tracked in self._state.tracked.values()
+            if tracked.process.kind in _PREPARED
         ]
         for process in [process for process in own if not process.after][: os.cpu_count() or 1]:
             self._children.prepare(process, self._commands[process.name])

@@ -374,25 +374,25 @@ def _order_of(part: str) -> tuple[int, str]:
 
 def _damaged(path: str, error: Exception) -> BagError:
     """Return what to say where the library cannot read a bag."""
-    words = " ".join(str(error).split()) or type(error).__name__
+    reason = " ".join(str(error).split()) or type(error).__name__
     advice = ""
-    if "end magic" in words:
-        words = "it ends in the middle, as when the recorder was killed"
+    if "end magic" in reason:
+        reason = "it ends in the middle, as when the recorder was killed"
         advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"
     elif (
         _is_mcap(Path(path))
         and not isinstance(error, OSError)
         and not type(error).__module__.startswith("rosbags")
     ):
-        words = (  # what the library did not expect, such as a size beyond all bounds
-            f"it is damaged ({words})"
+        reason = (  # what the library did not expect, such as a size beyond all bounds
+            f"it is damaged ({reason})"
         )
         advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"
-    elif "malformed" in words or "missing tables" in words or "not a database" in words:
+    elif "malformed" in reason or "missing tables" in reason or "not a database" in reason:
         advice = "sqlite3 FILE .recover | sqlite3 WHOLE.db3 keeps what is whole in it"
-    elif "metadata" in words or "database files are missing" in words:
+    elif "metadata" in reason or "database files are missing" in reason:
         advice = "ros2 bag reindex writes metadata.yaml anew; or name a recording in the folder"
-    return BagError(f"{path} cannot be read as a bag: {words}", advice)
+    return BagError(f"{path} cannot be read as a bag: {reason}", advice)
 
 
 def _is_mcap(path: Path) -> bool:

@@ -63,7 +63,11 @@ class Own:
         """
         return [
             *self.given,
-            *(word for old, new in self.process.remap.items() for word in ("-r", f"{old}:={new}")),
+            *(
+                argument
+                for old, new in self.process.remap.items()
+                for argument in ("-r", f"{old}:={new}")
+            ),
         ]
 
     @property
@@ -135,11 +139,11 @@ def read_own(argv: Sequence[str], kind: str) -> Own:
     Raises:
         RejectedError: with a TF902 finding, if there is no such plan or process.
     """
-    words = list(argv)
-    at = words.index("--ros-args") if "--ros-args" in words else len(words)
+    arguments = list(argv)
+    at = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
     if at != _ARGUMENTS:
         raise _unfit(f"usage: tfcompose {kind} PLAN_FILE PROCESS_NAME [--ros-args …]", "")
-    file, name = words[:at]
+    file, name = arguments[:at]
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
     except (OSError, UnicodeDecodeError) as error:
@@ -152,7 +156,7 @@ def read_own(argv: Sequence[str], kind: str) -> Own:
         raise _unfit(f"process {name} is of kind {process.kind}, not {kind}", file)
     if kind == "simulate" and process.simulate is None:
         raise _unfit(f"process {name} does not say what to simulate", file)
-    return Own(plan, process, Path(file), tuple(words[at + 1 :]))
+    return Own(plan, process, Path(file), tuple(arguments[at + 1 :]))
 
 
 def _unfit(message: str, file: str) -> RejectedError:

@@ -51,7 +51,11 @@ def run(arguments: Namespace) -> int:
         compiled_robot(arguments.old, arguments), compiled_robot(arguments.new, arguments)
     )
     if arguments.format == "json":
-        print(json.dumps([one._asdict() for one in found], indent=2, ensure_ascii=False))
+        print(
+            json.dumps(
+                [difference._asdict() for difference in found], indent=2, ensure_ascii=False
+            )
+        )
     else:
         print("\n".join(map(str, found)) or "no difference between the two trees")
     return int(bool(found))

@@ -85,7 +85,7 @@ def run(arguments: Namespace) -> int:
             return _print([finding("TF901", str(error), None)], arguments.format)
         if stop.requested:
             check_early_end(found.seconds, arguments.duration, heard=bool(found.edges))
-    findings = [*(one for one in odd if one), *found.findings]
+    findings = [*(finding for finding in odd if finding), *found.findings]
     code = _print(findings, arguments.format)
     if arguments.format == "text":
         observed = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"
@@ -96,8 +96,8 @@ def run(arguments: Namespace) -> int:
         for cost in found.costs:
             print(printable(cost))
         if found.edges and found.elsewhere:
-            words = namespace_options(found.elsewhere)
-            print(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {words}")
+            options = namespace_options(found.elsewhere)
+            print(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {options}")
     return code
 
 

@@ -66,8 +66,8 @@ def _stop_leftovers(robot: str | None) -> int:
     for leftover in found:
         print(f"stopping {leftover.pid}: {leftover.command}")
     rest = end(found)
-    for one in rest:
-        warn(f"{one.pid} is still running: {one.command}")
+    for leftover in rest:
+        warn(f"{leftover.pid} is still running: {leftover.command}")
     if rest:
         return FAILED
     print(f"{len(found)} process{'' if len(found) == 1 else 'es'} of earlier runs stopped")

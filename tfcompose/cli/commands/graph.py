@@ -188,12 +188,12 @@ def graph_of_observers(
     return Graph(printable(title), (), tuple(arrows))
 
 
-def _arrow(one: EdgeState, *, poses: bool) -> Arrow:
+def _arrow(edge: EdgeState, *, poses: bool) -> Arrow:
     from tfcompose.compiler.draw import Arrow
 
-    stream = one.stream
-    rate = "" if stream.static or one.timing.rate is None else f"{one.timing.rate:.1f} Hz"
-    owner = printable(one.publisher) or "unknown"
+    stream = edge.stream
+    rate = "" if stream.static or edge.timing.rate is None else f"{edge.timing.rate:.1f} Hz"
+    owner = printable(edge.publisher) or "unknown"
     below = _pose(stream.pose) if poses else ""
     kind: Kind = "static" if stream.static else "dynamic"
     return Arrow(

@@ -129,7 +129,7 @@ def codes(text: str) -> list[str]:
     """
     from tfcompose.foundation.catalogue import CATALOGUE, absent_code
 
-    beginnings = [one.strip() for one in text.split(",")]
+    beginnings = [part.strip() for part in text.split(",")]
     for beginning in beginnings:
         named = [CATALOGUE[code] for code in CATALOGUE if beginning and code.startswith(beginning)]
         if not named:
@@ -190,7 +190,7 @@ def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[
     else:
         cases = {file: lint(file, read) for file in robots}
     cases |= {file: _selected(linter.lint_urdf(file, read), arguments) for file in urdfs}
-    found = [one for case in cases.values() for one in case]
+    found = [finding for case in cases.values() for finding in case]
     _print(cases, arguments, len(robots) + len(urdfs))
     if exit_code_of(found) == UNREADABLE:
         return UNREADABLE
@@ -287,15 +287,15 @@ def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
         name = error.filename or "?"
         return {name: [finding("TF001", f"cannot be fixed: {error.strerror}", Span(name))]}
     stream = sys.stdout if arguments.format == "text" else sys.stderr
-    for one in fixer.fixed:
-        now = " … ".join(edit.text.strip(", \n") for edit in one.edits)
-        stream.write(f"{one.span}: fixed[{one.code}] {one.message}: now {now}\n")
+    for fixed in fixer.fixed:
+        now = " … ".join(edit.text.strip(", \n") for edit in fixed.edits)
+        stream.write(f"{fixed.span}: fixed[{fixed.code}] {fixed.message}: now {now}\n")
     return found
 
 
 def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) -> None:
     """Print the findings of each file; beside a difference, to stderr."""
-    form, found = arguments.format, [one for case in cases.values() for one in case]
+    form, found = arguments.format, [finding for case in cases.values() for finding in case]
     if form == "text":
         from tfcompose.compiler.render.text import summary
 

@@ -126,10 +126,12 @@ def _place(robot: str | None, command: str) -> RuntimeDir:
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
     there = [place for place in runtime_dirs(os.environ) if is_folder(place.logs)]
-    meant = [place for place in there if is_meant(place, robot)] if robot else in_scope(there)
-    running = [place for place in meant if place.holder()]
-    if meant and len(running) <= 1:
-        return running[0] if running else max(meant, key=lambda place: last_modified(place.logs))
+    matching = [place for place in there if is_meant(place, robot)] if robot else in_scope(there)
+    running = [place for place in matching if place.holder()]
+    if matching and len(running) <= 1:
+        return (
+            running[0] if running else max(matching, key=lambda place: last_modified(place.logs))
+        )
     return chosen_run(robot, command, among=lambda: running or there)
 
 

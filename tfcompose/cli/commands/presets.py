@@ -94,17 +94,17 @@ def _list(only: str | None, known: Library, form: str) -> int:
         for name, preset in presets.items()
     ]
     rows += preset_page.node_rows()
-    words = sorted({word for row in rows for word in _words(row)})
+    kinds = sorted({kind for row in rows for kind in _words(row)})
     wanted = {only, *_KINDS.get(only or "", ())}
     exact = [row for row in rows if not only or not wanted.isdisjoint(_words(row))]
-    partly = [row for row in rows if only and any(only.lower() in word for word in _words(row))]
+    partly = [row for row in rows if only and any(only.lower() in kind for kind in _words(row))]
     rows = (
         exact or partly or [row for row in rows if only and only.lower() in row["about"].lower()]
     )
     if not rows:
         warn(
             f"no preset, vendor or kind {only};"
-            f" {did_you_mean(only or '', words, 'tfcompose presets lists them')}"
+            f" {did_you_mean(only or '', kinds, 'tfcompose presets lists them')}"
         )
         return 1
     if form == "json":

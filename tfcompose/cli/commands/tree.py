@@ -209,7 +209,7 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
         if planned is None:
             return (name, "", "", "", "", "")
         return (name, planned.kind, "", "", "", f"missing: owner {planned.owner} ({planned.node})")
-    one = branch.observed[0]
+    observed = branch.observed[0]
     others = [
         f"also {printable(other.name)} from {printable(other.publisher) or 'unknown'}"
         for other in branch.observed[1:]
@@ -217,13 +217,13 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
     remarks = [_status(branch, plan)] if plan else []
     rate = (
         ""
-        if one.stream.static
-        else f"{one.timing.rate:.1f} Hz"
-        if one.timing.rate is not None
+        if observed.stream.static
+        else f"{observed.timing.rate:.1f} Hz"
+        if observed.timing.rate is not None
         else "–"
     )
-    age = "" if one.data_age_s is None else duration(one.data_age_s)
-    kind = "static" if one.stream.static else "dynamic"
+    age = "" if observed.data_age_s is None else duration(observed.data_age_s)
+    kind = "static" if observed.stream.static else "dynamic"
     return (
         name,
         kind,
@@ -241,29 +241,33 @@ def _owner(branch: Branch, plan: Plan | None) -> str:
     """
     from tfcompose.guard.verdict.ownership import may_be_owners, relays_of
 
-    planned, one = branch.planned, branch.observed[0]
-    if plan is None or planned is None or not may_be_owners(planned, one.nodes, relays_of(plan)):
-        return one.publisher
-    through = "" if planned.node in one.nodes else "through "
-    return f"{planned.owner} ({through}{one.publisher})"
+    planned, observed = branch.planned, branch.observed[0]
+    if (
+        plan is None
+        or planned is None
+        or not may_be_owners(planned, observed.nodes, relays_of(plan))
+    ):
+        return observed.publisher
+    through = "" if planned.node in observed.nodes else "through "
+    return f"{planned.owner} ({through}{observed.publisher})"
 
 
 def _status(branch: Branch, plan: Plan) -> str:
     from tfcompose.guard.verdict.ownership import code_of, may_be_owners, relays_of
 
-    planned, one = branch.planned, branch.observed[0] if branch.observed else None
-    if one is None:
+    planned, observed = branch.planned, branch.observed[0] if branch.observed else None
+    if observed is None:
         return "missing"
     if planned is None:
-        allowed = plan.may_be_undeclared(one.stream.parent, one.stream.child)
+        allowed = plan.may_be_undeclared(observed.stream.parent, observed.stream.child)
         return "allowed" if allowed else "unexpected"
-    owner = not one.nodes or may_be_owners(planned, one.nodes, relays_of(plan))
+    owner = not observed.nodes or may_be_owners(planned, observed.nodes, relays_of(plan))
     code = code_of(
         planned,
-        one.stream.parent,
-        static=one.stream.static,
+        observed.stream.parent,
+        static=observed.stream.static,
         owner=owner,
-        sure=len(one.nodes) < 2,  # noqa: PLR2004
+        sure=len(observed.nodes) < 2,  # noqa: PLR2004
     )
     match code:
         case "TF802":
@@ -306,5 +310,5 @@ def _edge_object(branch: Branch, plan: Plan | None) -> dict[str, Any]:
         "parent": branch.parent,
         "child": branch.frame,
         **status,
-        "seen": [object_of(one) for one in branch.observed],
+        "seen": [object_of(observed) for observed in branch.observed],
     }

@@ -90,23 +90,23 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
 def diagnose(state: TreeState) -> list[Finding]:
     """Return everything that is wrong, errors first, else in the order of the checks."""
     found = [finding for diagnosis in DIAGNOSES for finding in diagnosis(state)]
-    return sorted(dict.fromkeys(found), key=lambda one: one.severity)
+    return sorted(dict.fromkeys(found), key=lambda finding: finding.severity)
 
 
 def examine(states: Sequence[TreeState]) -> Diagnosis:
     """Judge all states of one observation, of one or more pairs of topics."""
-    findings = list(dict.fromkeys(one for state in states for one in diagnose(state)))
+    findings = list(dict.fromkeys(finding for state in states for finding in diagnose(state)))
     edges = {(edge.parent, edge.child) for state in states for edge in state.taken}
     names = {name for state in states for edge in state.taken for name in edge.nodes}
     roots = tuple(dict.fromkeys(root for state in states for root in tree.trees_of(state)))
     own = {topic for state in states for topic in state.topics}
     with_tf = [
-        one.name for state in states[:1] for one in state.typed(TF_MESSAGE) if one.publishers
+        topic.name for state in states[:1] for topic in state.typed(TF_MESSAGE) if topic.publishers
     ]
     elsewhere = tuple(name for name in with_tf if name not in own and "/_" not in name)
     seconds = states[0].seconds if states else 0.0
     return Diagnosis(
-        sorted(findings, key=lambda one: one.severity),
+        sorted(findings, key=lambda finding: finding.severity),
         len(edges),
         len(names),
         seconds=seconds,
@@ -125,21 +125,21 @@ def cost(state: TreeState) -> str:
 
     Each message goes to each listener: what sends several edges does so with one.
     """
-    messages = sum(one.messages for one in state.sent.values())
+    messages = sum(count.messages for count in state.sent.values())
     if not messages or not state.seconds:
         return ""
     name = state.topics[0]
     readers = next((topic.readers for topic in state.graph if topic.name == name), ())
-    transforms = sum(one.transforms for one in state.sent.values())
+    transforms = sum(count.transforms for count in state.sent.values())
     text = (
         f"{name} carries {messages / state.seconds:.0f} messages a second with"
         f" {transforms / state.seconds:.0f} transforms to {counted(len(readers), 'listener')}"
     )
     single = []
-    for gid, one in state.sent.items():
+    for gid, count in state.sent.items():
         edges = [edge for edge in state.moving if edge.stream.gid == gid]
-        if one.messages == one.transforms and len(edges) >= _SINGLE_FROM:
-            hertz = one.messages / state.seconds
+        if count.messages == count.transforms and len(edges) >= _SINGLE_FROM:
+            hertz = count.messages / state.seconds
             single.append(
                 f"{who(edges[0])} sends its {len(edges)} edges one by one ({hertz:.0f}/s)"
             )

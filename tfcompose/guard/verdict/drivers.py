@@ -123,8 +123,8 @@ def driver_pose_differs(
         f" {compared(edge.pose, sent)}"
     )
     notes = [
-        Note(f"{one.edge.child} in {one.edge.parent}: {compared(one.edge.pose, pose)}")
-        for one, pose in others
+        Note(f"{reading.edge.child} in {reading.edge.parent}: {compared(reading.edge.pose, pose)}")
+        for reading, pose in others
     ]
     own = f"{{{edge.child}: {{xyz: [{_row(sent.xyz)}], quat_xyzw: [{_row(sent.quat_xyzw)}]}}}}"
     values = f"sensors: {{{driven.sensor}: {{frames: {own}}}}}"

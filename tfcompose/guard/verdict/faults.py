@@ -247,7 +247,7 @@ def _wrong_topic(group: FaultGroup) -> tuple[str, str]:
     received, declared = (fixed, moving) if first.static else (moving, fixed)
     by = "" if first.recorded else f"its owner {first.who}"
     message = publishers.topics_message(
-        group.edges, [(received, by)], declared=declared, several=bool(group.more)
+        group.edges, [(received, by)], declared=declared, are_many=bool(group.more)
     )
     return message, "static: true says that the owner sends it on /tf_static"
 
@@ -264,7 +264,7 @@ def _self(group: FaultGroup) -> tuple[str, str]:
 
 def _two_publishers(group: FaultGroup) -> tuple[str, str]:
     names = [group.first.who, group.first.detail]
-    message = publishers.two_publishers_message(group.edges, names, several=bool(group.more))
+    message = publishers.two_publishers_message(group.edges, names, are_many=bool(group.more))
     advice = "end one of them, or let each send a frame of its own: tf2 takes whatever came last"
     return message, advice
 

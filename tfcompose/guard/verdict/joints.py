@@ -187,7 +187,7 @@ def sent_twice(senders: Sequence[SentJoints]) -> Iterator[Finding]:
                 shared.setdefault((topic, nodes), []).append(joint)
     for (topic, nodes), joints in shared.items():
         named = listed(joints, _NAMED_AT_MOST)
-        message = two_publishers_message(named, nodes, several=len(joints) > 1)
+        message = two_publishers_message(named, nodes, are_many=len(joints) > 1)
         yield finding(
             "TF860",
             f"{message}, on {topic}",
@@ -217,8 +217,10 @@ def unknown_joints(senders: Sequence[SentJoints], known: Collection[str]) -> Ite
         unknown = sorted(sender.joints.difference(known))
         if not unknown or not sender.node:
             continue
-        meant = {joint: nearest(joint, list(known)) for joint in unknown}
-        near = [f"did you mean {name} for {joint}?" for joint, name in meant.items() if name]
+        nearest_names = {joint: nearest(joint, list(known)) for joint in unknown}
+        near = [
+            f"did you mean {name} for {joint}?" for joint, name in nearest_names.items() if name
+        ]
         yield finding(
             "TF861",
             f"{sender.node} sends {listed(unknown, _NAMED_AT_MOST)} on {sender.topic}; the robot"

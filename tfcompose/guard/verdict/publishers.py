@@ -36,15 +36,15 @@ TOGETHER_S = 0.3
 # What there is to say.
 
 
-def two_publishers_message(edges: str, publishers: Sequence[str], *, several: bool) -> str:
+def two_publishers_message(edges: str, publishers: Sequence[str], *, are_many: bool) -> str:
     """Return the message for edges that have two publishers; one name alone is there twice."""
     names = list(dict.fromkeys(publishers))
     by = f"twice by {names[0]}" if len(names) == 1 else f"by {' and by '.join(names)}"
-    return f"{edges} {'are' if several else 'is'} published {by}"
+    return f"{edges} {'are' if are_many else 'is'} published {by}"
 
 
 def topics_message(
-    edges: str, topics: Sequence[tuple[str, str]], declared: str = "", *, several: bool = False
+    edges: str, topics: Sequence[tuple[str, str]], declared: str = "", *, are_many: bool = False
 ) -> str:
     """Return the message for edges that come on the wrong topic, or on two.
 
@@ -54,7 +54,7 @@ def topics_message(
     """
     on = " and ".join(f"on {' by '.join(filter(None, pair))}" for pair in topics)
     return (
-        f"{edges} {'are' if several else 'is'} published"
+        f"{edges} {'are' if are_many else 'is'} published"
         f" {on}{', declared for ' if declared else ''}{declared}"
     )
 
@@ -117,12 +117,12 @@ def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: boo
         advice += 'a script passes them on with "$@"'
         return finding("TF852", message, None, help=advice)
     variable = PROFILE_VARIABLES[0]
-    given = f"with {variable}={profile}, which" if profile else f"without {variable}, which"
-    notes = [
-        Note(
-            f"it runs {given} a script or program that starts it {'sets' if profile else 'unsets'}"
-        )
-    ]
+    starter = "a script or program that starts it"
+    if profile:
+        how = f"with {variable}={profile}, which {starter} sets"
+    else:
+        how = f"without {variable}, which {starter} unsets"
+    notes = [Note(f"it runs {how}")]
     if profile:
         advice = (
             f"take {variable} out of the script, and name the file in the robot's file, where the"
@@ -222,7 +222,7 @@ def two_publishers(state: TreeState) -> Iterator[Finding]:
         names = list(dict.fromkeys(who(edge) for edge in rivals))
         named = with_more(rivals[0].name, len(found) - 1)
         message = (
-            two_publishers_message(named, names, several=len(found) > 1)
+            two_publishers_message(named, names, are_many=len(found) > 1)
             + f"; {_difference(rivals)}"
         )
         notes = [Note(_where(state, edge)) for edge in rivals]
@@ -334,7 +334,7 @@ def many_static(state: TreeState) -> Iterator[Finding]:
     """So many nodes publish fixed frames that listeners lose some."""
     fixed = [publisher for publisher in state.publishers if publisher.static]
     if len(fixed) >= MOST_STATIC:
-        nodes = sorted({one.node for one in fixed if one.node})
+        nodes = sorted({publisher.node for publisher in fixed if publisher.node})
         message = (
             f"{len(fixed)} publishers on {state.topics[1]}, and a listener keeps the last"
             f" {MOST_STATIC} messages"
@@ -426,10 +426,10 @@ def pose_differs(
     )
     notes = [
         Note(
-            f"{one.child} in {above} by {offset_of(one.pose, sent).text}:"
-            f" {compared(one.pose, sent)}"
+            f"{edge.child} in {above} by {offset_of(edge.pose, sent).text}:"
+            f" {compared(edge.pose, sent)}"
         )
-        for one, above, sent in others[:LISTED_AT_MOST]
+        for edge, above, sent in others[:LISTED_AT_MOST]
     ]
     notes += (
         [] if place else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]

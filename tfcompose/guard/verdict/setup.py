@@ -26,10 +26,10 @@ MOST_SETTINGS = MOST_PROCESSES = 3
 
 def settings_text(settings: Mapping[str, str]) -> str:
     """Return the settings as people read them."""
-    words = [f"{name}={settings[name]}" for name in VARIABLES if settings.get(name)]
+    settings_shown = [f"{name}={settings[name]}" for name in VARIABLES if settings.get(name)]
     if not settings.get(DOMAIN):
-        words.insert(0, f"{DOMAIN} unset (0)")
-    return ", ".join(words)
+        settings_shown.insert(0, f"{DOMAIN} unset (0)")
+    return ", ".join(settings_shown)
 
 
 def elsewhere_help(elsewhere: Sequence[str]) -> str:
@@ -87,7 +87,8 @@ def other_settings(state: TreeState) -> Iterator[Finding]:
     # Those of this domain first: they are of this robot. Else who was started last, as robots are
     # that one looks for.
     order = sorted(
-        found.items(), key=lambda item: (DOMAIN in dict(item[0]), -max(one.pid for one in item[1]))
+        found.items(),
+        key=lambda item: (DOMAIN in dict(item[0]), -max(process.pid for process in item[1])),
     )
     for apart_items, processes in order[:MOST_SETTINGS]:
         number = "a ROS process" if len(processes) == 1 else f"{len(processes)} ROS processes"

@@ -82,7 +82,7 @@ class Difference:
 def differences(state: TreeState, plan: Plan, tolerance: Offset = SAME_POSE) -> list[Difference]:
     """Return what differs from the plan: edge by edge in its order, then what is not in it."""
     comparison = _Comparison(state, plan, tolerance)
-    planned = [one for edge in plan.edges for one in comparison.of_planned(edge)]
+    planned = [difference for edge in plan.edges for difference in comparison.of_planned(edge)]
     return [*planned, *comparison.undeclared()]
 
 
@@ -121,21 +121,26 @@ class _Comparison:
 
     def of_planned(self, edge: PlanEdge) -> Iterator[Difference]:
         some = self.by_child.get(edge.child, [])
-        for one in some:
-            yield from self._fault(edge, one)
-            yield from self._value(edge, one)
+        for observed in some:
+            yield from self._fault(edge, observed)
+            yield from self._value(edge, observed)
         yield from self._twice(edge, some)
-        hanging = [one for one in some if one.parent != edge.child]
+        hanging = [observed for observed in some if observed.parent != edge.child]
         if not hanging:
             yield Difference("TF811", edge)
         owners = [
-            one
-            for one in hanging
-            if edge.may_hang_on(one.parent) and (not one.nodes or self._may_own(edge, one))
+            observed
+            for observed in hanging
+            if edge.may_hang_on(observed.parent)
+            and (not observed.nodes or self._may_own(edge, observed))
         ]
         if owners:  # one that was started again is judged by what came last
             newest = max(
-                owners, key=lambda one: (one.present is not False, one.stream.arrivals.last_ns)
+                owners,
+                key=lambda observed: (
+                    observed.present is not False,
+                    observed.stream.arrivals.last_ns,
+                ),
             )
             yield from _times(edge, newest, simulated=self.plan.ros.clock == "sim")
 
@@ -147,13 +152,13 @@ class _Comparison:
                 continue
             yield self._faulty("TF803", None, edge)
 
-    def _fault(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
-        stream = one.stream
+    def _fault(self, edge: PlanEdge, observed: EdgeState) -> Iterator[Difference]:
+        stream = observed.stream
         if stream.parent == stream.child:
-            yield self._faulty(SELF, edge, one)
+            yield self._faulty(SELF, edge, observed)
             return
-        unknown = not one.nodes and (self.state.recorded or one.known_s < NAMELESS_S)
-        owner, sure = unknown or self._may_own(edge, one), unknown or len(one.nodes) == 1
+        unknown = not observed.nodes and (self.state.recorded or observed.known_s < NAMELESS_S)
+        owner, sure = unknown or self._may_own(edge, observed), unknown or len(observed.nodes) == 1
         code = code_of(edge, stream.parent, static=stream.static, owner=owner, sure=sure)
         if code:
             off = (
@@ -161,7 +166,7 @@ class _Comparison:
                 if code == "TF801" and stream.rejected_row is not stream.row
                 else None
             )
-            found = self._faulty(code, edge, one)
+            found = self._faulty(code, edge, observed)
             yield (
                 replace(found, off=off)
                 if off is not None and off.beyond(self.tolerance)
@@ -169,27 +174,31 @@ class _Comparison:
             )
 
     def _faulty(
-        self, code: str, edge: PlanEdge | None, one: EdgeState, *, namesake: bool = False
+        self, code: str, edge: PlanEdge | None, observed: EdgeState, *, namesake: bool = False
     ) -> Difference:
-        stream = one.stream
+        stream = observed.stream
         fault = Fault(
             code,
             stream.parent,
             stream.child,
-            nodes=one.nodes,
+            nodes=observed.nodes,
             static=stream.static,
             edge=edge,
             namesake=namesake,
             recorded=self.state.recorded,
         )
-        return Difference(code, edge, one, fault)
+        return Difference(code, edge, observed, fault)
 
     def _twice(self, edge: PlanEdge, some: Sequence[EdgeState]) -> Iterator[Difference]:
         """Judge publishers that all have the owner's name: there is one too many."""
         namesakes: dict[bytes | None, EdgeState] = {}
-        for one in sorted(some, key=lambda one: one.stream.first_ns):
-            if one.nodes == (edge.node,) and one.present and edge.may_hang_on(one.parent):
-                namesakes.setdefault(one.stream.gid, one)
+        for observed in sorted(some, key=lambda observed: observed.stream.first_ns):
+            if (
+                observed.nodes == (edge.node,)
+                and observed.present
+                and edge.may_hang_on(observed.parent)
+            ):
+                namesakes.setdefault(observed.stream.gid, observed)
         of_kind = [
             namesake
             for namesake in namesakes.values()
@@ -198,25 +207,25 @@ class _Comparison:
         for other in of_kind[1:]:
             yield self._faulty("TF801", edge, other, namesake=True)
 
-    def _may_own(self, edge: PlanEdge, one: EdgeState) -> bool:
+    def _may_own(self, edge: PlanEdge, observed: EdgeState) -> bool:
         return may_be_owners(
-            edge, one.nodes, self._relays | self._stand_ins.get(edge.child, frozenset())
+            edge, observed.nodes, self._relays | self._stand_ins.get(edge.child, frozenset())
         )
 
-    def _value(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
-        stream = one.stream
+    def _value(self, edge: PlanEdge, observed: EdgeState) -> Iterator[Difference]:
+        stream = observed.stream
         if stream.rejected_row is stream.row or not edge.may_hang_on(stream.parent):
             return
-        if one.nodes and not self._may_own(edge, one):
+        if observed.nodes and not self._may_own(edge, observed):
             return  # somebody else's value is reported with who it is
         driver = self.drivers.get(edge.child)
         if driver is not None:
             if is_off(driver, stream.pose):
-                yield Difference("TF828", edge, one, driver=driver)
+                yield Difference("TF828", edge, observed, driver=driver)
             return
         off = self._off(edge, stream.pose)
         if off is not None and off.beyond(self.tolerance):
-            yield Difference("TF846", edge, one, off=off)
+            yield Difference("TF846", edge, observed, off=off)
 
     def _off(self, edge: PlanEdge, pose: Pose) -> Offset | None:
         """Return how far the pose is from what is fixed of it, None where nothing is."""
@@ -229,39 +238,39 @@ class _Comparison:
         return off if is_fixed(edge, owner) else None
 
 
-def _times(edge: PlanEdge, one: EdgeState, *, simulated: bool) -> Iterator[Difference]:
+def _times(edge: PlanEdge, observed: EdgeState, *, simulated: bool) -> Iterator[Difference]:
     """Judge whether it comes, and often enough.
 
     A simulation may go slower than the time of day.
     """
     rate, limit_s = edge.rate, edge.silent_after_s
-    if one.present is False:
-        yield Difference("TF804", edge, one, silence_s=one.age_s)
+    if observed.present is False:
+        yield Difference("TF804", edge, observed, silence_s=observed.age_s)
         return
-    if one.stream.static or rate is None or limit_s is None:
+    if observed.stream.static or rate is None or limit_s is None:
         return
-    speed = min(1.0, one.stream.speed) if simulated else 1.0
+    speed = min(1.0, observed.stream.speed) if simulated else 1.0
     limit_s /= speed
-    gap_s, observed_rate = one.timing.longest_gap_s, one.timing.rate
-    if one.age_s > limit_s:
-        yield Difference("TF804", edge, one, silence_s=one.age_s)
+    gap_s, observed_rate = observed.timing.longest_gap_s, observed.timing.rate
+    if observed.age_s > limit_s:
+        yield Difference("TF804", edge, observed, silence_s=observed.age_s)
     elif gap_s is not None and gap_s > limit_s:
-        yield Difference("TF804", edge, one, silence_s=gap_s, over=True)
+        yield Difference("TF804", edge, observed, silence_s=gap_s, over=True)
     elif (
         observed_rate is not None
-        and one.stream.arrivals.count >= FEWEST
+        and observed.stream.arrivals.count >= FEWEST
         and edge.is_slow(observed_rate, speed)
     ):
-        yield Difference("TF805", edge, one)
+        yield Difference("TF805", edge, observed)
 
 
 def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
     """Return what to do about an edge that never came."""
     planned = {edge.child for edge in plan.edges}
     strangers = [edge.child for edge in state.edges if edge.child not in planned]
-    meant = did_you_mean(edge.child, strangers)
-    if meant or state.recorded:
-        return meant
+    advice = did_you_mean(edge.child, strangers)
+    if advice or state.recorded:
+        return advice
     if edge.node in state.nodes:
         return (
             f"{edge.node} is running and sends nothing: what does it wait for, and is its TF"
@@ -316,74 +325,83 @@ def _difference_finding(
     group: Group, state: TreeState, plan: Plan, place: Span | None, slow_is: Severity
 ) -> Finding:
     first = group[0]
-    edges = [one.edge for one in group if one.edge is not None]
+    edges = [difference.edge for difference in group if difference.edge is not None]
     if first.live is None:
         return never_received(edges, missing_help(state, plan, edges[0]), place)
     stream = first.live.stream
     if first.driver is not None:
         off = [
-            (one.driver, one.live.stream.pose)
-            for one in group
-            if one.driver is not None and one.live is not None
+            (difference.driver, difference.live.stream.pose)
+            for difference in group
+            if difference.driver is not None and difference.live is not None
         ]
         return driver_pose_differs(first.live.publisher, off, place)
     if first.off is not None:
         return _poses(group, place)
     if first.code == "TF805":
         return slow(
-            edges, min(one.live.timing.rate or 0.0 for one in group if one.live), place, slow_is
+            edges,
+            min(difference.live.timing.rate or 0.0 for difference in group if difference.live),
+            place,
+            slow_is,
         )
     if stream.static:
         return left(edges, place)
     gone = first.live.present is False
-    return silent(edges, max(one.silence_s for one in group), place, over=first.over, gone=gone)
+    return silent(
+        edges, max(difference.silence_s for difference in group), place, over=first.over, gone=gone
+    )
 
 
-def _key(one: Difference) -> tuple[object, ...]:
-    if one.fault is not None:
-        owner = one.edge.owner if one.edge else None
+def _key(difference: Difference) -> tuple[object, ...]:
+    if difference.fault is not None:
+        owner = difference.edge.owner if difference.edge else None
         return (
-            one.code,
-            one.fault.who,
+            difference.code,
+            difference.fault.who,
             owner,
-            one.fault.static if one.code == "TF809" else None,
+            difference.fault.static if difference.code == "TF809" else None,
         )
-    if one.edge is None:
-        return (one.code,)
-    edge = one.edge
-    sensor = one.driver.driven.sensor if one.driver else None
-    rate = edge.rate if one.code in {"TF804", "TF805"} else None
+    if difference.edge is None:
+        return (difference.code,)
+    edge = difference.edge
+    sensor = difference.driver.driven.sensor if difference.driver else None
+    rate = edge.rate if difference.code in {"TF804", "TF805"} else None
     return (
-        one.code,
+        difference.code,
         edge.owner,
         rate,
-        one.over,
+        difference.over,
         sensor,
-        one.live.publisher if one.off and one.live else None,
+        difference.live.publisher if difference.off and difference.live else None,
     )
 
 
 def _fault_finding(group: Group, state: TreeState, plan: Plan, place: Span | None) -> Finding:
-    faults = [one.fault for one in group if one.fault is not None]
-    runs = dict.fromkeys(state.where(one.live) for one in group if one.live)
+    faults = [difference.fault for difference in group if difference.fault is not None]
+    runs = dict.fromkeys(state.where(difference.live) for difference in group if difference.live)
     driven = sensor_of(faults[0], drives_of(plan))
     found = fault_finding(group_of(faults, plan, list(runs), driven), place)
     found = replace(found, notes=(*found.notes, *_elsewhere(group)))
     if not faults[0].namesake:
         return found
-    gids = {one.live.stream.gid for one in group if one.live}
+    gids = {difference.live.stream.gid for difference in group if difference.live}
     others = [
         publisher
         for publisher in state.publishers
         if publisher.node in faults[0].nodes and publisher.gid not in gids and publisher.where
     ]
-    notes = [Note(f"{one.node} runs {one.where}") for one in others]
+    notes = [Note(f"{publisher.node} runs {publisher.where}") for publisher in others]
     return replace(found, notes=(*found.notes, *dict.fromkeys(notes)))
 
 
 def _elsewhere(group: Group) -> list[Note]:
     """Return how far the poses are off that came from a node other than the owner."""
-    off = [(one.fault, one.off) for one in group if one.fault and one.off]
+    off = [
+        (difference.fault, difference.off)
+        for difference in group
+        if difference.fault and difference.off
+    ]
     notes = [
         Note(f"its pose of {what.child} in {what.parent} is off by {far.text}")
         for what, far in off[:MOST_POSES]
@@ -397,7 +415,9 @@ def _elsewhere(group: Group) -> list[Note]:
 
 def _poses(group: Group, place: Span | None) -> Finding:
     off = [
-        (one.edge, one.live.parent, one.live.stream.pose) for one in group if one.edge and one.live
+        (difference.edge, difference.live.parent, difference.live.stream.pose)
+        for difference in group
+        if difference.edge and difference.live
     ]
     publisher = group[0].live.publisher if group[0].live else ""
     return pose_differs(off, publisher, place)
@@ -463,7 +483,7 @@ def verify(
             *loop(replace(state, edges=lasting)),
             *volatile_static(state),
         )
-        extra += [Verdict(listed(state.topics), "", (one,)) for one in in_all]
+        extra += [Verdict(listed(state.topics), "", (finding,)) for finding in in_all]
     sent = list(dict.fromkeys(joint for each in observers.values() for joint in each.sent_joints))
     of_joints = (*sent_twice(sent), *unknown_joints(sent, planned_joints(plan)))
     extra += [
@@ -514,7 +534,7 @@ def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
 def summary(verdicts: Sequence[Verdict]) -> str:
     """Return one line: how many edges are as expected, and how many are not declared."""
     planned = [verdict for verdict in verdicts if verdict.owner]
-    right = sum(not one.found for one in planned)
+    right = sum(not verdict.found for verdict in planned)
     extra = sum(verdict.owner is None for verdict in verdicts)
     more = f", {extra} that nobody declared" if extra else ""
     return f"{right} of {len(planned)} edges as expected{more}"

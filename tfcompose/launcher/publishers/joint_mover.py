@@ -157,7 +157,7 @@ class JointMover:
         moving = (
             JointGroup(self._edges, self._all_joints, followed, names.names) if followed else None
         )
-        self._moved |= {one.joint for one in followed}
+        self._moved |= {joint.joint for joint in followed}
         self._sources.append(_Source(names, moving))
         return self._sources[-1]
 
@@ -214,13 +214,13 @@ class JointGroup:
         followed: Sequence[Followed],
         names: Sequence[str],
     ) -> None:
-        ordered = sorted(followed, key=lambda one: joints[one.joint].type in SLIDING)
-        self._names = [names[one.column] for one in ordered]
-        self._columns = np.array([one.column for one in ordered], np.intp)
-        self._multiplier = np.array([one.multiplier for one in ordered])
-        self._offset = np.array([one.offset for one in ordered])
-        self._follows = any((one.multiplier, one.offset) != (1.0, 0.0) for one in ordered)
-        moved = [(edges[one.joint], joints[one.joint]) for one in ordered]
+        ordered = sorted(followed, key=lambda joint: joints[joint.joint].type in SLIDING)
+        self._names = [names[joint.column] for joint in ordered]
+        self._columns = np.array([joint.column for joint in ordered], np.intp)
+        self._multiplier = np.array([joint.multiplier for joint in ordered])
+        self._offset = np.array([joint.offset for joint in ordered])
+        self._follows = any((joint.multiplier, joint.offset) != (1.0, 0.0) for joint in ordered)
+        moved = [(edges[joint.joint], joints[joint.joint]) for joint in ordered]
         self._turning = turning = sum(joint.type not in SLIDING for _, joint in moved)
         self._message = ArrayTemplate(
             [(e.parent, e.child) for e, _ in moved], [e.pose for e, _ in moved]

@@ -47,7 +47,7 @@ class Joints:
         for column, name in enumerate(names):
             columns.setdefault(name, column)
         found = (self._followed(index, joint, columns) for index, joint in enumerate(self._joints))
-        return [one for one in found if one is not None]
+        return [joint for joint in found if joint is not None]
 
     def _followed(self, index: int, joint: PlanJoint, columns: dict[str, int]) -> Followed | None:
         multiplier, offset, name = 1.0, 0.0, joint.name

@@ -146,8 +146,8 @@ class JointSource:
             (start, simulation.sweep.get(name)) for name, start in simulation.joints.items()
         ]
         movable = [joint for joint in joints if joint.type in TURNING + SLIDING]
-        followed = {movable[one.joint].name: one for one in Joints(movable).followed(own)}
-        self._mimics = [one for name, one in followed.items() if name not in simulation.joints]
+        followed = {movable[joint.joint].name: joint for joint in Joints(movable).followed(own)}
+        self._mimics = [joint for name, joint in followed.items() if name not in simulation.joints]
         #: The names, in the order of the positions.
         self.names = own + [name for name in followed if name not in simulation.joints]
 

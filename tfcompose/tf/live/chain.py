@@ -44,8 +44,8 @@ class FrameChain:
 
         None where none moves.
         """
-        delays = [one for edge in self.newest if (one := _delay(edge))]
-        return max(delays, key=lambda one: one.mean_s, default=None)
+        delays = [delay for edge in self.newest if (delay := _delay(edge))]
+        return max(delays, key=lambda delay: delay.mean_s, default=None)
 
 
 def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | str:
@@ -59,9 +59,9 @@ def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | st
         if edge.stream.rejections == edge.stream.arrivals.count:
             continue
         by_child.setdefault(edge.child, []).append(edge)
-    for several in by_child.values():
-        several.sort(key=lambda edge: (edge.present is False, -edge.stream.arrivals.last_ns))
-    known = {*by_child, *(edge.parent for several in by_child.values() for edge in several)}
+    for rivals in by_child.values():
+        rivals.sort(key=lambda edge: (edge.present is False, -edge.stream.arrivals.last_ns))
+    known = {*by_child, *(edge.parent for rivals in by_child.values() for edge in rivals)}
     unknown = next((frame for frame in (a, b) if frame not in known), None)
     if unknown is not None:
         return str(UnknownFrame(unknown, sorted(known)))
@@ -71,9 +71,9 @@ def chain_between(edges: Sequence[EdgeState], a: str, b: str) -> FrameChain | st
         return two_trees((), a, b, above_a[-1], above_b[-1])
     up, down = above_a[: above_a.index(common)], above_b[: above_b.index(common)][::-1]
     some = [by_child[child] for child in (*up, *down)]
-    newest = tuple(several[0] for several in some)
+    newest = tuple(rivals[0] for rivals in some)
     return FrameChain(
-        (*up, common, *down), newest, tuple(edge for several in some for edge in several)
+        (*up, common, *down), newest, tuple(edge for rivals in some for edge in rivals)
     )
 
 

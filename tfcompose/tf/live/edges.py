@@ -421,7 +421,11 @@ class TreeObserver:
         left = self.publishers.known.values()
         return tuple(
             sorted(
-                {one.node for one in left if one.static == stream.static and one.node is not None}
+                {
+                    publisher.node
+                    for publisher in left
+                    if publisher.static == stream.static and publisher.node is not None
+                }
             )
         )
 
@@ -469,7 +473,7 @@ def forest(
     for edge in edges:
         by_child.setdefault(edge.child, []).append(edge)
     for some in by_child.values():
-        some.sort(key=lambda one: (one.present is False, -one.stream.arrivals.last_ns))
+        some.sort(key=lambda edge: (edge.present is False, -edge.stream.arrivals.last_ns))
     parents = {
         child: edge.parent for child, edge in (planned or {}).items() if child not in by_child
     }

@@ -66,7 +66,7 @@ class JointStates:
                 names = read_names(received.data)
             except ValueError:
                 return
-        others = [one for one in sent.lists if one[0] is not names]
+        others = [names_at for names_at in sent.lists if names_at[0] is not names]
         sent.lists = [*others[1 - MOST_LISTS :], (names, now_ns)]
         self._sent[gid] = sent
 
@@ -86,7 +86,7 @@ class JointStates:
     def forget(self, before_ns: int) -> None:
         """Forget what was not sent since then, in nanoseconds of the system's clock."""
         for sent in self._sent.values():
-            sent.lists = [one for one in sent.lists if one[1] >= before_ns]
+            sent.lists = [names_at for names_at in sent.lists if names_at[1] >= before_ns]
         self._sent = {gid: sent for gid, sent in self._sent.items() if sent.lists}
         self._nodes = {gid: node for gid, node in self._nodes.items() if gid in self._sent}
 

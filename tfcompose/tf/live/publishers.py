@@ -81,7 +81,9 @@ class MessageReader:
         if not any(child in self._frames for _, child in layout.plain_edges):
             return ()
         self._posed.add((received.gid, layout))
-        return tuple(Pose(one.xyz, one.quat_xyzw) for one in decode(received.data))
+        return tuple(
+            Pose(transform.xyz, transform.quat_xyzw) for transform in decode(received.data)
+        )
 
 
 #: Of publishers that have left so many are remembered: those that come and go take a bounded
@@ -221,14 +223,22 @@ class Publishers:
         there = self.present.values()
         return tuple(
             sorted(
-                {one.node for one in there if one.static == static and one.node and not one.fenced}
+                {
+                    publisher.node
+                    for publisher in there
+                    if publisher.static == static and publisher.node and not publisher.fenced
+                }
             )
         )
 
     def named(self, nodes: Collection[str], *, static: bool) -> list[bytes]:
         """Return the publishers that are there of these nodes, on that kind of topic."""
         there = self.present.values()
-        return [one.gid for one in there if one.static == static and one.node in nodes]
+        return [
+            publisher.gid
+            for publisher in there
+            if publisher.static == static and publisher.node in nodes
+        ]
 
     def where(self, gid: bytes | None) -> str:
         """Return where the publisher runs, empty where that is not known."""
@@ -325,19 +335,22 @@ class Senders(Publishers):
 
         Empty: none is.
         """
-        one = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
-        return one.process if one and one.ours else ""
+        publisher = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
+        return publisher.process if publisher and publisher.ours else ""
 
     def is_ours(self, gid: bytes | None) -> bool | None:
         """Return whether the publisher is of the guard's own run; None: that is not known."""
-        one = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
-        return one.ours if one else None
+        publisher = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
+        return publisher.ours if publisher else None
 
     def shows_process(self, process: str, node: str, *, static: bool) -> bool:
         """Return whether a publisher of that node exists and provably is the process's."""
         return any(
-            one.ours and one.process == process and one.node == node and one.static == static
-            for one in self.present.values()
+            publisher.ours
+            and publisher.process == process
+            and publisher.node == node
+            and publisher.static == static
+            for publisher in self.present.values()
         )
 
     def is_held_back(self, gid: bytes | None) -> bool | None:
@@ -345,36 +358,42 @@ class Senders(Publishers):
 
         None: that is not known.
         """
-        one = self.present.get(gid) if gid is not None else None
-        return one.fenced if one else None
+        publisher = self.present.get(gid) if gid is not None else None
+        return publisher.fenced if publisher else None
 
     def run(self, gid: bytes | None) -> OtherRun | None:
         """Return the run of another robot that the publisher is of, by its environment.
 
         None: no such is known.
         """
-        one = self.known.get(gid) if gid is not None else None
-        return one.run if one else None
+        publisher = self.known.get(gid) if gid is not None else None
+        return publisher.run if publisher else None
 
     def was_held_back(self, gid: bytes | None) -> bool:
         """Return whether messages of one that may have left reached nobody, as far as known."""
-        one = self.known.get(gid) if gid is not None else None
-        return bool(one and one.fenced)
+        publisher = self.known.get(gid) if gid is not None else None
+        return bool(publisher and publisher.fenced)
 
     @property
     def mark(self) -> tuple[int, int]:
         """What changes when there is more to remember."""
-        return len(self._heard), sum(one.node is not None for one in self.known.values())
+        return len(self._heard), sum(
+            publisher.node is not None for publisher in self.known.values()
+        )
 
     def memory(self) -> dict[str, SenderMemory]:
         """Return what the next guard must know of present publishers, by hexadecimal ids."""
         there = {gid: sender for gid, sender in self._heard.items() if gid in self.present}
-        return {gid.hex(): SenderMemory(self.known[gid].nodes, one) for gid, one in there.items()}
+        return {
+            gid.hex(): SenderMemory(self.known[gid].nodes, since) for gid, since in there.items()
+        }
 
     def recall(self, memory: dict[str, SenderMemory]) -> None:
         """Know what the guard before knew."""
-        for hexed, one in memory.items():
+        for hexed, sender in memory.items():
             gid = bytes.fromhex(hexed)
-            self._heard[gid] = one.sender
-            if one.nodes:
-                self.known[gid] = Publisher(gid, one.nodes[0], static=False, others=one.nodes[1:])
+            self._heard[gid] = sender.sender
+            if sender.nodes:
+                self.known[gid] = Publisher(
+                    gid, sender.nodes[0], static=False, others=sender.nodes[1:]
+                )

@@ -98,7 +98,7 @@ class TFTopics:
     @property
     def readers(self) -> list[MessageSource]:
         """What is waited for."""
-        return [one.reader for one in (*self._fenced, *self._public)]
+        return [subscriber.reader for subscriber in (*self._fenced, *self._public)]
 
     def take(self) -> Iterator[TFData]:
         """Yield what has come, but from oneself."""
@@ -115,9 +115,9 @@ class TFTopics:
 
     def close(self) -> None:
         """End the readers that the node does not end."""
-        for one in self._public:
-            if isinstance(one.reader, PublicTFReader):
-                one.reader.close()
+        for subscriber in self._public:
+            if isinstance(subscriber.reader, PublicTFReader):
+                subscriber.reader.close()
 
     def _take(self, readable: Sequence[_Readable]) -> Iterator[TFData]:
         """Yield what has come there.
@@ -125,13 +125,13 @@ class TFTopics:
         What comes on a process's own topic is of that process, also where the rmw does not say
         whose it is.
         """
-        for one in readable:
-            for received in one.reader.take():
+        for subscriber in readable:
+            for received in subscriber.reader.take():
                 if received.raw_gid in self.own and received.raw_gid is not None:
                     continue
-                if one.process and received.gid is None:
-                    received = replace(received, gid=id_of_topic(one.reader.topic))  # noqa: PLW2901 (the same message)
-                yield TFData(received, one.static, one.fenced, one.process)
+                if subscriber.process and received.gid is None:
+                    received = replace(received, gid=id_of_topic(subscriber.reader.topic))  # noqa: PLW2901 (the same message)
+                yield TFData(received, subscriber.static, subscriber.fenced, subscriber.process)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,9 +198,9 @@ class RunMarks:
         """
         if found is None:
             return Identity()
-        own = [one for one in found if one.get(self.variable) == self.run]
+        own = [variables for variables in found if variables.get(self.variable) == self.run]
         if len(own) != 1:
-            others = [one for one in found if one.get(self.variable)]
+            others = [variables for variables in found if variables.get(self.variable)]
             return Identity(
                 ours=bool(own),
                 run=self._other(others[0]) if len(found) == len(others) == 1 else None,
@@ -311,29 +311,29 @@ class TFGraph:
     ) -> list[Publisher]:
         moving, fixed = topics
         return [
-            self._publisher(one, topic, static=static, fenced=fenced)
+            self._publisher(publisher, topic, static=static, fenced=fenced)
             for static, topic in ((True, fixed), (False, moving))
-            for one in ask(self._node, topic)
-            if not self._is_own(one)
+            for publisher in ask(self._node, topic)
+            if not self._is_own(publisher)
         ]
 
-    def _is_own(self, one: GraphPublisher) -> bool:
+    def _is_own(self, publisher: GraphPublisher) -> bool:
         """Whether a publisher is of this process.
 
         By its id, or on Zenoh, whose ids are hashes, by its node's name.
         """
         if middleware() == IMPLEMENTATIONS["zenoh"]:
-            return one.node == own_name(self._node)
-        return one.gid[:PARTICIPANT] == self._own_gid()[:PARTICIPANT]
+            return publisher.node == own_name(self._node)
+        return publisher.gid[:PARTICIPANT] == self._own_gid()[:PARTICIPANT]
 
     def _by_topic(self, topics: Topics, there: list[Publisher]) -> Iterator[Publisher]:
         """Yield stand-ins for all senders on a topic, as messages do not identify them."""
         for static, topic in zip((False, True), topics, strict=True):
             gid = id_of_topic(topic)
-            those = [one for one in there if one.static == static]
-            nodes = sorted({one.node for one in those if one.node})
+            those = [publisher for publisher in there if publisher.static == static]
+            nodes = sorted({publisher.node for publisher in those if publisher.node})
             if nodes:
-                proven = {(one.ours, one.process) for one in those}
+                proven = {(publisher.ours, publisher.process) for publisher in those}
                 ours, process = proven.pop() if len(proven) == 1 else (None, "")
                 self._ours[gid] = Identity(ours or None, process)
                 others = tuple(nodes[1:])
@@ -380,7 +380,7 @@ class TFGraph:
             return Identity()
         found = environments(gid, own)
         known = self._marks.identify(found)
-        if found and not any(self._marks.variable in one for one in found):
+        if found and not any(self._marks.variable in variables for variables in found):
             pids = descent(gid, own, self._marks.launcher_pid)
             return replace(known, unmarked=pids[0] if pids else 0)
         return known

@@ -41,12 +41,12 @@ def parameter(name: str, value: Any) -> Any:
     Raises:
         ValueError: if ROS has no parameter of that kind.
     """
-    kinds = {type(one) for one in value} if isinstance(value, list) else {type(value)}
+    kinds = {type(item) for item in value} if isinstance(value, list) else {type(value)}
     kind = float if kinds == {int, float} else next(iter(kinds)) if len(kinds) == 1 else None
     field, number = (_LISTS if isinstance(value, list) else _SINGLE).get(kind, ("", 0))  # type: ignore[arg-type]
     if not field:
         raise ValueError(f"{name} is {value!r}, and ROS has no parameter of that kind")
-    value = [float(one) for one in value] if kind is float and isinstance(value, list) else value
+    value = [float(item) for item in value] if kind is float and isinstance(value, list) else value
     return Parameter(name=name, value=ParameterValue(type=number, **{field: value}))
 
 
@@ -120,7 +120,7 @@ class Container:
             node_name=name,
             node_namespace=namespace or "/",
             remap_rules=[f"{old}:={new}" for old, new in request.remap.items()],
-            parameters=[parameter(*one) for one in component.params.items()],
+            parameters=[parameter(*item) for item in component.params.items()],
             extra_arguments=[
                 parameter(*argument) for argument in component.extra_arguments.items()
             ],

@@ -232,7 +232,7 @@ def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
     infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
     infos += [(info, False) for info in node.get_subscriptions_info_by_topic(topic)]
     named = [(_name_of(info), info.topic_type, sends) for info, sends in infos]
-    return sorted({one for one in named if one[0] not in {own, UNKNOWN_NODE}})
+    return sorted({node for node in named if node[0] not in {own, UNKNOWN_NODE}})
 
 
 def nodes(node: Node) -> list[str]:
@@ -318,7 +318,7 @@ def _ask(node: Node) -> bool:
         end = time.monotonic() + SHOWN_WITHIN_S
         while not (shown := writers(node, ASKING)) and time.monotonic() < end:
             time.sleep(0.01)
-        return gid_of(publisher) in {one.gid for one in shown}
+        return gid_of(publisher) in {endpoint.gid for endpoint in shown}
     finally:
         node.destroy_publisher(publisher)
 

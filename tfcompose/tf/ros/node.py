@@ -73,8 +73,8 @@ def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> Qo
     A depth alone leaves all else of the default, so that latched stays so.
     """
     if isinstance(qos_or_depth, int):
-        given: Any = default
-        return qos(qos_or_depth, given.durability, given.reliability)
+        profile: Any = default
+        return qos(qos_or_depth, profile.durability, profile.reliability)
     return qos_or_depth or default
 
 

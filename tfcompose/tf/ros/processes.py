@@ -153,6 +153,6 @@ def words_of(pid: int) -> list[str]:
         return []
 
 
-def _shown(words: list[str]) -> str:
-    line = masked(" ".join(" ".join(words).split()), "?")
+def _shown(argv: list[str]) -> str:
+    line = masked(" ".join(" ".join(argv).split()), "?")
     return line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…"

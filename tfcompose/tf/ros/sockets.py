@@ -30,10 +30,10 @@ _INTERNET = (socket.AF_INET, socket.AF_INET6)
 
 def widen_buffers() -> None:
     """Let each socket hold ``WANTED`` bytes, or as much as the kernel grants."""
-    for one in _udp_sockets():
+    for udp_socket in _udp_sockets():
         with suppress(OSError):
-            if one.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) < WANTED:
-                one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WANTED)
+            if udp_socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) < WANTED:
+                udp_socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WANTED)
 
 
 def buffer_limit() -> int | None:
@@ -50,16 +50,16 @@ class LostDatagrams:
     def take(self) -> int:
         """Return how many were lost since the last time."""
         before, self._known = self._known, _drops()
-        return sum(max(0, drops - before.get(one, 0)) for one, drops in self._known.items())
+        return sum(max(0, drops - before.get(inode, 0)) for inode, drops in self._known.items())
 
 
 def _drops() -> dict[int, int]:
     """Return how many datagrams each socket lost, by its inode."""
     found = {}
-    for one in _udp_sockets():
+    for udp_socket in _udp_sockets():
         with suppress(OSError):  # a kernel that does not count
-            numbers = one.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMORY.size)
-            found[os.fstat(one.fileno()).st_ino] = _MEMORY.unpack(numbers)[-1]
+            numbers = udp_socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMORY.size)
+            found[os.fstat(udp_socket.fileno()).st_ino] = _MEMORY.unpack(numbers)[-1]
     return found
 
 
@@ -69,6 +69,6 @@ def _udp_sockets() -> Iterator[socket.socket]:
         with suppress(OSError):  # closed meanwhile
             if not stat.S_ISSOCK(os.fstat(descriptor).st_mode):
                 continue
-            with socket.socket(fileno=os.dup(descriptor)) as one:
-                if one.family in _INTERNET and one.type == socket.SOCK_DGRAM:
-                    yield one
+            with socket.socket(fileno=os.dup(descriptor)) as copy:
+                if copy.family in _INTERNET and copy.type == socket.SOCK_DGRAM:
+                    yield copy

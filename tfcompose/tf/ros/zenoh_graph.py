@@ -180,7 +180,7 @@ class ZenohGraph:
             found = [
                 publisher for publisher in self._publishers.values() if publisher.topic == topic
             ]
-        return sorted(found, key=lambda one: (one.node, one.gid))
+        return sorted(found, key=lambda publisher: (publisher.node, publisher.gid))
 
     def node_of(self, gid: bytes) -> str | None:
         """Return the full name of the node whose publisher has this id.
@@ -207,8 +207,8 @@ class ZenohGraph:
             token = str(sample.key_expr)
             if sample.kind == zenoh.SampleKind.DELETE:
                 self._publishers.pop(token, None)
-            elif one := publisher_of(token):
-                self._publishers[token] = one
+            elif publisher := publisher_of(token):
+                self._publishers[token] = publisher
 
 
 class ZenohTF:

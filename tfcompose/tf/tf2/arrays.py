@@ -83,12 +83,12 @@ def stamps_of(stamps: ArrayLike) -> Stamps:
     Raises:
         TypeError: if they are not whole numbers in one row.
     """
-    given = np.asarray(stamps)
-    if given.ndim != 1 or (given.dtype.kind not in "iu" and given.size):
+    array = np.asarray(stamps)
+    if array.ndim != 1 or (array.dtype.kind not in "iu" and array.size):
         raise TypeError(
-            f"stamps are one row of whole nanoseconds, not {given.dtype} of shape {given.shape}"
+            f"stamps are one row of whole nanoseconds, not {array.dtype} of shape {array.shape}"
         )
-    return given.astype(np.int64)
+    return array.astype(np.int64)
 
 
 def lookup_many(
@@ -263,14 +263,14 @@ def moved_points(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
     Raises:
         InvalidArgumentException: if the last dimension is not 3.
     """
-    given = np.asarray(points)
-    if given.ndim == 0 or given.shape[-1] != 3:  # noqa: PLR2004 (x, y, z)
-        raise InvalidArgumentException(f"points have the shape (…, 3), not {given.shape}")
+    array = np.asarray(points)
+    if array.ndim == 0 or array.shape[-1] != 3:  # noqa: PLR2004 (x, y, z)
+        raise InvalidArgumentException(f"points have the shape (…, 3), not {array.shape}")
     moved = np.empty(
-        given.shape, given.dtype if given.dtype in (np.float32, np.float64) else np.float64
+        array.shape, array.dtype if array.dtype in (np.float32, np.float64) else np.float64
     )
     turned, to = rotation_and_translation(pose)
-    rows, out = given.reshape(-1, 3), moved.reshape(-1, 3)
+    rows, out = array.reshape(-1, 3), moved.reshape(-1, 3)
     for start in range(0, len(rows), _POINTS):
         block = slice(start, start + _POINTS)
         out[block] = rows[block].astype(np.float64, copy=False) @ turned + to

@@ -248,9 +248,9 @@ def do_transform_pose(pose: Any, transform: Any) -> Any:
         if length
         else (0.0, 0.0, 0.0, 1.0)
     )
-    given = (at.x, at.y, at.z, quat[0], quat[1], quat[2], quat[3])
+    numbers = (at.x, at.y, at.z, quat[0], quat[1], quat[2], quat[3])
     at.x, at.y, at.z, rotation.x, rotation.y, rotation.z, rotation.w = unit(
-        product(pose_of(transform), given)
+        product(pose_of(transform), numbers)
     )
     return moved
 

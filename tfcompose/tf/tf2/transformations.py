@@ -243,7 +243,7 @@ def vector_norm(data: ArrayLike, axis: int | None = None) -> Any:
 
 def unit_vector(data: ArrayLike, axis: int | None = None) -> Floats:
     """Return the array at length 1, as a whole or along an axis."""
-    given = np.array(data, float)
-    length = np.linalg.norm(given, axis=axis, keepdims=axis is not None)
-    found: Floats = given / length
+    vector = np.array(data, float)
+    length = np.linalg.norm(vector, axis=axis, keepdims=axis is not None)
+    found: Floats = vector / length
     return found

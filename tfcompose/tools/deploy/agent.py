@@ -300,7 +300,7 @@ class Agent:
         if folder is None:
             raise HostError("its launcher is not a release's")
         self.running = self.base / "releases" / release
-        words = [
+        argv = [
             "up",
             str(self.running / "plan.json"),
             "--host",
@@ -309,7 +309,7 @@ class Agent:
             "--build-dir",
             str(folder),
         ]
-        done = self._tfcompose(words, UNIT_S)
+        done = self._tfcompose(argv, UNIT_S)
         if done.returncode != 0:
             raise HostError(_last_line(done.stderr) or "its launcher does not follow")
         return done.stdout.strip().rpartition("; ")[2] or "nothing starts again"
@@ -322,9 +322,9 @@ class Agent:
             shown = self._shown()
             if left <= 0 or shown.get("ActiveState") == "inactive" or self._has_failed(shown):
                 break
-            words = ["wait", "--ready", "--timeout", f"{left:.1f}", "--robot", self.name]
+            argv = ["wait", "--ready", "--timeout", f"{left:.1f}", "--robot", self.name]
             begun = time.monotonic()
-            if self._tfcompose(words, left + PROGRAM_S).returncode == 0:
+            if self._tfcompose(argv, left + PROGRAM_S).returncode == 0:
                 break
             self.gone.wait(min(0.3, max(left, 0)) if time.monotonic() - begun < left else 0)
         return self._status(self._shown())
@@ -407,7 +407,7 @@ class Agent:
 
     # Everything else.
 
-    def execute(self, words: list[str]) -> None:
+    def execute(self, argv: list[str]) -> None:
         """Become tfcompose with these words, where the robot runs.
 
         Under the user's systemd, or the system's.
@@ -417,7 +417,7 @@ class Agent:
             and not (self.units / self.unit).is_file()
         )
         self._be_of(system=self.system or system)
-        command = self._command([*self._start(self._python_of(self.base / "current")), *words])
+        command = self._command([*self._start(self._python_of(self.base / "current")), *argv])
         os.execvpe(command[0], command, self._environment())  # noqa: S606 (no shell: these are words)
 
     def _unit_of(self, release: str) -> str:
@@ -435,7 +435,7 @@ class Agent:
         """Make the release's own Python of its wheels, over what the host's Python has."""
         python = self._executable()
         wheels = sorted(map(str, (folder / "wheels").glob("*.whl")))
-        for words in (
+        for argv in (
             [python, "-I", "-m", "venv", "--system-site-packages", str(folder / "venv")],
             [
                 str(folder / "venv/bin/python"),
@@ -449,7 +449,7 @@ class Agent:
                 *wheels,
             ],
         ):
-            done = self._program(words, 600)
+            done = self._program(argv, 600)
             if done.returncode != 0:
                 why = _last_line(done.stderr) or _last_line(done.stdout)
                 raise HostError(f"the wheels cannot be installed: {why}")
@@ -465,18 +465,18 @@ class Agent:
         """Return the words that start tfcompose with that Python."""
         return [python, "-c", self.program]
 
-    def _command(self, words: list[str]) -> list[str]:
+    def _command(self, argv: list[str]) -> list[str]:
         files = [str(Path(file).expanduser()) for file in self.setup]
-        return ["/bin/bash", "-c", self.sourcing, "bash", *files, "--", *words] if files else words
+        return ["/bin/bash", "-c", self.sourcing, "bash", *files, "--", *argv] if files else argv
 
     def _program(
-        self, words: list[str], seconds: float = PROGRAM_S
+        self, argv: list[str], seconds: float = PROGRAM_S
     ) -> subprocess.CompletedProcess[str]:
-        return _run(self._command(words), seconds, self._environment())
+        return _run(self._command(argv), seconds, self._environment())
 
-    def _tfcompose(self, words: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
+    def _tfcompose(self, argv: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
         python = self._python_of(self.running or self.base / "current")
-        return self._program([*self._start(python), *words], seconds)
+        return self._program([*self._start(python), *argv], seconds)
 
     def _environment(self) -> dict[str, str]:
         """Return the environment in which the run is found.
@@ -491,29 +491,29 @@ class Agent:
             "ROS_LOG_DIR": str(self.base / "log"),
         }
 
-    def _systemctl(self, *words: str) -> subprocess.CompletedProcess[str]:
+    def _systemctl(self, *argv: str) -> subprocess.CompletedProcess[str]:
         return _run(
-            ["systemctl", *([] if self.system else ["--user"]), *words], UNIT_S, dict(os.environ)
+            ["systemctl", *([] if self.system else ["--user"]), *argv], UNIT_S, dict(os.environ)
         )
 
-    def _must(self, *words: str) -> None:
-        done = self._systemctl(*words)
+    def _must(self, *argv: str) -> None:
+        done = self._systemctl(*argv)
         if done.returncode != 0:
             raise HostError(
-                f"systemctl {' '.join(words)}: {_last_line(done.stderr) or done.returncode}"
+                f"systemctl {' '.join(argv)}: {_last_line(done.stderr) or done.returncode}"
             )
 
     def _shown(self) -> dict[str, str]:
-        words = ("LoadState", "ActiveState", "UnitFileState", "MainPID", "NRestarts")
+        argv = ("LoadState", "ActiveState", "UnitFileState", "MainPID", "NRestarts")
         lines = self._systemctl(
-            "show", self.unit, f"--property={','.join(words)}"
+            "show", self.unit, f"--property={','.join(argv)}"
         ).stdout.splitlines()
         return {name: value for name, _, value in (line.partition("=") for line in lines)}
 
     def _journal(self) -> list[str]:
         own = [] if self.system else ["--user"]
-        words = ["journalctl", *own, "-u", self.unit, "-n", "12", "-o", "cat", "--no-pager"]
-        return _run(words, PROGRAM_S, dict(os.environ)).stdout.splitlines()
+        argv = ["journalctl", *own, "-u", self.unit, "-n", "12", "-o", "cat", "--no-pager"]
+        return _run(argv, PROGRAM_S, dict(os.environ)).stdout.splitlines()
 
     def _lingers(self) -> bool:
         return Path("/var/lib/systemd/linger", pwd.getpwuid(os.getuid()).pw_name).exists()
@@ -547,10 +547,12 @@ class Agent:
         """
         pid = self._shown().get("MainPID") or "0"
         try:
-            words = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")
+            argv = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")
         except OSError:
             return None
-        plans = [Path(os.fsdecode(word)) for word in words if word.endswith(b"/plan.json")]
+        plans = [
+            Path(os.fsdecode(argument)) for argument in argv if argument.endswith(b"/plan.json")
+        ]
         return plans[0].parent if plans and plans[0].is_relative_to(self.base) else None
 
     def _prune(self) -> None:
@@ -569,12 +571,10 @@ class Agent:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _run(
-    words: list[str], seconds: float, env: dict[str, str]
-) -> subprocess.CompletedProcess[str]:
+def _run(argv: list[str], seconds: float, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
     try:
         return subprocess.run(
-            words,
+            argv,
             capture_output=True,
             check=False,
             env=env,
@@ -583,10 +583,10 @@ def _run(
             timeout=seconds,
         )
     except OSError as error:
-        return subprocess.CompletedProcess(words, 127, "", f"{words[0]}: {error.strerror}")
+        return subprocess.CompletedProcess(argv, 127, "", f"{argv[0]}: {error.strerror}")
     except subprocess.TimeoutExpired:
         return subprocess.CompletedProcess(
-            words, 124, "", f"{words[0]} does not end within {seconds:g} s"
+            argv, 124, "", f"{argv[0]} does not end within {seconds:g} s"
         )
 
 

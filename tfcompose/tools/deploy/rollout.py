@@ -112,14 +112,17 @@ class Share:
         if self.release is None:
             return [f"release {self.state['release']} → {self.goal}"]
         there, wanted = self.state["files"], self.wanted.manifest
-        words = [("new", wanted.keys() - there.keys()), ("removed", there.keys() - wanted.keys())]
-        words.append(
+        changed = [
+            ("new", wanted.keys() - there.keys()),
+            ("removed", there.keys() - wanted.keys()),
+        ]
+        changed.append(
             (
                 "changed",
                 {path for path in wanted.keys() & there.keys() if wanted[path] != there[path]},
             )
         )
-        lines = [f"{path}: {word}" for word, paths in words for path in sorted(paths)]
+        lines = [f"{path}: {change}" for change, paths in changed for path in sorted(paths)]
         if self.state["unit"] != self.unit.text():
             lines.append(f"{self.unit.file}: {'changed' if self.state['unit'] else 'new'}")
         if not lines and (self.state["unsettled"] or not self.state["active"]):
@@ -143,8 +146,8 @@ class Rollout:
 
     async def examine(self) -> list[Finding]:
         """Return what is in the way on the hosts, and apart between them."""
-        offsets = await self._by_name(lambda one: one.host.clock_offset_s())
-        found = [one for share in self.shares for one in self._unfit(share)]
+        offsets = await self._by_name(lambda share: share.host.clock_offset_s())
+        found = [finding for share in self.shares for finding in self._unfit(share)]
         found += _clocks_apart(offsets, self.target)
         found += _settings_apart(self.shares, self.target)
         for share in self.shares:
@@ -168,7 +171,7 @@ class Rollout:
 
     async def compare(self, release: Release) -> None:
         """Learn what each host has, and what it would have with this release."""
-        states = await self._by_name(lambda one: one.host.ask("state"))
+        states = await self._by_name(lambda share: share.host.ask("state"))
         for share in self.shares:
             share.state = states[share.name]
             share.release = release.with_text(UNIT, share.unit.text())
@@ -179,13 +182,13 @@ class Rollout:
         """Find out which hosts can go on while they change, which all of them have to allow."""
         changing = [share for share in self.shares if share.changes() and share.state["release"]]
         texts = await asyncio.gather(
-            *(one.host.ask("texts", paths=[PLAN], any_size=True) for one in changing)
+            *(share.host.ask("texts", paths=[PLAN], any_size=True) for share in changing)
         )
         try:
             before = [read_plan(some[PLAN], PLAN) for some in texts if some.get(PLAN)]
         except RejectedError:  # another version's
             return
-        if len(before) < len(changing) or not all(can_follow(one, plan) for one in before):
+        if len(before) < len(changing) or not all(can_follow(share, plan) for share in before):
             return
         for share in changing:
             share.follows = self._is_sound(share) and same_files(
@@ -204,9 +207,9 @@ class Rollout:
         ):
             return False
         late = any(
-            one["failed"] or not one["ready"]
-            for one in robot["processes"]
-            if one["kind"] != "external"
+            process["failed"] or not process["ready"]
+            for process in robot["processes"]
+            if process["kind"] != "external"
         )
         return not late and name_of(state["files"]) == state["release"]
 
@@ -270,7 +273,7 @@ class Rollout:
             RejectedError: with who holds one.
         """
         who = f"{getpass.getuser()}@{os.uname().nodename}, pid {os.getpid()}"
-        for share in sorted(self.shares, key=lambda one: one.name):
+        for share in sorted(self.shares, key=lambda share: share.name):
             answer = await self._ask(share, "take_lock", who=who)
             if answer["holder"]:
                 message = f"{share.name} is being deployed to by {answer['holder']}"
@@ -286,9 +289,9 @@ class Rollout:
                 before.
         """
         await self._all(self._send)
-        found = [one for some in await self._all(self._rehearse) for one in some]
+        found = [finding for some in await self._all(self._rehearse) for finding in some]
         if found:
-            await self._all(lambda one: self._ask(one, "discard", release=one.wanted.name))
+            await self._all(lambda share: self._ask(share, "discard", release=share.wanted.name))
             raise RejectedError(found)
 
     async def _send(self, share: Share) -> None:
@@ -333,13 +336,13 @@ class Rollout:
         """
         begun = time.monotonic()
         changing = [share for share in self.shares if share.changes()]
-        anew = [one for one in changing if not one.follows]
+        anew = [share for share in changing if not share.follows]
         try:
-            await self._all(lambda one: self._ask(one, "stop"), anew)
-            await self._all(lambda one: self._ask(one, "start", release=one.goal), anew)
-            await self._all(self._follow, [one for one in changing if one.follows])
+            await self._all(lambda share: self._ask(share, "stop"), anew)
+            await self._all(lambda share: self._ask(share, "start", release=share.goal), anew)
+            await self._all(self._follow, [share for share in changing if share.follows])
             live = await self._until_live(begun) if self.target.waits else "started"
-            await self._all(lambda one: self._ask(one, "commit", release=one.goal), changing)
+            await self._all(lambda share: self._ask(share, "commit", release=share.goal), changing)
         except RejectedError as error:
             first, *others = error.findings
             notes = (*first.notes, *await self._back(changing))
@@ -368,7 +371,9 @@ class Rollout:
             left = end - time.monotonic()
             seconds = max(min(SLICE_S, left), 0.1)
             states = await self._all(self._waiting(seconds))
-            missing = [one for some in map(self._missing, self.shares, states) for one in some]
+            missing = [
+                problem for some in map(self._missing, self.shares, states) for problem in some
+            ]
             if not missing:
                 hosts = listed([share.name for share in self.shares], NAMED_AT_MOST)
                 return f"{counted(len(self._edges()), 'edge')} live on {hosts}"
@@ -376,11 +381,11 @@ class Rollout:
                 raise RejectedError(missing)
 
     def _waiting(self, seconds: float) -> Callable[[Share], Awaitable[Any]]:
-        return lambda one: self._ask(one, "wait", seconds=seconds)
+        return lambda share: self._ask(share, "wait", seconds=seconds)
 
     def not_live(self) -> list[Finding]:
         """Return what was not live on the hosts when they were compared."""
-        return [one for share in self.shares for one in self._missing(share, share.state)]
+        return [problem for share in self.shares for problem in self._missing(share, share.state)]
 
     async def plan_return(self) -> None:
         """Let the goal of each host be the release before.
@@ -388,7 +393,7 @@ class Rollout:
         Raises:
             RejectedError: if a host has none.
         """
-        states = await self._by_name(lambda one: one.host.ask("state"))
+        states = await self._by_name(lambda share: share.host.ask("state"))
         found = []
         for share in self.shares:
             share.state, share.goal = states[share.name], states[share.name]["previous"] or ""
@@ -421,9 +426,9 @@ class Rollout:
             if edge in expected
         ]
         late = [
-            one
-            for one in robot["processes"]
-            if one["kind"] != "external" and (one["failed"] or not one["ready"])
+            process
+            for process in robot["processes"]
+            if process["kind"] != "external" and (process["failed"] or not process["ready"])
         ]
         found = []
         if missing:
@@ -436,7 +441,8 @@ class Rollout:
             found.append(finding("TF917", message + listed(named, NAMED_AT_MOST), at))
         if late:
             named = [
-                f"{one['name']} ({one['detail'] or one['waits'] or one['state']})" for one in late
+                f"{process['name']} ({process['detail'] or process['waits'] or process['state']})"
+                for process in late
             ]
             found.append(
                 finding("TF917", f"not ready on {share.name}: {listed(named, NAMED_AT_MOST)}", at)
@@ -598,16 +604,16 @@ def _settings_apart(shares: Sequence[Share], target: DeployTarget) -> Iterable[F
     Another domain, middleware, or no discovery.
     """
     ros = target.plan.ros
-    given = {"ROS_DOMAIN_ID": ros.domain_id, "RMW_IMPLEMENTATION": ros.rmw}
+    settings = {"ROS_DOMAIN_ID": ros.domain_id, "RMW_IMPLEMENTATION": ros.rmw}
     for variable, default in _AGREED.items():
-        if given.get(variable) is not None:
+        if settings.get(variable) is not None:
             continue
         values = {share.name: share.probe["env"].get(variable, default) for share in shares}
         if len(set(values.values())) > 1:
-            words = ", ".join(f"{value} on {name}" for name, value in values.items())
+            changed = ", ".join(f"{value} on {name}" for name, value in values.items())
             yield finding(
                 "TF916",
-                f"{variable} is {words}",
+                f"{variable} is {changed}",
                 None,
                 help=_HOLDS.get(variable, "set it alike in setup"),
             )
@@ -619,7 +625,7 @@ def _settings_apart(shares: Sequence[Share], target: DeployTarget) -> Iterable[F
         for share in shares
     }
     for reach in ("localhost", "off"):
-        if kept := [name for name, one in reaches.items() if one == reach]:
+        if kept := [name for name, share in reaches.items() if share == reach]:
             message = (
                 f"discovery: {reach} keeps nodes from those of other hosts on"
                 f" {listed(kept, NAMED_AT_MOST)}"
@@ -644,9 +650,9 @@ async def reached(
         settings = settings_of(plan.robot, name, host, system=target.system)
         connecting.append(connected(name, host, settings, target.places.get(name)))
     done = await asyncio.gather(*connecting)
-    hosts = [one for one in done if isinstance(one, ConnectedHost)]
+    hosts = [result for result in done if isinstance(result, ConnectedHost)]
     try:
-        if found := [one for one in done if isinstance(one, Finding)]:
+        if found := [result for result in done if isinstance(result, Finding)]:
             raise RejectedError(found)
         rollout = Rollout(target, [], report)
         for there, probe in zip(

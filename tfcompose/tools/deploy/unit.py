@@ -71,7 +71,7 @@ class Unit:
     def _command(self) -> str:
         at = f"{self.base}/current"
         python = f"{at}/venv/bin/python" if self.has_wheels else self.python
-        words = [
+        argv = [
             *anywhere(python),
             "up",
             f"{at}/plan.json",
@@ -79,4 +79,6 @@ class Unit:
             self.host,
             "--no-live",
         ]
-        return " ".join(quoted(word).replace("$", "$$") for word in sourced(self.setup, words))
+        return " ".join(
+            quoted(argument).replace("$", "$$") for argument in sourced(self.setup, argv)
+        )

@@ -76,8 +76,8 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Do it; exit code 0, 1 with findings, 2 for wrong use and what cannot be read."""
-    files = [word for word in arguments.words if word.endswith(_YAML)]
-    names = [word for word in arguments.words if not word.endswith(_YAML)]
+    files = [argument for argument in arguments.words if argument.endswith(_YAML)]
+    names = [argument for argument in arguments.words if not argument.endswith(_YAML)]
     wanted = _ACTIONS[arguments.action]
     if len(names) != len(wanted) or len(files) > 1:
         usage = " ".join(["tfcompose fleet", arguments.action, *wanted, "[FILE]"])
@@ -197,10 +197,10 @@ def _report(observer: FleetObserver, arguments: Namespace) -> int:
     return 0 if all(robot.state == "live" for robot in robots) else FAILED
 
 
-def _row(one: FleetRobotStatus) -> tuple[str, ...]:
-    live = sum(edge.age_s is not None and not edge.stale for edge in one.edges)
-    age = "–" if one.age_s is None else f"{one.age_s:.1f} s"
-    return one.robot, one.state, age, f"{live}/{len(one.edges)}", one.router
+def _row(robot: FleetRobotStatus) -> tuple[str, ...]:
+    live = sum(edge.age_s is not None and not edge.stale for edge in robot.edges)
+    age = "–" if robot.age_s is None else f"{robot.age_s:.1f} s"
+    return robot.robot, robot.state, age, f"{live}/{len(robot.edges)}", robot.router
 
 
 def _echo(observer: FleetObserver, target: str, source: str, arguments: Namespace) -> int:

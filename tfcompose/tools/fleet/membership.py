@@ -75,11 +75,15 @@ def wrong_membership(section: ToolSection, robot: Robot) -> list[Finding]:
     try:
         fleet_source = load_named(section.read(path), path, FleetSpec)
         fleet = validate_fleet(fleet_source)
-        wrong = [one for one in check_fleet(fleet, fleet_source) if one.severity == "error"]
+        wrong = [
+            finding for finding in check_fleet(fleet, fleet_source) if finding.severity == "error"
+        ]
     except RejectedError as error:
         wrong = list(error.findings)
     if wrong:
-        return [replace(one, notes=(*one.notes, Note("named here", at))) for one in wrong]
+        return [
+            replace(finding, notes=(*finding.notes, Note("named here", at))) for finding in wrong
+        ]
     name = _name(section)
     if name not in fleet.robots:
         place = section.at("robot") if member.robot else spec.at(("robot",))

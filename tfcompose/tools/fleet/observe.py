@@ -267,45 +267,45 @@ class FleetObserver:
         self.buffer.insert(rows, static=static, authority=robot)
 
 
-def problems_of(one: FleetRobotStatus) -> Iterator[Finding]:
+def problems_of(robot: FleetRobotStatus) -> Iterator[Finding]:
     """Yield what is wrong with a robot."""
-    if one.state == "unreachable":
-        ago = f", and nothing came for {one.age_s:.1f} s" if one.age_s is not None else ""
+    if robot.state == "unreachable":
+        ago = f", and nothing came for {robot.age_s:.1f} s" if robot.age_s is not None else ""
         advice = (
             "is the robot on, and in this network? its router is the process zenoh_router, or"
             " zenohd"
         )
         yield finding(
             "TF882",
-            f"the router of {one.robot} at {one.router} is not reached{ago}",
+            f"the router of {robot.robot} at {robot.router} is not reached{ago}",
             None,
             help=advice,
         )
         return
-    if one.state == "stale":
+    if robot.state == "stale":
         message = (
-            f"the link to {one.robot} is stale: what came last was sent {one.age_s:.1f} s ago"
+            f"the link to {robot.robot} is stale: what came last was sent {robot.age_s:.1f} s ago"
         )
         advice = (
             _LATE
-            if one.delay_s > CLOCK_S
-            else f"does its process still run? tfcompose fleet share {one.robot}"
+            if robot.delay_s > CLOCK_S
+            else f"does its process still run? tfcompose fleet share {robot.robot}"
         )
         yield finding("TF883", message, None, help=advice)
         return
-    if one.state == "silent":
-        advice = f"start it on the robot: tfcompose fleet share {one.robot}"
-        message = f"{one.robot} shares nothing: its router is reached, and nothing came"
+    if robot.state == "silent":
+        advice = f"start it on the robot: tfcompose fleet share {robot.robot}"
+        message = f"{robot.robot} shares nothing: its router is reached, and nothing came"
         yield finding("TF883", message, None, help=advice)
         return
-    if one.delay_s > CLOCK_S:
+    if robot.delay_s > CLOCK_S:
         yield finding(
             "TF885",
-            f"what {one.robot} sends comes {one.delay_s:.1f} s after it was sent",
+            f"what {robot.robot} sends comes {robot.delay_s:.1f} s after it was sent",
             None,
             help=_LATE,
         )
-    for edge in one.edges:
+    for edge in robot.edges:
         name = f"{edge.parent} → {edge.child}"
         if edge.age_s is None or edge.stale:
             when = (
@@ -314,11 +314,11 @@ def problems_of(one: FleetRobotStatus) -> Iterator[Finding]:
                 else f"was sent {edge.age_s:.1f} s ago for the last time"
             )
             advice = "does the robot publish it under these names? tfcompose doctor on the robot"
-            yield finding("TF884", f"{name} of {one.robot} {when}", None, help=advice)
+            yield finding("TF884", f"{name} of {robot.robot} {when}", None, help=advice)
         elif edge.delay_s is not None and edge.delay_s < -CLOCK_S:
             message = (
-                f"{name} of {one.robot} is stamped {-edge.delay_s:.1f} s ahead of this computer's"
-                " clock"
+                f"{name} of {robot.robot} is stamped {-edge.delay_s:.1f} s ahead of this"
+                " computer's clock"
             )
             yield finding(
                 "TF885", message, None, help="synchronise the clocks: chrony, or systemd-timesyncd"

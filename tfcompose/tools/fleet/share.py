@@ -55,9 +55,9 @@ class SharedEdges:
         if not due:
             return None
         found = {
-            edge: one
-            for one in self._renamed(self._decoder.rows(data), due)
-            for edge in [(one.parent, one.child)]
+            edge: row
+            for row in self._renamed(self._decoder.rows(data), due)
+            for edge in [(row.parent, row.child)]
         }
         if static:
             self._fixed |= found

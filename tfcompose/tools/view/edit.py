@@ -105,9 +105,9 @@ class Mount:
         """Return the pose that the file has to give for the edge to have this one."""
         return self.parent_from_base.inverse() @ parent_from_child @ self.child_from_place
 
-    def of_edge(self, given: Pose) -> Pose:
+    def of_edge(self, pose: Pose) -> Pose:
         """Return the pose of the edge when the file gives this one."""
-        return self.parent_from_base @ given @ self.child_from_place.inverse()
+        return self.parent_from_base @ pose @ self.child_from_place.inverse()
 
 
 def mount_of(robot: Robot, source: Source, child: str) -> Mount:
@@ -435,7 +435,9 @@ def _scalars(value: Any, path: Path = ()) -> dict[Path, Any]:
     if not isinstance(value, (dict, list)):
         return {path: value}
     items = value.items() if isinstance(value, dict) else enumerate(value)
-    return {at: one for step, item in items for at, one in _scalars(item, (*path, step)).items()}
+    return {
+        at: scalar for step, item in items for at, scalar in _scalars(item, (*path, step)).items()
+    }
 
 
 def _value(text: str) -> float | None:

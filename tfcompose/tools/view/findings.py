@@ -29,10 +29,11 @@ def findings_html(found: Sequence[Finding], none: str = "") -> str:
     return paragraphs([*lines, *([f"and {len(found) - MOST} more"] if len(found) > MOST else [])])
 
 
-def _line(one: Finding) -> str:
-    place = f" ({escape(str(one.span))})" if one.span else ""
-    colour = _COLOURS.get(one.severity, "inherit")
-    return f'<span style="color: {colour}">{escape(one.code)}</span> {escape(one.message)}{place}'
+def _line(finding: Finding) -> str:
+    place = f" ({escape(str(finding.span))})" if finding.span else ""
+    colour = _COLOURS.get(finding.severity, "inherit")
+    code = f'<span style="color: {colour}">{escape(finding.code)}</span>'
+    return f"{code} {escape(finding.message)}{place}"
 
 
 def paragraphs(lines: Sequence[str]) -> str:
@@ -55,12 +56,12 @@ def saved_html(saved: Saved) -> str:
         text += _code([_diff_line(line) for line in saved.diff.splitlines()]) + findings_html(
             saved.found
         )
-    for one in saved.elsewhere:
-        offer = _code(map(escape, one.overlay("", "").splitlines())) if one.entry else ""
+    for place in saved.elsewhere:
+        offer = _code(map(escape, place.overlay("", "").splitlines())) if place.entry else ""
         text += (
             paragraphs(
                 [
-                    f"{escape(one.reason)} ({escape(str(one.at))})"
+                    f"{escape(place.reason)} ({escape(str(place.at))})"
                     + "; in an overlay:" * bool(offer)
                 ]
             )

@@ -78,8 +78,8 @@ class FrameTree:
 
     def matches(self, search: str) -> set[str]:
         """Return the frames whose names contain each word of the search, in any case."""
-        words = search.lower().split()
-        return {frame for frame in self.frames if all(word in frame.lower() for word in words)}
+        terms = search.lower().split()
+        return {frame for frame in self.frames if all(term in frame.lower() for term in terms)}
 
     def rows(self, chosen: Mapping[str, bool], search: str = "") -> Iterator[Row]:
         """Yield the rows from top to bottom.
@@ -115,6 +115,6 @@ class FrameTree:
     def show(self, frame: str, chosen: Mapping[str, bool], *, shown: bool) -> dict[str, bool]:
         """Return what is chosen when a frame, with all below it, is shown or hidden."""
         others = below(self._children, frame)
-        rest = {one: value for one, value in chosen.items() if one not in others}
+        rest = {name: value for name, value in chosen.items() if name not in others}
         is_so_above = (frame in self.hidden(rest)) != shown
         return rest if is_so_above else {**rest, frame: shown}

@@ -58,7 +58,9 @@ class Judgement:
     def about(self, frame: str) -> list[str]:
         """Return a line for each thing that is wrong with the edge above a frame."""
         off = [f"off by {self.off[frame].text}"] if frame in self.off else []
-        return off + [f"{one.code} {one.message}" for one in self.of_frame.get(frame, ())]
+        return off + [
+            f"{finding.code} {finding.message}" for finding in self.of_frame.get(frame, ())
+        ]
 
 
 class PlanJudge:
@@ -91,7 +93,7 @@ class PlanJudge:
         for topics, part in self._parts.items():
             state = states[topics]
             different = differences(state, part, self._tolerance)
-            kept = [one for one in different if counts(one)]
+            kept = [difference for difference in different if counts(difference)]
             about = [
                 ([edge.child], rejected)
                 for edge in state.edges
@@ -101,16 +103,20 @@ class PlanJudge:
             about += [
                 (list(_children(group)), self._finding(group, state)) for group in grouped(kept)
             ]
-            about += [([], one) for one in flooded(state)]
+            about += [([], finding) for finding in flooded(state)]
             for children, finding in about:
                 found.append(finding)
                 for child in dict.fromkeys(children):
                     of_frame.setdefault(self._names.get(child, child), []).append(finding)
-            left = [one for one in different if one.live is not None and holds(one.live)]
+            left = [
+                difference
+                for difference in different
+                if difference.live is not None and holds(difference.live)
+            ]
             off |= {
                 self._names.get(child, child): far
-                for one in (*kept, *left)
-                for child, far in _off(one)
+                for difference in (*kept, *left)
+                for child, far in _off(difference)
             }
         return Judgement(
             tuple(found), {frame: tuple(some) for frame, some in of_frame.items()}, off
@@ -124,18 +130,18 @@ class PlanJudge:
 
 
 def _children(group: Sequence[Difference]) -> Iterator[str]:
-    for one in group:
-        if one.edge is not None:
-            yield one.edge.child
-        elif one.live is not None:
-            yield one.live.child
+    for difference in group:
+        if difference.edge is not None:
+            yield difference.edge.child
+        elif difference.live is not None:
+            yield difference.live.child
 
 
-def _off(one: Difference) -> Iterator[tuple[str, Offset]]:
+def _off(difference: Difference) -> Iterator[tuple[str, Offset]]:
     """Yield the frame that is not where the robot has it, and how far it is off."""
-    if one.edge is None or one.live is None:
+    if difference.edge is None or difference.live is None:
         return
-    if one.off is not None:
-        yield one.edge.child, one.off
-    elif one.driver is not None:
-        yield one.edge.child, offset_of(one.edge.pose, one.live.stream.pose)
+    if difference.off is not None:
+        yield difference.edge.child, difference.off
+    elif difference.driver is not None:
+        yield difference.edge.child, offset_of(difference.edge.pose, difference.live.stream.pose)

@@ -84,7 +84,7 @@ class LiveTree(ShownTree):
         streams = self._streams()
         self.judgement = self._judge.judge(
             states,
-            lambda one: _counts(one, listened_s),
+            lambda difference: _counts(difference, listened_s),
             lambda edge: streams.get(self._pictures.name(edge.child)) is edge.stream,
         )
         return self.judgement
@@ -101,14 +101,18 @@ class LiveTree(ShownTree):
         return lines + self.judgement.about(frame)
 
 
-def _counts(one: Difference, listened_s: float) -> bool:
+def _counts(difference: Difference, listened_s: float) -> bool:
     """Return whether it is so now.
 
     Neither of somebody who has left, nor of what may still come.
     """
-    if one.fault is not None and one.live is not None and one.live.present is False:
+    if (
+        difference.fault is not None
+        and difference.live is not None
+        and difference.live.present is False
+    ):
         return False
-    return listened_s >= FOUND_S or one.code not in _MISSING
+    return listened_s >= FOUND_S or difference.code not in _MISSING
 
 
 def _published(edge: EdgeState) -> Iterator[str]:

@@ -167,7 +167,7 @@ def _fields(robot: Robot, scale: float) -> Iterator[dict[str, Any]]:
 def _moved(pose: Pose, points: Any) -> Any:
     """Return points (n, 3) of a frame with this pose in the frame above."""
     rotation = Pose(quat_xyzw=pose.quat_xyzw)
-    axes = [(rotation @ Pose(one)).xyz for one in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    axes = [(rotation @ Pose(axis)).xyz for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
     return np.asarray(points) @ np.array(axes) + pose.xyz
 
 

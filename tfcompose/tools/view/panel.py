@@ -391,11 +391,11 @@ class Panel:
             self._enable(is_enabled=False)
             return
         self._enable(is_enabled=True)
-        given = mount.given(mount.edge.pose)
+        pose = mount.given(mount.edge.pose)
         self._given.content = paragraphs(
             [f"pose of <b>{escape(mount.place)}</b> in <b>{escape(mount.relative_to)}</b>"]
         )
-        self._fill(given)
+        self._fill(pose)
         at = self.poses()[mount.place]
         scale = _GIZMO_M * self.scene.scale
         self.gizmo = self._server.scene.add_transform_controls(
@@ -409,9 +409,9 @@ class Panel:
             if handle.disabled == is_enabled:
                 handle.disabled = not is_enabled
 
-    def _fill(self, given: Pose) -> None:
-        values = [value * 1000 for value in given.xyz] + [
-            math.degrees(one) for one in clean_rpy(given.quat_xyzw)
+    def _fill(self, pose: Pose) -> None:
+        values = [value * 1000 for value in pose.xyz] + [
+            math.degrees(angle) for angle in clean_rpy(pose.quat_xyzw)
         ]
         self._showing = True
         for handle, value in zip(self._numbers, values, strict=True):
@@ -429,18 +429,18 @@ class Panel:
         w, qx, qy, qz = (float(value) for value in self.gizmo.wxyz)
         px, py, pz = (float(value) for value in self.gizmo.position)
         base = self.poses()[mount.relative_to]
-        given = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
-        self.move(_snapped(given, mount.given(mount.edge.pose)) if self.choices.snaps else given)
+        pose = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
+        self.move(_snapped(pose, mount.given(mount.edge.pose)) if self.choices.snaps else pose)
         self._show_selected()
 
-    def move(self, given: Pose) -> None:
+    def move(self, pose: Pose) -> None:
         """Give the selected mount the pose that its file is to have."""
         try:
             mount = self.session.mount(self.selected)
         except ImmovableError as error:
             self.report.content = paragraphs([escape(str(error))])
             return
-        self.session.move(mount.edge.child, mount.of_edge(given))
+        self.session.move(mount.edge.child, mount.of_edge(pose))
         self._show_moved()
         if self.gizmo is not None:
             at = self.poses()[mount.place]
@@ -456,8 +456,8 @@ class Panel:
             conflicts = sorted(self.window.conflicts & self.session.moved.keys())
             self.window.conflicts.clear()
             if conflicts:
-                word = f"not saved: another window saved {listed(conflicts)} at another pose"
-                self.say(paragraphs([escape(word), "save again to replace that"]))
+                message = f"not saved: another window saved {listed(conflicts)} at another pose"
+                self.say(paragraphs([escape(message), "save again to replace that"]))
                 return
             try:
                 saved = self.session.save()

@@ -124,11 +124,11 @@ class Pictures:
         off = judgement.off.keys() & self.edges.keys() & self._forest.index.keys()
         if not off:
             return {}
-        meant = self._local.copy()
+        placed_local = self._local.copy()
         for child in off:
             row = self._forest.index[child]
-            meant[row] = row_of(self._meant(child, pose_of(self._local[row].tolist())))
-        placed = self._in_fixed(in_roots, self._forest.in_roots(meant))
+            placed_local[row] = row_of(self._meant(child, pose_of(self._local[row].tolist())))
+        placed = self._in_fixed(in_roots, self._forest.in_roots(placed_local))
         frames = self._forest.below(set(off))
         return {
             frame: pose_of(placed[self._forest.index[frame]].tolist()) for frame in sorted(frames)

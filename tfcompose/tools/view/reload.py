@@ -60,9 +60,9 @@ class WatchedFiles:
     @property
     def folders(self) -> set[Path]:
         """The folders of all files that were read: editors replace files by others."""
-        several = (*self._texts, *self._meshes)
+        files = (*self._texts, *self._meshes)
         return {
-            folder for file in several if is_folder(folder := Path(os.path.realpath(file)).parent)
+            folder for file in files if is_folder(folder := Path(os.path.realpath(file)).parent)
         }
 
     def differ(self) -> bool:

@@ -62,10 +62,10 @@ def _all_rpy(rotation: Quaternion, old: Vector) -> Iterator[Vector]:
             (roll + sign * (old[2] - yaw), pitch, old[2]),
         ]
     found += [(roll + math.pi, math.pi - pitch, yaw + math.pi) for roll, pitch, yaw in found]
-    for one in found:
+    for solution in found:
         near = tuple(
             new + math.tau * round((was - new) / math.tau)
-            for new, was in zip(one, old, strict=True)
+            for new, was in zip(solution, old, strict=True)
         )
         rpy = (near[0], near[1], near[2])
         if angle_between(quat_from_rpy(*rpy), rotation) < _SAME_RAD:

@@ -317,7 +317,7 @@ class RobotScene:
     def bounds(self, frame: str) -> tuple[Vector, Vector]:
         """Return the bounds of a frame's shown body, in the frame, in metres."""
         columns = list(zip(*self._corners[frame], strict=True))
-        (x0, y0, z0), (x1, y1, z1) = (tuple(map(one, columns)) for one in (min, max))
+        (x0, y0, z0), (x1, y1, z1) = (tuple(map(bound, columns)) for bound in (min, max))
         return (x0, y0, z0), (x1, y1, z1)
 
     def is_shown(self, frame: str) -> bool:

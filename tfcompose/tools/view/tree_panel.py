@@ -176,10 +176,10 @@ class TreePanel:
             if self._search.value != search:
                 self._search.value = search
             found = self.tree.matches(search)
-            meant = search if search in found else found.pop() if len(found) == 1 else None
+            frame = search if search in found else found.pop() if len(found) == 1 else None
             self._refresh(scrolls=True)
-        if meant is not None and meant != self._choices.selected:
-            self.select(meant)
+        if frame is not None and frame != self._choices.selected:
+            self.select(frame)
 
     def show(self, frame: str, *, shown: bool) -> None:
         """Show or hide a frame with all below it."""
@@ -235,11 +235,11 @@ class TreePanel:
     def content(self, *, scrolls: bool = False) -> str:
         """Return the tree as HTML; it ``scrolls`` to the selected or found frame."""
         choices, hidden = self._choices, self.hidden
-        words = re.compile(
+        terms = re.compile(
             "|".join(map(re.escape, choices.search.split())) or r"(?!)", re.IGNORECASE
         )
         rows = "".join(
-            self._row(row, words, is_hidden=row.frame in hidden)
+            self._row(row, terms, is_hidden=row.frame in hidden)
             for row in self.tree.rows(choices.is_open, choices.search)
         )
         count = counted(len(self.tree.frames), "frame")
@@ -255,7 +255,7 @@ class TreePanel:
         )
         return f'{_STYLE}<div class="tf-frames" tabindex="0" {handlers}>{header}{tree}</div>'
 
-    def _row(self, row: Row, words: re.Pattern[str], *, is_hidden: bool) -> str:
+    def _row(self, row: Row, terms: re.Pattern[str], *, is_hidden: bool) -> str:
         frame, title = row.frame, escape(self._titles[row.frame])
         classes = "tf-row" + " tf-hidden" * is_hidden + " tf-wrong" * (frame in self._wrong)
         selected = str(frame == self._choices.selected).lower()
@@ -272,14 +272,14 @@ class TreePanel:
             f' style="{row.style}"><i>{opens}</i><input type="checkbox"'
             f' data-does="show"{"" if is_hidden else " checked"} style="accent-color:'
             f' rgb{self._colours[frame]}" title="show it and what is below"><button'
-            f' data-does="select" title="{title}">{_marked(frame, words)}{moved}</button></div>'
+            f' data-does="select" title="{title}">{_marked(frame, terms)}{moved}</button></div>'
         )
 
 
-def _marked(name: str, words: re.Pattern[str]) -> str:
+def _marked(name: str, terms: re.Pattern[str]) -> str:
     """Return a name as HTML with the words marked that are searched for."""
     parts, at = [], 0
-    for match in words.finditer(name):
+    for match in terms.finditer(name):
         parts += [escape(name[at : match.start()]), f"<mark>{escape(match[0])}</mark>"]
         at = match.end()
     return "".join([*parts, escape(name[at:])])

@@ -46,12 +46,12 @@ def session_of(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
 
 
 def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Session:
-    texts = {one: files(one) for one in (file, *arguments.overlays)}
+    texts = {name: files(name) for name in (file, *arguments.overlays)}
     presets, packages = library(files), replace(disk_of(file, arguments), read=files)
 
     def compiled(now: Mapping[str, str]) -> Compiled:
-        def read(one: str) -> str:
-            return now[one] if one in now else files(one)
+        def read(name: str) -> str:
+            return now[name] if name in now else files(name)
 
         overlays = overlays_of(arguments, read)
         return compile_robot(
@@ -65,9 +65,9 @@ def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sess
             given=given_by(arguments),
         )
 
-    def write(one: str, old: str, new: str) -> None:
-        rewrite(Path(one), old, new)
-        files.wrote(one, new)
+    def write(name: str, old: str, new: str) -> None:
+        rewrite(Path(name), old, new)
+        files.wrote(name, new)
 
     return Session(texts, compiled, write)
 

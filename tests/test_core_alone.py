@@ -8,22 +8,27 @@ from __future__ import annotations
 import os
 import re
 import sys
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support import processes
 from tests.support.cli import tfcompose_in
-from tests.support.core import run_with
 from tests.support.house import ROOT
 from tests.support.names import FILE, names
+from tests.support.preloaded import preloaded
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tool import shipped
 
 if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from tfcompose.foundation.tool import Tool
+
+    Run = Callable[..., subprocess.CompletedProcess[str]]
 
 #: One worker has the copy, whose modules are compiled once.
 pytestmark = pytest.mark.xdist_group("core")
@@ -65,24 +70,31 @@ def test_it_lints_builds_and_explains_the_example_robots(core: Path, tmp_path: P
             assert file.is_dir() or file.read_bytes() == same.read_bytes(), file
 
 
-def test_help_topics_and_codes_are_those_of_the_core(core: Path, tmp_path: Path) -> None:
-    text = run_with(core, tmp_path, "--help").stdout
+@pytest.fixture(scope="module")
+def alone(core: Path) -> Iterator[Run]:
+    """Run the core in a folder."""
+    with preloaded(core) as forks:
+        yield partial(forks.run, core)
+
+
+def test_help_topics_and_codes_are_those_of_the_core(alone: Run, tmp_path: Path) -> None:
+    text = alone(tmp_path, "--help").stdout
     assert "  lint " in text
     for tool in shipped().tools:
         for command in tool.commands:
             assert f"  {command.name} " not in text
     for word in ("lint", "guard", "codes", "sensors"):
-        assert run_with(core, tmp_path, "help", word).returncode == 0
-    assert run_with(core, tmp_path, "schema").returncode == 0
-    assert run_with(core, tmp_path, "explain", "TF801").returncode == 0
+        assert alone(tmp_path, "help", word).returncode == 0
+    assert alone(tmp_path, "schema").returncode == 0
+    assert alone(tmp_path, "explain", "TF801").returncode == 0
 
 
 @pytest.mark.parametrize("tool", shipped().tools, ids=lambda tool: tool.name)
 def test_a_command_of_an_absent_tool_says_what_installs_it(
-    tool: Tool, core: Path, tmp_path: Path
+    tool: Tool, alone: Run, tmp_path: Path
 ) -> None:
     for command in tool.commands:
-        done = run_with(core, tmp_path, command.name)
+        done = alone(tmp_path, command.name)
         install = f"tfcompose[{tool.extra}]" if tool.extra else "tfcompose"
         assert (done.returncode, done.stdout) == (2, "")
         assert f"pip install '{install}'" in done.stderr
@@ -102,9 +114,9 @@ def test_a_command_of_an_absent_tool_says_what_installs_it(
     ids=" ".join,
 )
 def test_a_topic_and_a_code_of_an_absent_tool_say_what_installs_it(
-    argv: tuple[str, ...], core: Path, tmp_path: Path
+    argv: tuple[str, ...], alone: Run, tmp_path: Path
 ) -> None:
-    done = run_with(core, tmp_path, *argv)
+    done = alone(tmp_path, *argv)
     tool = "deploy" if "deploy" in argv else "fleet"
     assert (done.returncode, done.stdout) == (2, "")
     assert f"belongs to the tool {tool}" in done.stderr
@@ -112,14 +124,14 @@ def test_a_topic_and_a_code_of_an_absent_tool_say_what_installs_it(
 
 
 def test_an_option_and_a_key_of_an_absent_tool_say_what_installs_it(
-    core: Path, tmp_path: Path
+    alone: Run, tmp_path: Path
 ) -> None:
-    done = run_with(core, tmp_path, "ps", "--all-hosts")
+    done = alone(tmp_path, "ps", "--all-hosts")
     assert (done.returncode, "tfcompose[deploy]" in done.stderr) == (2, True)
     (tmp_path / "robot.yaml").write_text(
         "tfcompose: 1\nrobot: r\nframes: {base_link: {}} # tfcompose: allow TF887 because x\n"
         "fleet: fleet.yaml\nrules: {TF881: off}\n"
     )
-    done = run_with(core, tmp_path, "lint")
+    done = alone(tmp_path, "lint")
     assert "robot.yaml:4:1: error[TF101] unknown key fleet" in done.stdout
     assert done.stdout.count("tfcompose[fleet]") == 3

@@ -9,16 +9,19 @@ import json
 import os
 import re
 import sys
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support import processes
-from tests.support.core import ACME, install, run_with, write_tool
+from tests.support.core import ACME, install, write_tool
+from tests.support.core import run_with as run_process
+from tests.support.preloaded import preloaded
 
 if TYPE_CHECKING:
     import subprocess
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -41,11 +44,18 @@ def acme(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return install(ACME, tmp_path_factory.mktemp("acme"))
 
 
+@pytest.fixture(scope="module")
+def run_with() -> Iterator[Run]:
+    """Run tfcompose with these folders on Python's path, in a folder."""
+    with preloaded() as forks:
+        yield forks.run
+
+
 @pytest.fixture
-def run(acme: Path, tmp_path: Path) -> Run:
+def run(run_with: Run, acme: Path, tmp_path: Path) -> Run:
     """Run tfcompose with the installed package, in a folder with a robot that has its section."""
     write_robot(tmp_path, "acme: {frame: mast, reach: 2 m}")
-    return lambda *arguments: run_with(acme, tmp_path, *arguments)
+    return partial(run_with, acme, tmp_path)
 
 
 def write_robot(folder: Path, *lines: str) -> None:
@@ -63,7 +73,7 @@ def completions(path: Path, folder: Path, line: str) -> set[str]:
         "COMP_LINE": line,
         "COMP_POINT": str(len(line)),
     }
-    run_with(path, folder, **variables)
+    run_process(path, folder, **variables)
     return set(answer.read_text("utf-8").split("\n"))
 
 
@@ -134,7 +144,7 @@ print(json.dumps([f"{one.code}: {one.message}" for one in found]))
 """
 
 
-def hindrances(path: str | Path, folder: Path, **environment: str) -> list[str]:
+def hindrances(run_with: Run, path: str | Path, folder: Path, **environment: str) -> list[str]:
     assert run_with(path, folder, "build", "-o", "built").returncode == 0
     env = os.environ | {"PYTHONPATH": str(path)} | environment
     done = processes.run([sys.executable, "-c", PREFLIGHT], cwd=folder, env=env, check=True)
@@ -142,24 +152,32 @@ def hindrances(path: str | Path, folder: Path, **environment: str) -> list[str]:
     return found
 
 
-def test_its_process_reads_its_section_of_the_plan(run: Run, acme: Path, tmp_path: Path) -> None:
-    assert hindrances(acme, tmp_path) == []
+def test_its_process_reads_its_section_of_the_plan(
+    run: Run, run_with: Run, acme: Path, tmp_path: Path
+) -> None:
+    assert hindrances(run_with, acme, tmp_path) == []
     done = run("beep", "built/plan.json")
     assert (done.returncode, done.stdout) == (0, "beep on mast, heard 2 m away\n")
 
 
-def test_its_preflight_check_runs_before_anything_starts(acme: Path, tmp_path: Path) -> None:
+def test_its_preflight_check_runs_before_anything_starts(
+    run_with: Run, acme: Path, tmp_path: Path
+) -> None:
     write_robot(tmp_path, "acme: {frame: mast}")
-    assert hindrances(acme, tmp_path, ACME_MUTED="1") == ["ACME103: mast is muted by ACME_MUTED"]
+    assert hindrances(run_with, acme, tmp_path, ACME_MUTED="1") == [
+        "ACME103: mast is muted by ACME_MUTED"
+    ]
 
 
-def test_a_preflight_check_that_crashes_is_a_bug_of_the_tool(tmp_path: Path) -> None:
+def test_a_preflight_check_that_crashes_is_a_bug_of_the_tool(
+    run_with: Run, tmp_path: Path
+) -> None:
     key = "Key('bell', 'bell:Bell', 'a bell', in_plan=True)"
     spec = "from tfcompose.spec.language.spec import Spec\nclass Bell(Spec): pass"
     more = f"preflight='bell:no_such_function', keys=({key},)"
     write_tool(tmp_path / "site", "bell", f"{spec}\n{TOOL}name='bell', package='bell', {more})")
     write_robot(tmp_path, "bell: {}")
-    (found,) = hindrances(tmp_path / "site", tmp_path)
+    (found,) = hindrances(run_with, tmp_path / "site", tmp_path)
     assert re.match("TF903: bell:no_such_function of bell crashed: AttributeError", found)
 
 
@@ -217,7 +235,7 @@ def test_its_preset_is_found(run: Run, tmp_path: Path) -> None:
     ids=["import", "type", "crash"],
 )
 def test_a_tool_that_does_not_load_is_one_finding_and_the_rest_goes_on(
-    module: str, acme: Path, tmp_path: Path
+    run_with: Run, module: str, acme: Path, tmp_path: Path
 ) -> None:
     write_tool(tmp_path / "broken", "broken", module)
     path = f"{acme}:{tmp_path / 'broken'}"
@@ -245,7 +263,7 @@ def test_a_tool_that_does_not_load_is_one_finding_and_the_rest_goes_on(
     ],
 )
 def test_a_clash_of_commands_or_keys_is_a_finding_and_the_first_one_stays(
-    brings: str, acme: Path, tmp_path: Path
+    run_with: Run, brings: str, acme: Path, tmp_path: Path
 ) -> None:
     write_tool(tmp_path / "second", "second", f"{TOOL}name='second', package='second', {brings})")
     path = f"{acme}:{tmp_path / 'second'}"
@@ -258,7 +276,9 @@ def test_a_clash_of_commands_or_keys_is_a_finding_and_the_first_one_stays(
 
 
 @pytest.mark.parametrize("code", ["ACME101", "TF801", "TF999", "acme1"])
-def test_a_code_that_is_not_its_own_is_a_finding(code: str, acme: Path, tmp_path: Path) -> None:
+def test_a_code_that_is_not_its_own_is_a_finding(
+    run_with: Run, code: str, acme: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "second"
     write_tool(folder, "second_tool", f"{TOOL}name='second', package='second', codes='second')")
     (folder / "second/codes").mkdir(parents=True)
@@ -270,7 +290,9 @@ def test_a_code_that_is_not_its_own_is_a_finding(code: str, acme: Path, tmp_path
     assert code in done.stderr
 
 
-def test_a_command_whose_module_does_not_load_is_one_finding(tmp_path: Path) -> None:
+def test_a_command_whose_module_does_not_load_is_one_finding(
+    run_with: Run, tmp_path: Path
+) -> None:
     brings = "name='far', package='far', commands=(Command('far', 'Go far', 'not_there'),)"
     write_tool(tmp_path / "far", "far", f"{TOOL}{brings})")
     done = run_with(tmp_path / "far", tmp_path, "far")

@@ -32,7 +32,7 @@ from tfcompose.tf.live.state import NAMELESS, RosProcess, StampedData, TopicStat
 from tfcompose.tf.ros.environment import RANGE
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
+JOINT_STATE, CLOCK = "sensor_msgs/msg/JointState", "rosgraph_msgs/msg/Clock"
 
 
 def codes(state: TreeState) -> set[str]:
@@ -137,6 +137,12 @@ CASES: dict[str, tuple[TreeState, set[str]]] = {
     "a clock that nobody stamps with": (
         sound_tree().moving("map odom", b"x").observed(clock_ns=100 * SECOND_NS, clock_moves=True),
         set(),
+    ),
+    "two simulators whose time goes": (
+        sound_tree().observed(
+            graph=(TopicState("/clock", CLOCK, ("/bag", "/sim")),), clock_ns=1, clock_moves=True
+        ),
+        {"TF837"},
     ),
     "data a little late": (sound_tree().observed(stamped=data("base_link", 0.1)), set()),
     "data a little ahead of a late edge": (
@@ -379,7 +385,7 @@ def test_stamps_that_stand_with_the_clock_are_reported_of_the_clock_alone() -> N
         .moving("odom base_link", stamp=lambda _: 106 * SECOND_NS)
         .fixed("base_link laser")
     )
-    clock = TopicState("/clock", "rosgraph_msgs/msg/Clock", ("/gazebo",), ("/nav",))
+    clock = TopicState("/clock", CLOCK, ("/gazebo",), ("/nav",))
     stands = history.observed(clock_ns=106 * SECOND_NS, clock_moves=False, graph=(clock,))
     assert codes(stands) == {"TF836"}
     assert "TF823" in codes(replace(stands, clock_moves=True))

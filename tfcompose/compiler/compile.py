@@ -95,15 +95,15 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     draft, unresolved = resolve(validated, library, read, disk)
     source, parts, robot = validated.source, draft.collected, draft.robot
     rules = {
-        word: (level, source.at_key(("rules", word)))
-        for word, level in levels_of(validated, robot.limits)
+        name: (level, source.at_key(("rules", name)))
+        for name, level in levels_of(validated, robot.limits)
     }
     codes = {code_of(name) for name, (level, _) in rules.items() if level == "off"}
     off = {code for code in codes if code and can_be_allowed(code)}
     found = without_duplicates([*validated.found, *unresolved, *_checked(robot, off)])
     sources = (source, *parts.sources)
     kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
-    ordered = tuple(sorted(kept, key=lambda one: one.sort_key))
+    ordered = tuple(sorted(kept, key=lambda entry: entry.sort_key))
     return Compiled(robot, ordered, source.allows, frozenset(used), sources)
 
 
@@ -115,9 +115,9 @@ def _checked(robot: Robot, off: Collection[str]) -> list[Finding]:
     of_tools, found = rules_of_tools(robot)
     return [
         *(
-            one
+            entry
             for rules in (RULES.values(), of_tools)
-            for one in check(robot, [rule for rule in rules if rule.code not in off])
+            for entry in check(robot, [rule for rule in rules if rule.code not in off])
         ),
         *found,
     ]

@@ -175,7 +175,7 @@ class _Scene:
 
 
 def _floats(element: ET.Element) -> list[float]:
-    return [float(word) for word in (element.text or "").split()]
+    return [float(token) for token in (element.text or "").split()]
 
 
 def _by_matrix(values: list[float], point: Vector) -> Vector:

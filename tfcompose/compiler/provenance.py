@@ -70,8 +70,8 @@ def _entries(edge: Edge, source: Source) -> Iterator[Path]:
             if section == "parts"
             else filter(entries.__contains__, ends)
         )
-        for one in known:
-            yield (section, one) if edge.given else (section, one, "frames", edge.child)
+        for entry in known:
+            yield (section, entry) if edge.given else (section, entry, "frames", edge.child)
 
 
 def _shown(value: Any) -> str:

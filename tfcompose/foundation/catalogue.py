@@ -221,25 +221,25 @@ def _is_code(text: str) -> bool:
 CATALOGUE = Catalogue(Path(__file__).parents[1] / "data" / "codes", more=code_folders)
 
 
-def code_of(word: str) -> str | None:
+def code_of(name: str) -> str | None:
     """Return the code that a code in any case, or a name, means; None if there is none."""
-    upper = word.upper()
+    upper = name.upper()
     if upper in CATALOGUE:
         return upper
-    return next((code.code for code in CATALOGUE.values() if code.name == word), None)
+    return next((code.code for code in CATALOGUE.values() if code.name == name), None)
 
 
-def absent_code(word: str) -> str:
+def absent_code(name: str) -> str:
     """Return what installs the tool that has a code, by that or by its name; empty if none has."""
-    return absent(word.upper(), "code") or absent(word, "rule")
+    return absent(name.upper(), "code") or absent(name, "rule")
 
 
-def similar_words(word: str) -> list[str]:
+def similar_words(name: str) -> list[str]:
     """Return the codes and names that an unknown word may be a slip of.
 
     There are none for a whole code, as TF999 is.
     """
-    if _is_code(word.upper()):
+    if _is_code(name.upper()):
         return []
     return [*CATALOGUE, *(code.name for code in CATALOGUE.values())]
 

@@ -190,9 +190,9 @@ def nearest(word: str, known: Iterable[str], cutoff: float = 0.61) -> str | None
     return next((name for name in known if name.lower() == found[0]), None) if found else None
 
 
-def slip_of(word: str, known: Iterable[str]) -> str | None:
+def slip_of(name: str, known: Iterable[str]) -> str | None:
     """Return the only known word that ``word`` is a slip of the pen away from, or None."""
-    near = slips_of(word, known)
+    near = slips_of(name, known)
     return near[0] if len(near) == 1 else None
 
 
@@ -218,7 +218,7 @@ def _is_one_slip(a: str, b: str) -> bool:
     return a[1:] == b[1:] or a[1:] == b or a == b[1:] or swapped
 
 
-def did_you_mean(word: str, known: Iterable[str], otherwise: str = "") -> str:
+def did_you_mean(name: str, known: Iterable[str], otherwise: str = "") -> str:
     """Return advice that names the nearest word, or ``otherwise`` if none is near."""
-    near = nearest(word, list(known))
+    near = nearest(name, list(known))
     return f"did you mean {near}?" if near else otherwise

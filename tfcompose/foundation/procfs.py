@@ -48,7 +48,7 @@ def stat(pid: int | str) -> Stat:
 
 def environ(pid: int | str) -> dict[str, str]:
     """Return the environment that the process was started with."""
-    pairs = (word.partition("=") for word in _words(pid, "environ"))
+    pairs = (entry.partition("=") for entry in _words(pid, "environ"))
     return {name: value for name, _, value in pairs if name}
 
 

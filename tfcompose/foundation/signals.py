@@ -159,8 +159,8 @@ class Stop:
         ignored = (
             signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
         )  # under nohup a hang-up is meant to be ignored
-        taken = SIGNALS[:2] if ignored else SIGNALS
-        self._previous = {number: signal.signal(number, self._on_signal) for number in taken}
+        handled = SIGNALS[:2] if ignored else SIGNALS
+        self._previous = {number: signal.signal(number, self._on_signal) for number in handled}
         self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
         self._thread.start()
         self._previous_mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)

@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 LISTED = 6
 
 
-def counted(number: int, word: str) -> str:
+def counted(number: int, noun: str) -> str:
     """Return the number with the word, in the plural where it belongs: "1 edge", "2 edges"."""
-    return f"{number} {word}{'' if number == 1 else 's'}"
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def with_more(first: str, more: int, word: str = "edge") -> str:
+def with_more(first: str, more: int, noun: str = "edge") -> str:
     """Return the first name, and how many there are besides: "a and 2 more edges"."""
-    return f"{first} and {counted(more, f'more {word}')}" if more else first
+    return f"{first} and {counted(more, f'more {noun}')}" if more else first
 
 
 def listed(names: Iterable[object], most: int = LISTED) -> str:

@@ -245,10 +245,10 @@ _SPELLINGS = {
 def respelt(text: str, unit: str, dimension: Dimension) -> str | None:
     """Return the quantity with the only unit of the dimension that fits ``unit``, or None."""
     known = [name for name, (_, its) in UNITS.items() if its == dimension]
-    meant = _SPELLINGS.get(unit) or _SPELLINGS.get(unit.lower()) or slip_of(unit, known)
-    if meant not in known or not text.rstrip().endswith(unit):
+    unit_meant = _SPELLINGS.get(unit) or _SPELLINGS.get(unit.lower()) or slip_of(unit, known)
+    if unit_meant not in known or not text.rstrip().endswith(unit):
         return None
-    return text.rstrip().removesuffix(unit) + str(meant)
+    return text.rstrip().removesuffix(unit) + str(unit_meant)
 
 
 def dimension_name(dimension: Dimension) -> str:

@@ -59,8 +59,11 @@ def entry(key: str, value: Any, depth: int = 0) -> list[str]:
     if len(line) <= WIDTH or not isinstance(value, (dict, list)) or not _splits(value):
         return [line]
     if isinstance(value, list):
-        return [head, *(one for item in value for one in _item(item, depth + 1))]
-    return [head, *(one for inner, item in value.items() for one in entry(inner, item, depth + 1))]
+        return [head, *(line for item in value for line in _item(item, depth + 1))]
+    return [
+        head,
+        *(line for inner, item in value.items() for line in entry(inner, item, depth + 1)),
+    ]
 
 
 def _splits(value: Any) -> bool:
@@ -77,7 +80,7 @@ def _item(value: Any, depth: int) -> list[str]:
     line = f"{before}- {flow(value)}"
     if len(line) <= WIDTH or not isinstance(value, dict):
         return [line]
-    lines = [one for key, item in value.items() for one in entry(key, item, depth + 1)]
+    lines = [line for key, item in value.items() for line in entry(key, item, depth + 1)]
     return [f"{before}- {lines[0].lstrip()}", *lines[1:]]
 
 
@@ -166,11 +169,13 @@ def comment(texts: Iterable[str], depth: int = 0) -> list[str]:
 
 def _folded(line: str, width: int) -> list[str]:
     lines = [""]
-    for word in line.split(" "):
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
-            lines.append("  " + word)
+    for token in line.split(" "):
+        if lines[-1] and len(lines[-1]) + 1 + len(token) > width:
+            lines.append("  " + token)
         else:
-            lines[-1] = f"{lines[-1]} {word}".strip() if len(lines) == 1 else f"{lines[-1]} {word}"
+            lines[-1] = (
+                f"{lines[-1]} {token}".strip() if len(lines) == 1 else f"{lines[-1]} {token}"
+            )
     return lines
 
 

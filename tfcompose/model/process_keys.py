@@ -335,8 +335,8 @@ def _stop_of_pod(exported: Exported) -> Iterator[Setting]:
     signal, time_s = exported.process.stop.signal, stop_s(exported.process)
     yield Setting("terminationGracePeriodSeconds", math.ceil(time_s), "pod")
     if signal != "SIGTERM":
-        words = ["sh", "-c", f"kill -s {signal.removeprefix('SIG')} 1; sleep {time_s / 2:g}"]
-        yield Setting("lifecycle", {"preStop": {"exec": {"command": words}}}, "container")
+        command = ["sh", "-c", f"kill -s {signal.removeprefix('SIG')} 1; sleep {time_s / 2:g}"]
+        yield Setting("lifecycle", {"preStop": {"exec": {"command": command}}}, "container")
 
 
 def _stop_in_launch(process: PlanProcess) -> Iterator[Setting]:

@@ -132,7 +132,7 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
         ratios = [trace / of_shape for of_shape in of_shapes if of_shape > 0]
         if not ratios or trace <= 0 or any(1 / times < ratio < times for ratio in ratios):
             continue
-        ratio = min(ratios, key=lambda one: abs(math.log(one)))
+        ratio = min(ratios, key=lambda candidate: abs(math.log(candidate)))
         at = inertial.at or link.at
         message = f"inertia of {link.name} is {ratio:.3g} times what its mass and shape give"
         advice = "give it in kg m², about the centre of mass"

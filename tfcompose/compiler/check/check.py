@@ -97,9 +97,9 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
             continue
         try:
             found += [
-                _of_part(one, robot)
-                for one in rule.find(robot)
-                if not _is_left_out(one, rule, robot)
+                _of_part(entry, robot)
+                for entry in rule.find(robot)
+                if not _is_left_out(entry, rule, robot)
             ]
         except Exception as error:  # noqa: BLE001 (a rule's fault must not hide the others' findings)
             name = CATALOGUE[rule.code].name

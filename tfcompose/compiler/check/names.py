@@ -36,11 +36,11 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
     for name, at in names.items():
         if not _GOOD.fullmatch(name):
             is_foreign = robot.is_foreign(at)
-            taken = bool(re.fullmatch(_TAKEN, name))
-            if taken and is_foreign and name not in moving and name not in robot.frames:
+            is_accepted = bool(re.fullmatch(_TAKEN, name))
+            if is_accepted and is_foreign and name not in moving and name not in robot.frames:
                 continue  # nothing is named after a fixed joint
-            taken = taken or (is_foreign and not re.fullmatch(_LOST, name))
-            yield _invalid(name, at, "name", "warning" if taken else "error")
+            is_accepted = is_accepted or (is_foreign and not re.fullmatch(_LOST, name))
+            yield _invalid(name, at, "name", "warning" if is_accepted else "error")
     for process in robot.processes:
         if not _PROCESS.fullmatch(process.name):
             yield _invalid(process.name, process.at, "process name")

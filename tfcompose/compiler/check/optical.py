@@ -152,7 +152,7 @@ def _is_wrong(edge: Edge, robot: Robot) -> bool:
         return True
     if _END_OF_ARM.search(parent):
         return False
-    by_right_angles = any(_is_at(quat_xyzw, one) for one in _RIGHT_ANGLES)
+    by_right_angles = any(_is_at(quat_xyzw, rotation) for rotation in _RIGHT_ANGLES)
     if _is_base(edge.parent, robot):
         view, down = rotate(quat_xyzw, (0.0, 0.0, 1.0)), rotate(quat_xyzw, (0.0, 1.0, 0.0))
         level, upright = (
@@ -160,8 +160,8 @@ def _is_wrong(edge: Edge, robot: Robot) -> bool:
             down[2] < -math.cos(_TOLERANCE_RAD),
         )
         return view[2] > math.sin(_STEEP_RAD) or (by_right_angles and level and not upright)
-    words = {*parent.split("_")}
-    is_camera = bool(words & _CAMERA_WORDS) and not words & _HOLDER_WORDS
+    tokens = {*parent.split("_")}
+    is_camera = bool(tokens & _CAMERA_WORDS) and not tokens & _HOLDER_WORDS
     return _is_at(quat_xyzw, IDENTITY_XYZW) or (is_camera and by_right_angles)
 
 

@@ -180,12 +180,12 @@ def driver_publishes_too(robot: Robot) -> Iterator[Finding]:
 
 def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
     """Whether the plan switches it off, or starts nothing that could publish."""
-    words = " ".join(process.argv).lower()
+    command_line = " ".join(process.argv).lower()
     return process.kind not in {"run", "external"} or (
         process.kind == "run"
         and all(
             (process.package and process.params.get(key) == value)
-            or f"{key}:={value}".lower() in words
+            or f"{key}:={value}".lower() in command_line
             for key, value in switch.items()
         )
     )
@@ -193,12 +193,12 @@ def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
 
 def _is_switched_on(process: Process, switch: dict[str, Any]) -> bool:
     """Return whether a parameter or argument fails to switch the driver off."""
-    words = " ".join(process.argv).lower()
+    command_line = " ".join(process.argv).lower()
     others = [
         process.params[key] != value for key, value in switch.items() if key in process.params
     ]
     return any(others) or any(
-        f"{key}:=" in words and f"{key}:={value}".lower() not in words
+        f"{key}:=" in command_line and f"{key}:={value}".lower() not in command_line
         for key, value in switch.items()
     )
 

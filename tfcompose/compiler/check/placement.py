@@ -122,7 +122,7 @@ def view_blocked(robot: Robot) -> Iterator[Finding]:
             for view in _views(robot, sensor)
             if not is_plane(view.optics) and not _sees_only_robot(robot, view)
         ]
-        worst = max(views, key=lambda one: one.blocked, default=None)
+        worst = max(views, key=lambda view: view.blocked, default=None)
         if worst and worst.blocked > limit:
             message = (
                 f"{_percent(worst.blocked)} of what {sensor.name} sees ({worst.optics.stream}) is"
@@ -282,8 +282,12 @@ def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
     around = _views_of(robot).around
     reported = set()
     for viewer, viewed in itertools.combinations(active, 2):
-        (one, of_one), (other, of_other) = viewer, viewed
-        if one is other or of_one.kind != of_other.kind or (one.name, other.name) in reported:
+        (sensor_a, of_one), (other, of_other) = viewer, viewed
+        if (
+            sensor_a is other
+            or of_one.kind != of_other.kind
+            or (sensor_a.name, other.name) in reported
+        ):
             continue
         there, back = _sight(around, of_one, of_other), _sight(around, of_other, of_one)
         if there is None or back is None:
@@ -294,12 +298,12 @@ def sensors_dazzle_each_other(robot: Robot) -> Iterator[Finding]:
             and _is_open(around, viewer, viewed, there)
             and _is_open(around, viewed, viewer, back)
         ):
-            reported.add((one.name, other.name))
+            reported.add((sensor_a.name, other.name))
             message = (
-                f"{one.name} and {other.name} look into each other, {far:.2g} m apart; the limit"
-                f" is {limit:g} m"
+                f"{sensor_a.name} and {other.name} look into each other, {far:.2g} m apart; the"
+                f" limit is {limit:g} m"
             )
-            notes = [Note(f"{one.name} is defined here", one.at)]
+            notes = [Note(f"{sensor_a.name} is defined here", sensor_a.at)]
             advice = "turn one away, or mount them at different heights"
             yield finding("TF645", message, other.at, help=advice, notes=notes)
 
@@ -351,7 +355,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
                 )
             continue
         names = [sensor.name for sensor in robot.sensors]
-        wrong = [one for one in zone.by if one not in KINDS and one not in names]
+        wrong = [name for name in zone.by if name not in KINDS and name not in names]
         if wrong:
             advice = did_you_mean(wrong[0], [*KINDS, *names])
             yield finding(

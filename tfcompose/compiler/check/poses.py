@@ -86,10 +86,12 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
                     f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
                 )
                 at = value.place(index)
-                meant = (
+                advice_value = (
                     f"{math.radians(number):.17g}" if robot.is_foreign(at) else f"{number:g} deg"
                 )
-                yield finding("TF410", message, at, help=f"if degrees are meant, write {meant}")
+                yield finding(
+                    "TF410", message, at, help=f"if degrees are meant, write {advice_value}"
+                )
 
 
 #: 1.5708 is good enough: it is 0.0002 degrees off, and no mount is that accurate.
@@ -193,7 +195,7 @@ def camera_looks_away(robot: Robot) -> Iterator[Finding]:
     poses = placed(robot) if base.startswith("base") and robot.sensors else {}
     for sensor in robot.sensors:
         view = next(
-            (_VIEWS[word] for word in reversed(sensor.name.split("_")) if word in _VIEWS), None
+            (_VIEWS[token] for token in reversed(sensor.name.split("_")) if token in _VIEWS), None
         )
         if view is None or sensor.kind not in CAMERAS or sensor.mount not in poses:
             continue
@@ -249,11 +251,15 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         largest = max(sizes[link.name], default=0.0)
         if largest > _LARGEST_M:
             message = f"the body of {link.name} is {largest:g} m long"
-            meant = f"{largest / 1000:g}" if robot.is_foreign(link.at) else f"{largest:g} mm"
-            yield finding(
-                "TF414", message, link.at, help=f"if millimetres are meant, write {meant}"
+            advice_value = (
+                f"{largest / 1000:g}" if robot.is_foreign(link.at) else f"{largest:g} mm"
             )
-    body = max((size for one in sizes.values() for size in one if size <= _LARGEST_M), default=0.0)
+            yield finding(
+                "TF414", message, link.at, help=f"if millimetres are meant, write {advice_value}"
+            )
+    body = max(
+        (size for extent in sizes.values() for size in extent if size <= _LARGEST_M), default=0.0
+    )
     below = placed(robot, moving=True)
     mounts = [
         norm(edge.pose.xyz)
@@ -298,11 +304,11 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
             farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
             at, number = value.place(farthest), value.numbers[farthest]
             unit, divisor = _unit_meant(distance, usual)
-            meant = f"{number / divisor:g}"
+            advice_value = f"{number / divisor:g}"
             if not robot.is_foreign(at):
-                meant = f"{number:g} {unit}"
+                advice_value = f"{number:g} {unit}"
             name = "centimetres" if unit == "cm" else "millimetres"
-            advice = f"a bare number is in metres; if {name} are meant, write {meant}"
+            advice = f"a bare number is in metres; if {name} are meant, write {advice_value}"
             yield finding("TF414", message, at, help=advice)
 
 
@@ -387,7 +393,7 @@ _SIDES = (
 )
 #: These are found at the beginning of longer words, too: leftfinger.
 _LONG_SIDES = ("left", "right")
-_SIDE_WORDS = {word for pair in _SIDES for word in pair[:2]}
+_SIDE_WORDS = {token for pair in _SIDES for token in pair[:2]}
 _NEAR_M = 1e-6
 #: Nearer to the middle than this, left and right may well be at one place.
 _MIDDLE_M = 0.01
@@ -418,32 +424,32 @@ def twins(frame: str) -> Iterator[str]:
 
     Left_wheel_link → right_wheel_link.
     """
-    words = frame.split("_")
-    for index, word in enumerate(words):
-        side, rest = _side_in(word)
+    tokens = frame.split("_")
+    for index, token in enumerate(tokens):
+        side, rest = _side_in(token)
         for first, second, _ in _SIDES:
             if side.lower() in {first, second}:
                 other = second if side.lower() == first else first
                 other = other.upper() if side.isupper() else other
-                yield "_".join([*words[:index], other + rest, *words[index + 1 :]])
+                yield "_".join([*tokens[:index], other + rest, *tokens[index + 1 :]])
 
 
-def _side_in(word: str) -> tuple[str, str]:
+def _side_in(token: str) -> tuple[str, str]:
     """Return the side that a word of a name begins with, empty if it has none, and the rest."""
-    side = next((side for side in _LONG_SIDES if word.startswith(side)), word)
-    return (side, word[len(side) :]) if side.lower() in _SIDE_WORDS else ("", word)
+    side = next((side for side in _LONG_SIDES if token.startswith(side)), token)
+    return (side, token[len(side) :]) if side.lower() in _SIDE_WORDS else ("", token)
 
 
 def without_side(frame: str) -> str:
     """Return the name with a star for each side: left_wheel_link is ``*_wheel_link``."""
-    words = map(_side_in, frame.split("_"))
-    return "_".join(f"{'*' * bool(side)}{rest}" for side, rest in words)
+    tokens = map(_side_in, frame.split("_"))
+    return "_".join(f"{'*' * bool(side)}{rest}" for side, rest in tokens)
 
 
-def are_swapped(one: Edge, other: Edge) -> bool:
+def are_swapped(edge: Edge, other: Edge) -> bool:
     """Return whether two frames stand mirrored to the sides in their names."""
-    axis, sign = side_of(one.child, other.child)
-    here, there = one.pose.xyz, other.pose.xyz
+    axis, sign = side_of(edge.child, other.child)
+    here, there = edge.pose.xyz, other.pose.xyz
     mirrored = list(there)
     mirrored[axis] = -mirrored[axis]
     return sign * here[axis] < -_MIDDLE_M and math.dist(here, mirrored) < _MIRRORED_M
@@ -458,13 +464,13 @@ def side_of(frame: str, twin: str) -> tuple[int, int]:
     return axis, 1 if here.lower() == first else -1
 
 
-def are_mirrored(one: Edge, other: Edge) -> bool:
+def are_mirrored(edge: Edge, other: Edge) -> bool:
     """Return whether two frames named after two sides stand at one place."""
-    if one.parent != other.parent or other.child not in twins(one.child):
+    if edge.parent != other.parent or other.child not in twins(edge.child):
         return False
-    axis, _ = side_of(one.child, other.child)
-    apart = math.dist(one.pose.xyz, other.pose.xyz)
-    return apart < _NEAR_M and abs(one.pose.xyz[axis]) > _MIDDLE_M
+    axis, _ = side_of(edge.child, other.child)
+    apart = math.dist(edge.pose.xyz, other.pose.xyz)
+    return apart < _NEAR_M and abs(edge.pose.xyz[axis]) > _MIDDLE_M
 
 
 def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None:

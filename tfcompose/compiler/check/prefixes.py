@@ -41,10 +41,10 @@ def frame_without_prefix(robot: Robot) -> Iterator[Finding]:
     for process in robot.processes if robot.ros.frame_prefix else ():
         if process.kind != "run" or not process.takes_ros_arguments:
             continue
-        given: set[str] = set()
+        parameters: set[str] = set()
         for node in process.ros_nodes:
             params = node.flat_params
-            given |= {_own_name(key) for key in params}
+            parameters |= {_own_name(key) for key in params}
             wrong = {
                 key: value
                 for key, value in params.items()
@@ -58,7 +58,7 @@ def frame_without_prefix(robot: Robot) -> Iterator[Finding]:
         left = {
             key: frame
             for key, frame in usual.items()
-            if key not in given and _lacks_prefix(frame, robot)
+            if key not in parameters and _lacks_prefix(frame, robot)
         }
         if left:
             yield replace(_without_prefix(process, left, robot), severity="warning")

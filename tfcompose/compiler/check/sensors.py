@@ -208,13 +208,13 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF622", follows="pose")
 def mount_copied(robot: Robot) -> Iterator[Finding]:
-    given: dict[str, Edge] = {}
+    mounts: dict[str, Edge] = {}
     for edge in robot.edges:
         if not edge.given:
             continue
-        others = [given[name] for name in twins(edge.child) if name in given]
+        others = [mounts[name] for name in twins(edge.child) if name in mounts]
         twin = next((other for other in others if are_mirrored(other, edge)), None)
-        given.setdefault(edge.child, edge)
+        mounts.setdefault(edge.child, edge)
         if twin:
             x, y, z = edge.pose.xyz
             message = (
@@ -228,7 +228,7 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
 @rule("TF625", follows="pose")
 def sides_swapped(robot: Robot) -> Iterator[Finding]:
     poses = placed(robot, moving=True)
-    given: dict[str, Edge] = {}
+    edges: dict[str, Edge] = {}
     for edge in robot.edges:
         base = poses.get(edge.parent)
         is_fixed = edge.joint.type == "continuous" if edge.joint else edge.kind == "static"
@@ -239,17 +239,17 @@ def sides_swapped(robot: Robot) -> Iterator[Finding]:
             or angle_between(base.quat_xyzw, IDENTITY_XYZW) > _TURNED_RAD
         ):
             continue
-        others = [given[name] for name in twins(edge.child) if name in given]
+        others = [edges[name] for name in twins(edge.child) if name in edges]
         swapped = (
             other for other in others if other.parent == edge.parent and are_swapped(other, edge)
         )
         twin = next(swapped, None)
-        given[edge.child] = edge
+        edges[edge.child] = edge
         if twin:
             axis = "xy"[side_of(edge.child, twin.child)[0]]
             places = " and ".join(
-                f"{one.child} at {axis} = {one.pose.xyz['xy'.index(axis)]:g}"
-                for one in (twin, edge)
+                f"{side.child} at {axis} = {side.pose.xyz['xy'.index(axis)]:g}"
+                for side in (twin, edge)
             )
             message = f"{places} in {edge.parent}: each is on the other's side"
             notes = [Note(f"{twin.child} is defined here", twin.xyz_at or twin.at)]
@@ -369,11 +369,14 @@ def _addresses_used_twice(robot: Robot, found: set[str]) -> Iterator[Finding]:
 
 def _addresses(process: Process) -> dict[str, str]:
     """Return what the process's parameters and arguments say about where its device is."""
-    words = [
+    arguments = [
         match.groups() for argument in process.argv if (match := _ARGUMENT.fullmatch(argument))
     ]
-    given = [*words, *((process.ros_nodes[0].flat_params if process.ros_nodes else {}).items())]
-    named = ((key.rpartition(".")[2], str(value)) for key, value in given)
+    settings = [
+        *arguments,
+        *((process.ros_nodes[0].flat_params if process.ros_nodes else {}).items()),
+    ]
+    named = ((key.rpartition(".")[2], str(value)) for key, value in settings)
     return {key: value for key, value in named if value and _ADDRESSES.fullmatch(key)}
 
 

@@ -70,26 +70,26 @@ def _of_static_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
 
 def _own_arguments(process: Process) -> list[str]:
     """Return the program's own arguments, without ROS's."""
-    words = list(process.argv if process.executable is not None else process.argv[1:])
-    return words[: words.index("--ros-args")] if "--ros-args" in words else words
+    argv = list(process.argv if process.executable is not None else process.argv[1:])
+    return argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
 
 
-def _frames_of(words: list[str]) -> tuple[str, str] | None:
+def _frames_of(argv: list[str]) -> tuple[str, str] | None:
     """Return parent and child from a static_transform_publisher's command line.
 
     In its old form or the new.
     """
-    if "--frame-id" in words or any(word.startswith("--frame-id=") for word in words):
-        parent, child = _option(words, "--frame-id"), _option(words, "--child-frame-id")
+    if "--frame-id" in argv or any(argument.startswith("--frame-id=") for argument in argv):
+        parent, child = _option(argv, "--frame-id"), _option(argv, "--child-frame-id")
         return (_plain(parent), _plain(child)) if parent and child else None
-    if len(words) in {_WITH_ANGLES, _WITH_QUATERNION}:
-        return _plain(words[-2]), _plain(words[-1])
+    if len(argv) in {_WITH_ANGLES, _WITH_QUATERNION}:
+        return _plain(argv[-2]), _plain(argv[-1])
     return None
 
 
-def _option(words: list[str], name: str) -> str:
-    following = dict(itertools.pairwise(words))
-    joined = (word.partition("=")[2] for word in words if word.startswith(f"{name}="))
+def _option(argv: list[str], name: str) -> str:
+    following = dict(itertools.pairwise(argv))
+    joined = (argument.partition("=")[2] for argument in argv if argument.startswith(f"{name}="))
     return following.get(name) or next(joined, "")
 
 
@@ -128,9 +128,15 @@ def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
 
 def _params_on_the_command_line(process: Process) -> dict[str, str]:
     """Return what ``-p NAME:=VALUE`` among ROS's arguments sets, each value as it is written."""
-    words = itertools.dropwhile(lambda word: word != "--ros-args", process.argv)
-    given = [value for option, value in itertools.pairwise(words) if option in {"-p", "--param"}]
-    return {name: value for name, sign, value in (one.partition(":=") for one in given) if sign}
+    argv = itertools.dropwhile(lambda argument: argument != "--ros-args", process.argv)
+    assignments = [
+        value for option, value in itertools.pairwise(argv) if option in {"-p", "--param"}
+    ]
+    return {
+        name: value
+        for name, sign, value in (assignment.partition(":=") for assignment in assignments)
+        if sign
+    }
 
 
 def _publishes_too(process: Process, what: str, edge: Edge, *, sure: bool = True) -> Finding:

@@ -93,7 +93,7 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
             if robot.is_foreign(at)
             else f"declare it: {section}: {{{name}: {{}}}}"
         )
-        return did_you_mean(name, [one for one in near if one != child], declare)
+        return did_you_mean(name, [candidate for candidate in near if candidate != child], declare)
 
     for edge in robot.edges:
         for parent in (edge.parent, *edge.switched) if edge.given else ():

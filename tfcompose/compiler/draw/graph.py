@@ -88,7 +88,7 @@ def collapsed(graph: Graph) -> Graph:
             frame = up[frame].parent
     gone = inside.keys() - needed
     beneath = {
-        frame: sum(one in gone for one in inside[frame].frames)
+        frame: sum(inner in gone for inner in inside[frame].frames)
         for frame in first
         if len(inside[frame].frames) > 1
     }

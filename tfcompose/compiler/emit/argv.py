@@ -29,9 +29,9 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
         return ()
     if process.kind != "run":
         arguments = [
-            word
+            argument
             for name, value in _own_params(process)
-            for word in ("-p", f"{name}:={json.dumps(value)}")
+            for argument in ("-p", f"{name}:={json.dumps(value)}")
         ]
         own = (PROGRAM, process.kind, "${plan}", process.name)
         return (*own, "--ros-args", *arguments) if arguments else own
@@ -75,7 +75,9 @@ def _is_node(process: Process, *, owns: bool) -> bool:
 
 def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[str]:
     """Return the ROS arguments but for names; a parameter file is named once."""
-    ros_args = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
+    ros_args = [
+        argument for old, new in process.remap.items() for argument in ("-r", f"{old}:={new}")
+    ]
     if process.log_level is not None:
         ros_args += ["--log-level", process.log_level]
     # A value behind -p counts as one for /**: of two for the same nodes the later one holds.

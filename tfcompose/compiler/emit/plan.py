@@ -174,7 +174,7 @@ def _at(target: Target, process: PlanProcess) -> PlanProcess:
     component = process.component
     if component:
         component = replace(
-            component, params={name: placed_in(one) for name, one in component.params.items()}
+            component, params={name: placed_in(value) for name, value in component.params.items()}
         )
     cwd = process.cwd and placed(process.cwd)
     return replace(

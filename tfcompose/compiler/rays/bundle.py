@@ -51,10 +51,10 @@ class Bundle:
         """Yield the rays of the smallest bundles whose cones meet the sphere around the point."""
         waiting = [self]
         while waiting:
-            one = waiting.pop()
-            if one.may_meet(x, y, z, radius):
-                yield from one.rays
-                waiting += one.parts
+            node = waiting.pop()
+            if node.may_meet(x, y, z, radius):
+                yield from node.rays
+                waiting += node.parts
 
 
 @lru_cache(maxsize=32)

@@ -147,7 +147,9 @@ def _read_hits(
         far = meshes.distances(path, (x, y, z), to_shape.xyz, turned) if depth < 0 else []
     except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
         return None, []
-    return depth, [(index, one) for index, one in enumerate(far) if math.isfinite(one)]
+    return depth, [
+        (index, distance) for index, distance in enumerate(far) if math.isfinite(distance)
+    ]
 
 
 def _hits(

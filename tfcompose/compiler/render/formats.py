@@ -175,9 +175,9 @@ def render_junit(
         fatal = [finding for finding in found if finding.severity in failing]
         failed += bool(fatal)
         body = "".join(
-            f'    <failure type="{one.code}"'
-            f' message="{_xml(one.message)}">{_xml(_details(one))}</failure>\n'
-            for one in fatal[:1]
+            f'    <failure type="{finding.code}"'
+            f' message="{_xml(finding.message)}">{_xml(_details(finding))}</failure>\n'
+            for finding in fatal[:1]
         )
         others = [*fatal[1:], *(finding for finding in found if finding not in fatal)]
         if others:

@@ -72,9 +72,9 @@ def _hardware(name: str, declared: HardwareSpec, spec: RobotSpec) -> Hardware:
     at: Path = ("ros2_control", name)
     kinds = (("joint", declared.joints), ("sensor", declared.sensors), ("gpio", declared.gpios))
     components = tuple(
-        _component(kind, inner, one, spec.at_key((*at, f"{kind}s", inner)))
-        for kind, several in kinds
-        for inner, one in several.items()
+        _component(kind, inner, component, spec.at_key((*at, f"{kind}s", inner)))
+        for kind, components in kinds
+        for inner, component in components.items()
     )
     return Hardware(
         name,
@@ -90,7 +90,8 @@ def _hardware(name: str, declared: HardwareSpec, spec: RobotSpec) -> Hardware:
 
 def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> HardwareComponent:
     command, state = (
-        [Interface(i, params) for i, params in one.items()] for one in (spec.command, spec.state)
+        [Interface(i, params) for i, params in interfaces.items()]
+        for interfaces in (spec.command, spec.state)
     )
     return HardwareComponent(
         kind, name, at, command=tuple(command), state=tuple(state), params=spec.params

@@ -109,16 +109,16 @@ class Bodies:
                 made.append(self.shape(shape, in_list if self.spec.spans.has(in_list) else at))
         return tuple(made)
 
-    def _material(self, given: specs.MaterialSpec, at: Path) -> Material:
+    def _material(self, declared: specs.MaterialSpec, at: Path) -> Material:
         """Return the colour with its name.
 
         One without is named after its parts, so that URDF keeps them apart.
         """
         texture = None
-        if given.texture is not None:
-            texture, wrong = self.packages.asset(given.texture, self.spec.at((*at, "texture")))
+        if declared.texture is not None:
+            texture, wrong = self.packages.asset(declared.texture, self.spec.at((*at, "texture")))
             self.found += [wrong] if wrong else []
-        name, rgba = given.name, given.rgba
+        name, rgba = declared.name, declared.rgba
         if name is None:
             rgba = rgba if rgba or texture else (0.5, 0.5, 0.5, 1.0)
             name = colour_name(rgba or ())
@@ -127,31 +127,31 @@ class Bodies:
 
     def _inertial(
         self,
-        given: specs.InertialSpec,
+        declared: specs.InertialSpec,
         visuals: tuple[Shape, ...],
         collisions: tuple[Shape, ...],
         at: Path,
     ) -> Inertial | None:
         shapes, place = collisions or visuals, self.spec.at_key(at[:2])
-        pose = Pose(given.xyz or (0.0, 0.0, 0.0), rotation_of(given) or Pose().quat_xyzw)
-        if given.inertia and given.mass:
-            i = given.inertia
+        pose = Pose(declared.xyz or (0.0, 0.0, 0.0), rotation_of(declared) or Pose().quat_xyzw)
+        if declared.inertia and declared.mass:
+            i = declared.inertia
             tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
             return Inertial(
-                given.mass, pose, tensor, traces(given.mass, visuals, collisions), place
+                declared.mass, pose, tensor, traces(declared.mass, visuals, collisions), place
             )
         moments = self.moments(shapes, self.spec.at_key(at)) if shapes else None
         if moments is None:
             return None
-        density = given.density or (given.mass or 0.0) / moments.volume
-        if given.inertia:
-            i = given.inertia
+        density = declared.density or (declared.mass or 0.0) / moments.volume
+        if declared.inertia:
+            i = declared.inertia
             tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
             return Inertial(
                 density * moments.volume, pose, tensor, (density * trace(moments.tensor),), place
             )
-        computed = inertial(moments, density, given.mass)
-        return replace(computed, pose=Pose(given.xyz)) if given.xyz else computed
+        computed = inertial(moments, density, declared.mass)
+        return replace(computed, pose=Pose(declared.xyz)) if declared.xyz else computed
 
     def moments(self, shapes: tuple[Shape, ...], at: Span) -> Moments | None:
         """Return the moments of the shapes at density 1 in the link's axes, None if unknown.
@@ -208,13 +208,17 @@ def with_colours(links: dict[str, Link]) -> dict[str, Link]:
 
 
 def _coloured(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
-    def shape(one: Shape) -> Shape:
+    def shape(visual: Shape) -> Shape:
         is_bare = (
-            one.material
-            and one.material.name in bare
-            and not (one.material.rgba or one.material.texture)
+            visual.material
+            and visual.material.name in bare
+            and not (visual.material.rgba or visual.material.texture)
         )
-        return replace(one, material=known[one.material.name]) if one.material and is_bare else one
+        return (
+            replace(visual, material=known[visual.material.name])
+            if visual.material and is_bare
+            else visual
+        )
 
     return replace(
         link,

@@ -111,7 +111,7 @@ def _matches(
         for entry in entries
         if entry.child in parents and entry.parent in children
     ]
-    return list({(one.names, one.entry.pose): one for one in straight or turned}.values())
+    return list({(match.names, match.entry.pose): match for match in straight or turned}.values())
 
 
 @dataclass(slots=True)

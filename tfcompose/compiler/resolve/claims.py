@@ -306,7 +306,8 @@ class _Claims:
         guard = self.robot.guard
         owns = any(edge.owner == claimant.process.name for edge in self.robot.edges)
         allowed = any(
-            fnmatchcase(one.child, child) or fnmatchcase(child, one.child) for one in guard.allow
+            fnmatchcase(pattern.child, child) or fnmatchcase(child, pattern.child)
+            for pattern in guard.allow
         )
         if owns or allowed or guard.unknown_edges == "ignore" or not claimant.is_published(claim):
             return
@@ -425,10 +426,10 @@ class Roles:
     def _bind(self, edge: Edge, claims: tuple[ClaimSpec, ...]) -> None:
         """Give an owned edge's ends the roles of the claim that fits it best."""
         fitting = [(self._fit(edge, claim), -index, claim) for index, claim in enumerate(claims)]
-        fitting = [one for one in fitting if one[0] >= 0]
+        fitting = [fit for fit in fitting if fit[0] >= 0]
         if not fitting:
             return
-        claim = max(fitting, key=lambda one: one[:2])[2]
+        claim = max(fitting, key=lambda fit: fit[:2])[2]
         for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
             hole = _HOLE.fullmatch(template)
             if hole:
@@ -463,9 +464,9 @@ class Roles:
                 for edge in robot.edges
                 if edge.parent == odom and edge.kind == "dynamic"
             )
-            taken = {self._bound.get("map"), odom, self.frames.get("map")}
+            used_frames = {self._bound.get("map"), odom, self.frames.get("map")}
             base = usual if usual in robot.frames else robot.base
-            return next(below, None) or (base if base not in taken else None)
+            return next(below, None) or (base if base not in used_frames else None)
         if role == "odom" and usual not in robot.frames:
             above = self._bound.get("map")
             return next(

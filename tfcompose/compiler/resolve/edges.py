@@ -217,10 +217,10 @@ def _of(entry: Spec, path: Path, spans: Spans) -> Iterator[SourceNumbers]:
         if key in _LISTS and value is not None:
             yield _numbers(dict(enumerate(value)), here, spans)
         elif key in _MAPPINGS and isinstance(value, (Spec, Limit)):
-            given = {
+            steps = {
                 step: getattr(value, step) for step in _MAPPINGS[key] if spans.has((*here, step))
             }
-            numbers = {step: number for step, number in given.items() if number is not None}
+            numbers = {step: number for step, number in steps.items() if number is not None}
             if numbers:
                 yield _numbers(numbers, here, spans)
         elif isinstance(value, Spec):

@@ -193,7 +193,7 @@ def _loose(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
         part.declared = part.declared.model_copy(
             update={"joint": f"{part.prefix}{edge.joint_name}"}
         )
-    return replace(robot, edges=tuple(one for one in robot.edges if one is not edge))
+    return replace(robot, edges=tuple(other for other in robot.edges if other is not edge))
 
 
 def _use(
@@ -205,24 +205,24 @@ def _use(
         return Use(part.spec.at((*at, "xacro")))
     places = (part.spec.at((*at, "include", index)) for index in range(len(spec.include)))
     files = (
-        *(packages.path_of(one, place) for one, place in zip(spec.include, places, strict=True)),
+        *(packages.path_of(file, place) for file, place in zip(spec.include, places, strict=True)),
         file,
     )
-    words: dict[str, str] = {name: value for name, value in bolted.items() if name != _ORIGIN}
+    parameters: dict[str, str] = {name: value for name, value in bolted.items() if name != _ORIGIN}
     blocks = [bolted[_ORIGIN]] if _ORIGIN in bolted else []
     for name, value in spec.params.items():
         if _is_markup(value):
             _refuse_broken(name, value, part.spec.at((*at, "params", name)))
         block = _block(value)
         if block is None:
-            words[name] = _word(_with_files(value, (*at, "params", name), part, disk))
+            parameters[name] = _word(_with_files(value, (*at, "params", name), part, disk))
         else:
             blocks.append(block)
     named = {name: part.spec.at_key((*at, "params", name)) for name in spec.params}
     return Use(
         part.spec.at((*at, "macro")),
         spec.macro,
-        words,
+        parameters,
         blocks=tuple(blocks),
         files=files,
         places=named,

@@ -85,9 +85,9 @@ def _merged(
     base: OpticsSpec | None, own: OpticsSpec | None, where: str
 ) -> tuple[dict[str, Any], Iterable[OpticsSource]]:
     """Return the values of the keys that anybody gives, and where they are from."""
-    values, given = _values(base), _values(own)
-    replaced = {*given, *(other for key in given for other in _REPLACES.get(key, ()))}
-    values = {key: value for key, value in values.items() if key not in replaced} | given
+    values, declared = _values(base), _values(own)
+    replaced = {*declared, *(other for key in declared for other in _REPLACES.get(key, ()))}
+    values = {key: value for key, value in values.items() if key not in replaced} | declared
     elevations = values.get("elevations")
     if elevations:
         values.setdefault("channels", len(elevations))
@@ -99,7 +99,7 @@ def _merged(
             if keys:
                 sources.append(OpticsSource(keys, source.where, source.quality))
     sourced = {key for source in _sources(own) for key in source.of}
-    unsourced = tuple(key for key in given if key not in sourced)
+    unsourced = tuple(key for key in declared if key not in sourced)
     if unsourced:
         sources.append(OpticsSource(unsourced, where, "robot file"))
     return values, sources

@@ -73,24 +73,24 @@ class _ParamFiles:
         without = []
         for path, place, content in files:
             _add_sections(sections, content)
-            for_node = any(matches(one.name, node.name) for one in content.nodes)
+            for_node = any(matches(section.name, node.name) for section in content.nodes)
             if not for_node and not content.found and not process.loads:
                 without.append(_nothing(path, place, node, process, content.nodes))
         if len(without) == len(files):
             # A file that all nodes are given need not have something for each.
             self.found += without
-        given: dict[str, Any] = {}
+        params_here: dict[str, Any] = {}
         for name, params in sections.items():
             if matches(name, node.name):
-                given = _laid_over(given, params)
+                params_here = _laid_over(params_here, params)
             others[name] = _laid_over(others.get(name, {}), _words(params))
         places |= {
             key: (named[value.at.file], value.at)
-            for key, value in given.items()
+            for key, value in params_here.items()
             if isinstance(value, Word)
         }
         inline = self._inline(node, places)
-        return replace(node, params=_laid_over(_words(given), inline), places=places)
+        return replace(node, params=_laid_over(_words(params_here), inline), places=places)
 
     def _inline(self, node: Node, places: dict[str, tuple[Span, ...]]) -> dict[str, Any]:
         """Return the parameters of the robot file itself; ``places`` takes where they are."""
@@ -123,7 +123,7 @@ class _ParamFiles:
         paths = (
             [(named, at)]
             if isinstance(named, str)
-            else [(one, (*at, i)) for i, one in enumerate(named)]
+            else [(file, (*at, i)) for i, file in enumerate(named)]
         )
         return [(file, self.draft.spec.at(path)) for file, path in paths]
 
@@ -168,10 +168,10 @@ def _add_sections(sections: dict[str, dict[str, Any]], content: ParamsFile) -> N
 def _nothing(
     path: str, at: Span, node: Node, process: Process, there: Sequence[NodeParams]
 ) -> Finding:
-    names = [one.name for one in there]
+    names = [section.name for section in there]
     near = nearest(node.name.rpartition("/")[2], [name.rpartition("/")[2] for name in names])
-    meant = next((one for one in there if near and one.name.endswith(near)), None)
-    notes = [Note(f"it has {meant.name}", meant.at)] if meant else []
+    likely = next((section for section in there if near and section.name.endswith(near)), None)
+    notes = [Note(f"it has {likely.name}", likely.at)] if likely else []
     advice = (
         f"call it {node.name} there (/** means any node), or give the process that node: it has"
         f" {', '.join(names) or 'no node'}"

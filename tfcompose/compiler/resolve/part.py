@@ -207,7 +207,9 @@ def subtree(robot: Robot, root: str) -> Robot:
         ),
         sensors=sensors,
         base=root,
-        hardware=tuple(filter(None, (with_joints(one, joints) for one in robot.hardware))),
+        hardware=tuple(
+            filter(None, (with_joints(hardware, joints) for hardware in robot.hardware))
+        ),
         blocks=tuple(
             filter(None, (within(block, robot, frames, joints) for block in robot.blocks))
         ),

@@ -86,9 +86,9 @@ def _validated(part: PartEntry, named: str, draft: Draft, read: Reader) -> Valid
         raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", at)])
     loaded = with_includes(load_named(read(file), file), read)
     draft.collected.notes.setdefault(file, []).append(_note(part))
-    given = Given(part.given_args(), draft.validated.given.environment)
-    source = composed(loaded, part.declared.profiles, given=given)
-    validated = validate(part.laid_over(source), None, given)
+    inputs = Given(part.given_args(), draft.validated.given.environment)
+    source = composed(loaded, part.declared.profiles, given=inputs)
+    validated = validate(part.laid_over(source), None, inputs)
     part.found += _useless(part, file, validated)
     draft.collected.allows += validated.source.allows
     draft.collected.sources.append(validated.source)
@@ -175,12 +175,12 @@ def _note(part: PartEntry) -> Note:
 
 def _useless(part: PartEntry, file: str, validated: Validated) -> Iterator[Finding]:
     """Yield a finding for each variable given to the part that it neither has nor uses."""
-    given, replaced = part.declared.vars, validated.spec.spans.replaced
+    variables, replaced = part.declared.vars, validated.spec.spans.replaced
     known = [
-        name for name in validated.spec.vars if name not in given or ("vars", name) in replaced
+        name for name in validated.spec.vars if name not in variables or ("vars", name) in replaced
     ]
     for section, name in validated.unused:
-        if section == "vars" and name in given and name not in known:
+        if section == "vars" and name in variables and name not in known:
             at = part.spec.at_key((*part.at, "vars", name))
             advice = did_you_mean(name, known, "remove it")
             message = f"{file} does not use the variable {name}"

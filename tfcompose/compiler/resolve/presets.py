@@ -80,8 +80,8 @@ class Sensor:
 
 def filled(pattern: str, name: str, words: dict[str, str]) -> str:
     """Return the pattern with the sensor's name and the preset's words in it."""
-    for word, means in words.items():
-        pattern = pattern.replace(f"{{{word}}}", means)
+    for hole, means in words.items():
+        pattern = pattern.replace(f"{{{hole}}}", means)
     return pattern.replace("{name}", name)
 
 
@@ -145,7 +145,11 @@ def _no_preset(name: str, library: Library, span: Span) -> Finding:
         if same
         else f"tfcompose presets lists them; {_OWN}"
     )
-    models = [one for one in names if one.rpartition("/")[2] == name.rpartition("/")[2].lower()]
+    models = [
+        candidate
+        for candidate in names
+        if candidate.rpartition("/")[2] == name.rpartition("/")[2].lower()
+    ]
     advice = (
         f"did you mean {' or '.join(models)}?"
         if models and not same
@@ -308,14 +312,14 @@ class Library:
             KeyError: if there is none of that name.
             RejectedError: if the preset itself is wrong.
         """
-        taken = tuple(sorted((choices or {}).items()))
-        if (name, taken) not in self._specs:
+        options = tuple(sorted((choices or {}).items()))
+        if (name, options) not in self._specs:
             source = self.source(name)
-            for option, value in taken:
+            for option, value in options:
                 variant = source.part(("options", option, "variants", value))
                 source = lay_over(source, variant, is_overlay=False, of=PresetSpec)
-            self._specs[name, taken] = validate_preset(source)
-        return self._specs[name, taken]
+            self._specs[name, options] = validate_preset(source)
+        return self._specs[name, options]
 
     def _extended(self, own: Source, name: str, deep: int) -> Source:
         base = extended_by(own)

@@ -272,7 +272,7 @@ def _of_ros2(argv: tuple[str, ...]) -> dict[str, Any] | None:
         case ("ros2", "run", package, executable, *words) if not package.startswith("-"):
             return {"package": package, "executable": executable, "argv": tuple(words)}
         case ("ros2", "launch", package, file, *words) if not package.startswith("-") and all(
-            ":=" in word for word in (*words,)
+            ":=" in argument for argument in (*words,)
         ):
             return (
                 {"launch": f"{package}/{file}", "argv": tuple(words)} if ":=" not in file else None

@@ -228,7 +228,9 @@ def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
 
     return replace(
         policy,
-        allow=tuple(EdgePattern(final(one.parent), final(one.child)) for one in policy.allow),
+        allow=tuple(
+            EdgePattern(final(pattern.parent), final(pattern.child)) for pattern in policy.allow
+        ),
     )
 
 

@@ -36,7 +36,7 @@ def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
         place = spec.at(("rules", name, "limit"))
         known = CATALOGUE[code].limit
         if known is None:
-            others = ", ".join(one.code for one in CATALOGUE.values() if one.limit)
+            others = ", ".join(code.code for code in CATALOGUE.values() if code.limit)
             message = f"{code} {CATALOGUE[code].name} has no limit"
             yield finding("TF107", message, place, help=f"these have one: {others}")
             continue
@@ -55,11 +55,11 @@ def zones_of(spec: RobotSpec) -> tuple[Zone, ...]:
         Zone(
             name,
             spec.at_key(("coverage", name)),
-            one.frame,
-            center=one.center,
-            size=one.box,
-            by=one.by,
-            least=one.least,
+            zone.frame,
+            center=zone.center,
+            size=zone.box,
+            by=zone.by,
+            least=zone.least,
         )
-        for name, one in spec.coverage.items()
+        for name, zone in spec.coverage.items()
     )

@@ -362,23 +362,33 @@ def further_processes(sensor: Sensor, spec: RobotSpec) -> Iterator[Process]:
         else {}
     )
     fill = _SensorFiller(sensor, settings_of(spec.ros).frame_prefix)
-    for suffix, one in driver.also.items():
-        if not sensor.holds(one.when):
+    for suffix, further in driver.also.items():
+        if not sensor.holds(further.when):
             continue
-        namespace = full_name(above, sensor.named(one.namespace)).strip("/")
+        namespace = full_name(above, sensor.named(further.namespace)).strip("/")
         name, place = f"{sensor.name}_{suffix}", spec.at_key(at)
-        full = full_name(f"/{namespace}", sensor.named(one.node))
+        full = full_name(f"/{namespace}", sensor.named(further.node))
         node = Node(
-            full, place, (*at, "driver", "also", suffix), fill.table(one.params), one.lifecycle
+            full,
+            place,
+            (*at, "driver", "also", suffix),
+            fill.table(further.params),
+            further.lifecycle,
         )
         process = Process(
-            name, "run", at=place, ros_nodes=(node,), argv=tuple(arguments(fill.table(one.args)))
+            name,
+            "run",
+            at=place,
+            ros_nodes=(node,),
+            argv=tuple(arguments(fill.table(further.args))),
         )
         process = replace(process, **inherited)
-        if one.launch:
-            yield replace(process, launch=f"{one.package}/{one.launch}", namespace=namespace)
+        if further.launch:
+            yield replace(
+                process, launch=f"{further.package}/{further.launch}", namespace=namespace
+            )
         else:
-            yield replace(process, package=one.package, executable=one.executable)
+            yield replace(process, package=further.package, executable=further.executable)
 
 
 def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
@@ -489,7 +499,9 @@ def _unreached(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
     }
     own = (stamped | ({*sensor.driven()} if sensor.tf == DRIVER else set())) - named
     at: Path = ("sensors", sensor.name)
-    for name in sorted(own & {frame for frame, one in declared.frames.items() if one.name}):
+    for name in sorted(
+        own & {frame for frame, described in declared.frames.items() if described.name}
+    ):
         wanted = declared.frames[name].name
         message = (
             f"the driver of {declared.preset} makes the name {name} itself, and cannot call it"

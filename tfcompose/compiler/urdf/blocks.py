@@ -150,8 +150,8 @@ def unknown_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
 
 def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
     """Yield a finding for each hardware joint that is no moving joint of the robot."""
-    for one in hardware:
-        for component in one.components:
+    for system in hardware:
+        for component in system.components:
             if component.kind == "joint" and component.name not in joints:
                 yield unknown_joint(component.name, component.at, joints)
 
@@ -190,7 +190,7 @@ def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
     had_joints = any(component.kind == "joint" for component in hardware.components)
     return (
         replace(hardware, components=left)
-        if not had_joints or any(one.kind == "joint" for one in left)
+        if not had_joints or any(component.kind == "joint" for component in left)
         else None
     )
 
@@ -213,12 +213,12 @@ def with_hardware(robot: Robot) -> Robot:
     hardware: dict[str, Hardware] = {}
     blocks = []
     for block in robot.blocks:
-        one = None
+        described = None
         if block.text.startswith("<ros2_control"):
             (element,) = read_block(block.text, robot.file, with_text=True).children
-            one = _hardware_of(element, block)
-        if one and one.name and one.name not in hardware:
-            hardware[one.name] = one
+            described = _hardware_of(element, block)
+        if described and described.name and described.name not in hardware:
+            hardware[described.name] = described
         else:
             blocks.append(block)
     return (
@@ -268,7 +268,9 @@ def _hardware(element: Element, block: Block) -> Hardware:
 
 def _component(element: Element) -> HardwareComponent:
     attributes = _only(element, "name", tags=("param", *_INTERFACES))
-    command, state = (tuple(_interface(one) for one in element.all(tag)) for tag in _INTERFACES)
+    command, state = (
+        tuple(_interface(child) for child in element.all(tag)) for tag in _INTERFACES
+    )
     for interfaces in (command, state):
         if len({interface.name for interface in interfaces}) != len(interfaces):
             raise _UnsupportedError
@@ -295,11 +297,11 @@ def _interface(element: Element) -> Interface:
 
 def _params(element: Element) -> dict[str, str]:
     params: dict[str, str] = {}
-    for one in element.all("param"):
-        name = _only(one, "name").get("name")
+    for param in element.all("param"):
+        name = _only(param, "name").get("name")
         if name is None or name in params:
             raise _UnsupportedError
-        params[name] = one.text.strip()
+        params[name] = param.text.strip()
     return params
 
 

@@ -118,7 +118,9 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
     joints = root.all("joint")
     _by_name(joints, values)
     _by_name(
-        [one for one in root.all("material") if one.attributes.get("name")], values, "warning"
+        [element for element in root.all("material") if element.attributes.get("name")],
+        values,
+        "warning",
     )
     edges = [edge for element in joints if (edge := _edge(element, values))]
     frames = {link: element.at_value("name") for link, element in links.items()}
@@ -141,7 +143,7 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
         foreign=frozenset({file, *included}),
         source_numbers=tuple(_source_numbers(root)),
     )
-    of_blocks = tuple(replace(one, severity="warning") for one in unknown)
+    of_blocks = tuple(replace(finding, severity="warning") for finding in unknown)
     return Converted(robot, (*values.found, *unknown_words(root)), of_blocks, tuple(bodies.found))
 
 
@@ -150,13 +152,13 @@ def _source_numbers(root: Element) -> Iterator[SourceNumbers]:
     for joint in root.all("joint"):
         path = ("joints", joint.attributes.get("name", ""))
         yield from _numbers_of(joint.first("origin"), path, ("xyz", "rpy"))
-        for one in _numbers_of(joint.first("limit"), path, ("lower", "upper")):
-            yield replace(one, path=(*path, "limit"))
+        for number in _numbers_of(joint.first("limit"), path, ("lower", "upper")):
+            yield replace(number, path=(*path, "limit"))
     for link in root.all("link"):
         for body in link.children:
             path = ("links", link.attributes.get("name", ""))
-            for one in _numbers_of(body.first("origin"), path, ("xyz", "rpy")):
-                yield replace(one, path=(*path, body.tag, one.key))
+            for number in _numbers_of(body.first("origin"), path, ("xyz", "rpy")):
+                yield replace(number, path=(*path, body.tag, number.key))
 
 
 def _numbers_of(
@@ -166,9 +168,9 @@ def _numbers_of(
     if element is None:
         return
     for name in names:
-        words = element.attributes.get(name, "").split()
+        tokens = element.attributes.get(name, "").split()
         try:
-            numbers = tuple(map(float, words))
+            numbers = tuple(map(float, tokens))
         except ValueError:
             continue
         if numbers and all(abs(number) <= HUGE for number in numbers):
@@ -322,8 +324,10 @@ def _numbers(
     if element is None:
         return None
     read = values.bound if cls in _BOUNDS else values.number
-    given = {name: read(element, name) for name in cls.__slots__}
-    return cls(**defaults | {name: value for name, value in given.items() if value is not None})
+    values_read = {name: read(element, name) for name in cls.__slots__}
+    return cls(
+        **defaults | {name: value for name, value in values_read.items() if value is not None}
+    )
 
 
 @dataclass
@@ -339,16 +343,16 @@ class _Bodies:
     _undescribed: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        visuals = [one for link in self.root.all("link") for one in link.all("visual")]
+        visuals = [element for link in self.root.all("link") for element in link.all("visual")]
         for around in (self.root, *visuals):
             for material in around.all("material"):
                 self._elements.setdefault(material.attributes.get("name", ""), []).append(material)
 
     def link(self, name: str, element: Element) -> Link:
         """Return the body."""
-        visuals = tuple(shape for one in element.all("visual") for shape in self._shapes(one))
+        visuals = tuple(shape for child in element.all("visual") for shape in self._shapes(child))
         collisions = tuple(
-            shape for one in element.all("collision") for shape in self._shapes(one)
+            shape for child in element.all("collision") for shape in self._shapes(child)
         )
         inertial = element.first("inertial")
         body = (
@@ -437,8 +441,10 @@ class _Bodies:
 
     def _named(self, name: str) -> Material | None:
         if name not in self._materials:
-            described = (self._described(name, one) for one in self._elements.get(name, ()))
-            self._materials[name] = next((one for one in described if one), None)
+            described = (
+                self._described(name, element) for element in self._elements.get(name, ())
+            )
+            self._materials[name] = next((material for material in described if material), None)
         return self._materials[name]
 
     def _described(self, name: str, material: Element) -> Material | None:

@@ -109,13 +109,13 @@ def expand(
             a robot file names it, if one does.
     """
     sandbox = sandbox or Sandbox()
-    given = {name: str(value) for name, value in arguments.items()}
+    values = {name: str(value) for name, value in arguments.items()}
     files = _XacroFiles(file, packages, sandbox.reach, use)
     trusted = sandbox.reach.everything
     wall_s = confined.MOST_TRUSTED_WALL_S if trusted else confined.MOST_WALL_S
     request = {
         "file": file,
-        "arguments": given,
+        "arguments": values,
         "call": _document(use) if use and use.macro else None,
         "is_trusted": trusted,
         "is_strict": sandbox.is_strict,
@@ -148,7 +148,7 @@ def expand(
         raise RejectedError([_where_used(outside, use)])
     if not all(map(files.has_served, answer["files"])):
         raise RejectedError([_where_used(_ended(outcome, "", files), use)])
-    _refuse_unknown(given, files.served, file, use)
+    _refuse_unknown(values, files.served, file, use)
     names = tuple(_shown(name, file) for name in answer["files"])
     places = tuple(place and tuple(place) for place in answer["places"])
     return Expansion(answer["text"], names, places, tuple(map(tuple, answer["comments"])))
@@ -230,17 +230,17 @@ class _XacroFiles:
 
 
 def _document(use: Use) -> str:
-    words = "".join(f" {name}={quoteattr(value)}" for name, value in use.words.items())
+    attributes = "".join(f" {name}={quoteattr(value)}" for name, value in use.words.items())
     includes = "".join(
         f"<xacro:include filename={quoteattr(os.path.normpath(Path(file).absolute()))}/>"
         for file in use.files
     )
-    macro = f"<xacro:{use.macro}{words}>{''.join(use.blocks)}</xacro:{use.macro}>"
+    macro = f"<xacro:{use.macro}{attributes}>{''.join(use.blocks)}</xacro:{use.macro}>"
     return f'<robot name="part" {NAMESPACE}>{includes}{macro}</robot>'
 
 
 def _refuse_unknown(
-    given: Mapping[str, str], files: Collection[str], file: str, use: Use | None
+    names: Mapping[str, str], files: Collection[str], file: str, use: Use | None
 ) -> None:
     """Refuse arguments that none of the files declares or asks for; xacro itself ignores them."""
     texts = [Path(name).read_text("utf-8", "replace") for name in files]
@@ -251,7 +251,7 @@ def _refuse_unknown(
         for name in found.groups()
         if name
     )
-    wrong = [name for name in given if name not in known]
+    wrong = [name for name in names if name not in known]
     if wrong:
         raise RejectedError([_where_used(_no_argument(name, known, file), use) for name in wrong])
 
@@ -278,7 +278,7 @@ def _where_used(found: Finding, use: Use | None) -> Finding:
 
 def _in_call(found: Finding, file: str, use: Use) -> Finding:
     """Return what xacro says about a macro call, at its parameter, with what it takes."""
-    named = [word for word in _WORD.findall(found.message) if word in use.places]
+    named = [name for name in _WORD.findall(found.message) if name in use.places]
     macros, at = macros_in(Path(file).read_text("utf-8", "replace")), use.at
     if use.macro in macros:
         takes = macros[use.macro]
@@ -384,7 +384,7 @@ def _placed(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Findi
         ]
         busy = _mark(*stop.at) if stop.at else found.span
         at = next(
-            (word for file, line in begins for word in _named_at(found.message, file, line)), busy
+            (name for file, line in begins for name in _named_at(found.message, file, line)), busy
         )
     return replace(found, span=at, notes=(*found.notes, *notes))
 
@@ -411,8 +411,8 @@ def _ended(outcome: Outcome, noted: str, files: _XacroFiles) -> Finding:
         message = by_signal if code < 0 else f"xacro gave up with code {code}"
     full = f"{message}: {noted}" if noted else message
     found = finding("TF008", full, Span(file), help=_ALONE.format(file=file))
-    words = _pattern_of(noted)
-    return _at_words(found, words, [(file, 0)]) if words and files.has_served(file) else found
+    pattern = _pattern_of(noted)
+    return _at_words(found, pattern, [(file, 0)]) if pattern and files.has_served(file) else found
 
 
 def _signal_name(number: int) -> str:

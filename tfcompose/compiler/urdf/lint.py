@@ -64,7 +64,7 @@ class Document:
         robot = replace(with_hardware(self.robot), base=roots[0] if len(roots) == 1 else None)
         found = dict.fromkeys([*self.converted.found, *check(robot, _RULES)])
         kept, used = apply(found, self.allows)
-        return sorted([*kept, *unused_allows(self.allows, used)], key=lambda one: one.sort_key)
+        return sorted([*kept, *unused_allows(self.allows, used)], key=lambda entry: entry.sort_key)
 
 
 def read_urdf(

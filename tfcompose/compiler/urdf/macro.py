@@ -137,13 +137,13 @@ def caller(robot: Robot) -> str:
     arguments = "\n".join(
         f'  <xacro:arg name="{name}" default="{default}"/>' for name, default in defaults.items()
     )
-    given = " ".join(f'{name}="$(arg {name})"' for name in defaults)
+    attributes = " ".join(f'{name}="$(arg {name})"' for name in defaults)
     return f"""<?xml version="1.0"?>
 <!-- The robot alone: xacro robot.urdf.xacro prefix:=left_
      Within another xacro, include {MACRO}, which says how. -->
 <robot name={quoted(robot.name)} {NAMESPACE}>
 {arguments}
   <xacro:include filename="{MACRO}"/>
-  <xacro:{macro_name(robot.name)} {given}/>
+  <xacro:{macro_name(robot.name)} {attributes}/>
 </robot>
 """

@@ -144,11 +144,11 @@ class Packages:
         includes it. Other schemes (``http``, ``model``) are for others to resolve.
         """
         document = document or at.file
-        meant = _MEANT.fullmatch(uri)
-        if meant or not uri:
+        url = _MEANT.fullmatch(uri)
+        if url or not uri:
             advice = (
-                f"package://{meant[1] or meant[2]}/{meant[3]}"
-                if meant
+                f"package://{url[1] or url[2]}/{url[3]}"
+                if url
                 else "write package://NAME/PATH or a path"
             )
             return Asset(uri, at), finding(

@@ -66,23 +66,28 @@ def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Itera
     edges = {
         edge.child: edge for edge in robot.edges if edge.child in frames and edge.child != base
     }
-    for about, found, several, meant in (
+    for about, found, there_named, expected in (
         ("links", links.keys(), there.links, frames),
         ("joints to these links", joints.keys(), there.joints, edges.keys()),
     ):
-        wrong = sorted(found ^ meant)
-        if wrong or len(several) != len(meant):
+        wrong = sorted(found ^ expected)
+        if wrong or len(there_named) != len(expected):
             yield f"{about} are missing, new or there twice: {', '.join(wrong)}"
             return
     for child, edge in edges.items():
         mine = full or edge.owner in {STATIC, JOINTS}
         joint = joints[child]
         kind = joint_type(edge) if mine else "floating"
-        yield from (f"the joint {joint.name}: {one}" for one in _of_joint(joint, edge, kind))
+        yield from (
+            f"the joint {joint.name}: {difference}" for difference in _of_joint(joint, edge, kind)
+        )
     for name in frames:
         link = robot.links.get(name)
         body = None if link is None or (name == base and not full) else link.inertial
-        yield from (f"the link {name}: {one}" for one in _of_link(links[name], link, body, target))
+        yield from (
+            f"the link {name}: {difference}"
+            for difference in _of_link(links[name], link, body, target)
+        )
 
 
 def _is_moved(origin: Any, pose: Pose) -> bool:
@@ -93,8 +98,11 @@ def _is_moved(origin: Any, pose: Pose) -> bool:
             or angle_between(pose.quat_xyzw, Pose().quat_xyzw) > FAR_RAD
         )
     (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = origin.tolist()
-    meant = chain(*matrix_from_quat(pose.quat_xyzw))
-    far = (abs(one - other) for one, other in zip((a, b, c, d, e, f, g, h, i), meant, strict=True))
+    expected = chain(*matrix_from_quat(pose.quat_xyzw))
+    far = (
+        abs(element - other)
+        for element, other in zip((a, b, c, d, e, f, g, h, i), expected, strict=True)
+    )
     return math.dist((x, y, z), pose.xyz) > FAR_M or max(far) > FAR_RAD
 
 
@@ -113,13 +121,13 @@ def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
     axis = tuple(there.axis.tolist())
     if axis != joint.axis:
         yield f"axis is {axis}, not {joint.axis}"
-    for tag, meant in _values(joint).items():
+    for tag, expected in _values(joint).items():
         found = getattr(there, tag)
         actual = None if found is None else _given(found)
-        if (actual is None) != (meant is None):
+        if (actual is None) != (expected is None):
             yield f"{tag} is {'missing' if actual is None else 'new'}"
-        elif actual != meant:
-            yield f"{tag} is {actual}, not {meant}"
+        elif actual != expected:
+            yield f"{tag} is {actual}, not {expected}"
 
 
 def _given(values: Any) -> dict[str, Any]:
@@ -168,11 +176,11 @@ def _of_link(
         ("visual", there.visuals, visuals),
         ("collision", there.collisions, collisions),
     ):
-        meant = [(shape, solid) for shape in shapes for solid in _solids(shape, target)]
-        if len(found) != len(meant):
-            yield f"it has {len(found)} {tag} elements, not {len(meant)}"
+        expected = [(shape, solid) for shape in shapes for solid in _solids(shape, target)]
+        if len(found) != len(expected):
+            yield f"it has {len(found)} {tag} elements, not {len(expected)}"
             continue
-        for element, (shape, (kind, values, pose)) in zip(found, meant, strict=True):
+        for element, (shape, (kind, values, pose)) in zip(found, expected, strict=True):
             if _form(getattr(element.geometry, kind)) != values or _is_moved(element.origin, pose):
                 yield f"a {kind} of its {tag} differs"
             if tag == "visual" and _paint(element.material) != _meant_paint(

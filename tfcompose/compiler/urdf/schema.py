@@ -90,7 +90,7 @@ def unknown_words(root: Element) -> Iterator[Finding]:
     waiting = [root]
     while waiting:
         element = waiting.pop()
-        attributes, inside = (words.split() for words in ELEMENTS[element.tag])
+        attributes, inside = (names.split() for names in ELEMENTS[element.tag])
         for name in element.attributes:
             if name not in attributes and ":" not in name and name != "xmlns":
                 yield _unknown(
@@ -120,9 +120,9 @@ def _unexpanded(element: Element) -> Finding:
 
 
 def _unknown(
-    what: str, word: str, known: list[str], element: Element, attribute: str = ""
+    what: str, name: str, known: list[str], element: Element, attribute: str = ""
 ) -> Finding:
-    near = nearest(word, known)
+    near = nearest(name, known)
     advice = (
         f"did you mean {near}?"
         if near
@@ -131,7 +131,7 @@ def _unknown(
         else "nothing is allowed here"
     )
     at = element.at_value(attribute) if attribute else element.at
-    wrong = near and (slip_of(word, known) or nearest(word, known, _MISSPELT))
+    wrong = near and (slip_of(name, known) or nearest(name, known, _MISSPELT))
     return finding(
         "TF720", f"unknown {what}", at, help=advice, severity="error" if wrong else "warning"
     )
@@ -175,9 +175,9 @@ class AttributeReader:
         """
         if element is None or name not in element.attributes:
             return default
-        words = element.attributes[name].split()
+        tokens = element.attributes[name].split()
         try:
-            values = tuple(map(float, words))
+            values = tuple(map(float, tokens))
         except ValueError:
             values = ()
         if len(values) != len(default) or not all(map(math.isfinite, values)):
@@ -219,10 +219,10 @@ class AttributeReader:
             value = 0.0
         if not HUGE < abs(value) < math.inf:
             return self.number(element, name)  # type: ignore[no-any-return]  # a number, or None
-        taken = math.copysign(HUGE, value)
-        message = f"{name} is too large: {taken:g} is used"
+        used = math.copysign(HUGE, value)
+        message = f"{name} is too large: {used:g} is used"
         self.refuse(message, element.at_value(name), "such a limit limits nothing", "warning")
-        return taken
+        return used
 
     def pose(self, parent: Element) -> Pose:
         """Return the pose that the element's origin gives."""

@@ -245,10 +245,14 @@ class UrdfWriter:
         inside = [
             *(
                 line
-                for one in component.command
-                for line in self._interface("command_interface", one)
+                for interface in component.command
+                for line in self._interface("command_interface", interface)
             ),
-            *(line for one in component.state for line in self._interface("state_interface", one)),
+            *(
+                line
+                for interface in component.state
+                for line in self._interface("state_interface", interface)
+            ),
             *self._parameters(component.params),
         ]
         head = f"    <{component.kind} name={self.name(component.name)}"
@@ -297,13 +301,13 @@ def _joint_names(edges: list[Edge]) -> list[str]:
 
     The user's, or ``parent_to_child``, longer where that is taken.
     """
-    taken = {edge.joint_name for edge in edges}
+    names_used = {edge.joint_name for edge in edges}
     names = []
     for edge in edges:
         name = edge.joint_name or f"{edge.parent}_to_{edge.child}"
-        while not edge.joint_name and name in taken:
+        while not edge.joint_name and name in names_used:
             name += "_"
-        taken.add(name)
+        names_used.add(name)
         names.append(name)
     return names
 

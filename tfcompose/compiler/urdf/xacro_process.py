@@ -303,17 +303,17 @@ class XacroRun:
         elif isinstance(root, OutsideDocumentError):
             kind, reason = "outside", " ".join([f"{root} may not be read", *_suffixes(chain)])
         elif isinstance(root, UnsafeError):
-            words = [f"an expression may not use {root}", *_suffixes(chain)]
-            kind, reason = "unsafe", " ".join(words)
+            parts = [f"an expression may not use {root}", *_suffixes(chain)]
+            kind, reason = "unsafe", " ".join(parts)
         elif isinstance(root, LimitError):
             kind, reason = "limit", str(root)
         elif isinstance(root, MemoryError):
             take_spare_memory()  # to say so
-            words = [
+            parts = [
                 f"xacro needs more than {MOST_MEMORY_BYTES >> 30} GB of memory",
                 *_suffixes(chain),
             ]
-            kind, reason = "limit", " ".join(words)
+            kind, reason = "limit", " ".join(parts)
         elif isinstance(root, RecursionError):
             kind, reason = "limit", "xacro goes too deep: macros, or elements in each other"
         line = getattr(root, "lineno", None)  # an ExpatError
@@ -363,7 +363,7 @@ def _reason(chain: list[Any]) -> str:
     """
     root = chain[-1]
     if isinstance(root, OSError):
-        words = [f"{root.strerror}: {root.filename}"]
+        parts = [f"{root.strerror}: {root.filename}"]
     else:
         heads = [str(error.args[0]) for error in chain[:-1] if error.args and error.args[0]]
         own = (
@@ -371,9 +371,9 @@ def _reason(chain: list[Any]) -> str:
             if hasattr(root, "suffix") or "line" in str(root)
             else f"{type(root).__name__}: {root}"
         )
-        words = [*(head for head in heads if str(root) not in head), own]
-        words += _suffixes(chain)
-    return " ".join(" ".join(words).split())
+        parts = [*(head for head in heads if str(root) not in head), own]
+        parts += _suffixes(chain)
+    return " ".join(" ".join(parts).split())
 
 
 def _suffixes(chain: list[Any]) -> list[str]:

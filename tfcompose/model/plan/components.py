@@ -82,5 +82,5 @@ def load_request(
 
 def _filled(value: Any, fill: Callable[[str], str]) -> Any:
     if isinstance(value, list):
-        return [_filled(one, fill) for one in value]
+        return [_filled(item, fill) for item in value]
     return fill(value) if isinstance(value, str) else value

@@ -52,7 +52,7 @@ def _data(value: Any) -> Any:
     """Return a value of a plan as JSON has it."""
     if is_dataclass(value):
         held = {field: getattr(value, field.name) for field in fields(value)}
-        return {one.name: _data(part) for one, part in held.items() if part != _default(one)}
+        return {field.name: _data(part) for field, part in held.items() if part != _default(field)}
     if isinstance(value, dict):
         return {key: _data(part) for key, part in value.items()}
     return [_data(part) for part in value] if isinstance(value, (list, tuple)) else value
@@ -86,7 +86,7 @@ def read_plan(text: str, file: str) -> Plan:
         raise RejectedError([_bad(f"not a valid plan: {_short(error)}", Span(file))]) from None
     wrong = [*_wrong_text(data), *_wrong_names(plan)]
     if wrong:
-        raise RejectedError([_bad(f"not a valid plan: {one}", Span(file)) for one in wrong])
+        raise RejectedError([_bad(f"not a valid plan: {error}", Span(file)) for error in wrong])
     return plan
 
 
@@ -117,10 +117,12 @@ def _wrong_text(data: Any) -> Iterator[str]:
             if found and not (_FOR_PROGRAMS & set(path) and {"\n", "\t"}.issuperset(found)):
                 yield f"{'.'.join(path)} holds a control character: {json.dumps(value)[:60]}"
         elif isinstance(value, dict):
-            for key, one in reversed(value.items()):
-                waiting += [(one, (*path, key)), (key, (*path, "a key"))]
+            for key, item in reversed(value.items()):
+                waiting += [(item, (*path, key)), (key, (*path, "a key"))]
         elif isinstance(value, list):
-            waiting += reversed([(one, (*path, str(number))) for number, one in enumerate(value)])
+            waiting += reversed(
+                [(item, (*path, str(number))) for number, item in enumerate(value)]
+            )
 
 
 def _wrong_names(plan: Plan) -> Iterator[str]:

@@ -147,5 +147,5 @@ def _elsewhere(process: PlanProcess) -> PlanProcess:
 
 def without_computer(plan: Plan) -> tuple[str, ...]:
     """Return the processes that no computer under ``hosts`` would run."""
-    own = (one for one in plan.managed if one.kind != "guard")
+    own = (process for process in plan.managed if process.kind != "guard")
     return tuple(process.name for process in own if process.host not in plan.hosts)

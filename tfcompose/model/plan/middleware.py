@@ -71,9 +71,9 @@ def router_variables(ros: RosSettings) -> dict[str, str]:
 
     Where it listens, if that is not its own default.
     """
-    meant = re.fullmatch(ENDPOINT, ros.router) if ros.router else None
-    if meant is None and ros.discovery != "localhost":
+    endpoint = re.fullmatch(ENDPOINT, ros.router) if ros.router else None
+    if endpoint is None and ros.discovery != "localhost":
         return {}
     host = "localhost" if ros.discovery == "localhost" else "[::]"
-    protocol, port = (meant[1], meant[3]) if meant else ("tcp", _PORT)
+    protocol, port = (endpoint[1], endpoint[3]) if endpoint else ("tcp", _PORT)
     return {ZENOH_OVERRIDE: f'listen/endpoints=["{protocol}/{host}:{port}"]'}

@@ -577,8 +577,8 @@ class Plan:
         ):
             return True
         return policy.unknown_edges == "ignore" or any(
-            fnmatchcase(parent, one.parent) and fnmatchcase(child, one.child)
-            for one in policy.allow
+            fnmatchcase(parent, pattern.parent) and fnmatchcase(child, pattern.child)
+            for pattern in policy.allow
         )
 
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:

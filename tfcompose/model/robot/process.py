@@ -85,25 +85,25 @@ _DOUBLE = re.compile(
 )
 
 
-def value_of_word(word: str) -> bool | float | str:
+def value_of_word(text: str) -> bool | float | str:
     """Return what rcl takes an unquoted word of a parameter file for: on is true, 012 ten."""
-    if word in _TRUTHS:
-        return _TRUTHS[word]
+    if text in _TRUTHS:
+        return _TRUTHS[text]
     for form, base in ((_HEX, 16), (_OCTAL, 8), (_DECIMAL, 10)):
-        if form.fullmatch(word):
-            return int(word, base)
-    if _DOUBLE.fullmatch(word):
-        special = word.lower().endswith(("inf", "nan"))
-        return float(word.replace(".", "") if special else word)
-    return str(word)
+        if form.fullmatch(text):
+            return int(text, base)
+    if _DOUBLE.fullmatch(text):
+        special = text.lower().endswith(("inf", "nan"))
+        return float(text.replace(".", "") if special else text)
+    return str(text)
 
 
 def _meant(value: Any) -> Any:
     """Return a word of a parameter file as ROS reads it if it is a switch, or as text."""
     if not isinstance(value, AsInFile):
         return value
-    meant = value_of_word(value)
-    return meant if isinstance(meant, bool) else str(value)
+    typed_value = value_of_word(value)
+    return typed_value if isinstance(typed_value, bool) else str(value)
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,9 +101,11 @@ class ArgSpec(Checked):
         if self.type is not None:
             return self.type
         known = [
-            one for one in (self.default, *self.choices, self.min, self.max) if one is not None
+            value
+            for value in (self.default, *self.choices, self.min, self.max)
+            if value is not None
         ]
-        kinds = [_kind(one) for one in known]
+        kinds = [_kind(value) for value in known]
         return (
             "float"
             if "float" in kinds[:1] or (kinds[:1] == ["int"] and "float" in kinds)
@@ -123,9 +125,9 @@ class ArgSpec(Checked):
         if self.kind == "int" and (self.min is not None or self.max is not None):
             try:
                 known = {
-                    inserted(self.typed(one)): None
-                    for one in (self.min, self.default, self.max)
-                    if one is not None
+                    inserted(self.typed(value)): None
+                    for value in (self.min, self.default, self.max)
+                    if value is not None
                 }
             except ArgError:
                 return ()  # it is refused for that
@@ -228,10 +230,10 @@ class ArgSpec(Checked):
         known = (self.default, *self.choices, self.min, self.max)
         own = [
             found.dimension
-            for one in known
-            if isinstance(one, str) and isinstance(found := _read(one), Quantity)
+            for known_value in known
+            if isinstance(known_value, str) and isinstance(found := _read(known_value), Quantity)
         ]
-        other = next((one for one in own if one != NUMBER), number.dimension)
+        other = next((dimension for dimension in own if dimension != NUMBER), number.dimension)
         if number.dimension not in {NUMBER, other}:
             raise ArgError(
                 "TF104",
@@ -244,9 +246,9 @@ def _indexed(values: tuple[Any, ...]) -> Iterator[tuple[Path, Any]]:
         yield ("choices", index), value
 
 
-def _one_of(word: str, words: list[str]) -> str:
-    listed = f"one of: {', '.join(words)}"
-    near = did_you_mean(word, words)
+def _one_of(text: str, choices: list[str]) -> str:
+    listed = f"one of: {', '.join(choices)}"
+    near = did_you_mean(text, choices)
     return f"{near} {listed}" if near else listed
 
 

@@ -91,14 +91,16 @@ def alternatives_of(
             alternatives[name] = ArgSpec.model_validate(full(raw)).alternatives
         except ValidationError:
             continue  # it is refused where the whole is read
-    several = {name: words for name, words in alternatives.items() if words}
-    return several, {name: _first(variables.args[name], words) for name, words in several.items()}
+    with_choices = {name: texts for name, texts in alternatives.items() if texts}
+    return with_choices, {
+        name: _first(variables.args[name], texts) for name, texts in with_choices.items()
+    }
 
 
-def _first(value: Value | None, words: tuple[str, ...]) -> str:
+def _first(value: Value | None, texts: tuple[str, ...]) -> str:
     """Return the word that says the value, or the first of all."""
     return next(
-        (word for word in words if value is not None and word == inserted(value)), words[0]
+        (text for text in texts if value is not None and text == inserted(value)), texts[0]
     )
 
 

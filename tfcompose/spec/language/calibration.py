@@ -308,7 +308,7 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
     if wrong:
         wrong = _without_text(wrong, text)
         return CalibrationFile(
-            file, form, (), tuple(_inside("TF610", one, file, at) for one in wrong)
+            file, form, (), tuple(_inside("TF610", refusal, file, at) for refusal in wrong)
         )
     known = _recognised(kind, documents)
     chosen = known if form == "auto" else form
@@ -407,9 +407,11 @@ class _FormatReader:
         """Note what is wrong at a path."""
         self._refused(SpecRefusal("TF610", path, message, advice))
 
-    def _refused(self, one: SpecRefusal) -> None:
-        code = "TF614" if one.code in _NO_ROTATION else "TF610"
-        self.found.append(_inside(code, one.finding(self.source), self.source.file, self.named_at))
+    def _refused(self, refusal: SpecRefusal) -> None:
+        code = "TF614" if refusal.code in _NO_ROTATION else "TF610"
+        self.found.append(
+            _inside(code, refusal.finding(self.source), self.source.file, self.named_at)
+        )
 
     def entry(
         self,
@@ -427,10 +429,10 @@ class _FormatReader:
         """Yield the entries of a sensor kit."""
         for parent, children in data.items() if isinstance(data, dict) else ():
             for child, values in children.items() if isinstance(children, dict) else ():
-                one = self.model(PoseXyzRpy, values, (parent, child))
-                if one:
+                refusal = self.model(PoseXyzRpy, values, (parent, child))
+                if refusal:
                     yield self.entry(
-                        (parent, child), one.pose, parent.lstrip("/"), child.lstrip("/")
+                        (parent, child), refusal.pose, parent.lstrip("/"), child.lstrip("/")
                     )
 
     def easy_handeye2(self, data: Any) -> Iterator[CalibrationEntry]:
@@ -471,9 +473,11 @@ class _FormatReader:
             return
         for index, message in enumerate(messages):
             path: Path = ("transforms", index) if is_list else ()
-            one = self.model(RecordedTransformStamped, message, path)
-            if one:
-                yield self.entry(path, one.transform.pose, one.header.frame_id, one.child_frame_id)
+            refusal = self.model(RecordedTransformStamped, message, path)
+            if refusal:
+                yield self.entry(
+                    path, refusal.transform.pose, refusal.header.frame_id, refusal.child_frame_id
+                )
 
     def kalibr(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield what each camera sees: the IMU, and the camera before it."""
@@ -483,69 +487,69 @@ class _FormatReader:
                 continue
             before = f"cam{int(number[1][:9]) - 1}"
             for key, child in (("T_cam_imu", "imu"), ("T_cn_cnm1", before)):
-                one = (
+                refusal = (
                     self.model(KalibrCamera, {key: values[key]}, (camera,))
                     if key in values
                     else None
                 )
-                rows = getattr(one, key) if one else None
+                rows = getattr(refusal, key) if refusal else None
                 if rows:
                     yield self.entry((camera, key), _pose_of(rows), camera, child, key)
 
     def matrix(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield the one entry of a file that is a matrix."""
-        one = self.model(MatrixFile, {"matrix": data}, ())
-        if one:
-            yield self.entry((), _pose_of(one.matrix))
+        refusal = self.model(MatrixFile, {"matrix": data}, ())
+        if refusal:
+            yield self.entry((), _pose_of(refusal.matrix))
 
     def moveit(self, data: Any) -> Iterator[CalibrationEntry]:
         """Yield an entry for each static_transform_publisher of a launch file."""
-        for index, words in enumerate(data):
-            if any(word.startswith("--") for word in words):
-                yield from self._flags(index, words)
+        for index, row in enumerate(data):
+            if any(flag.startswith("--") for flag in row):
+                yield from self._flags(index, row)
             else:
-                yield from self._positions(index, words)
+                yield from self._positions(index, row)
 
-    def _positions(self, index: int, words: list[str]) -> Iterator[CalibrationEntry]:
+    def _positions(self, index: int, row: list[str]) -> Iterator[CalibrationEntry]:
         """Read x y z qx qy qz qw parent child."""
-        if len(words) == 8:  # noqa: PLR2004 (x y z, three angles, two names)
+        if len(row) == 8:  # noqa: PLR2004 (x y z, three angles, two names)
             message = (
                 "three angles: the first versions of MoveIt wrote them in another order than their"
                 " reader takes"
             )
             self.refuse((index,), message, "write the quaternion: x y z qx qy qz qw parent child")
-        elif len(words) != 9:  # noqa: PLR2004 (x y z, quaternion, two names)
+        elif len(row) != 9:  # noqa: PLR2004 (x y z, quaternion, two names)
             self.refuse(
-                (index,), f"expected x y z qx qy qz qw parent child, got {len(words)} arguments"
+                (index,), f"expected x y z qx qy qz qw parent child, got {len(row)} arguments"
             )
         else:
-            names = dict(zip(PoseXyzQuat.model_fields, words[:7], strict=True))
+            names = dict(zip(PoseXyzQuat.model_fields, row[:7], strict=True))
             where = {name: at for at, name in enumerate(names)}
             pose = self._arguments(PoseXyzQuat, names, index, where)
             if pose:
-                yield self.entry((index,), pose, words[7].lstrip("/"), words[8].lstrip("/"))
+                yield self.entry((index,), pose, row[7].lstrip("/"), row[8].lstrip("/"))
 
-    def _flags(self, index: int, words: list[str]) -> Iterator[CalibrationEntry]:
+    def _flags(self, index: int, row: list[str]) -> Iterator[CalibrationEntry]:
         """Read --x … --qw or --roll --pitch --yaw, --frame-id and --child-frame-id."""
-        given = {flag[2:]: value for flag, value in zip(words[::2], words[1::2], strict=False)}
-        missing = [name for name in ("frame-id", "child-frame-id") if name not in given]
+        flags = {flag[2:]: value for flag, value in zip(row[::2], row[1::2], strict=False)}
+        missing = [name for name in ("frame-id", "child-frame-id") if name not in flags]
         if missing:
             self.refuse(
                 (index,), f"--{missing[0]} is missing", "it must be a string, not a variable"
             )
             return
-        where = {word[2:]: 2 * at + 1 for at, word in enumerate(words[::2])}
-        model = PoseXyzQuat if {"qx", "qy", "qz", "qw"} & set(given) else PoseXyzRpy
-        pose = self._arguments(model, given, index, where)
+        where = {flag[2:]: 2 * at + 1 for at, flag in enumerate(row[::2])}
+        model = PoseXyzQuat if {"qx", "qy", "qz", "qw"} & set(flags) else PoseXyzRpy
+        pose = self._arguments(model, flags, index, where)
         if pose:
             yield self.entry(
-                (index,), pose, given["frame-id"].lstrip("/"), given["child-frame-id"].lstrip("/")
+                (index,), pose, flags["frame-id"].lstrip("/"), flags["child-frame-id"].lstrip("/")
             )
 
     def _arguments(
         self,
         model: type[PoseXyzQuat | PoseXyzRpy],
-        given: dict[str, str],
+        flags: dict[str, str],
         index: int,
         where: dict[str, int],
     ) -> Pose | None:
@@ -553,7 +557,7 @@ class _FormatReader:
 
         ``where`` is each argument's place among the words.
         """
-        made, refusals = read(model, _DEFAULTS[model] | given)
+        made, refusals = read(model, _DEFAULTS[model] | flags)
         for refusal in refusals:
             path = (
                 (index, where[str(refusal.path[0])])

@@ -138,14 +138,14 @@ class _Unfolding:
                 if is_plain
                 else list(self._made(at, entry))
             )
-            for name, one, where in made:
+            for name, content, where in made:
                 if name in data:
                     message = f"{template} and another entry are both {name}"
                     self._refuse(
                         at, ExpressionError(message, "give them other names"), on_key=True
                     )
                     continue
-                data[name], inside[name], keys[name] = one, where, place.keys[template]
+                data[name], inside[name], keys[name] = content, where, place.keys[template]
         return data, place.with_inside(inside, keys)
 
     def _made(
@@ -222,8 +222,8 @@ class _Unfolding:
                 )
         lists = [self._items(value) for value in loops.values()]
         count = 1
-        for one in lists:
-            count *= len(one)
+        for alternatives in lists:
+            count *= len(alternatives)
         if count > MOST_ITEMS:
             raise ExpressionError(f"for makes {count:,} entries; at most {MOST_ITEMS:,}")
         return [dict(zip(loops, values, strict=True)) for values in product(*lists)]
@@ -288,7 +288,7 @@ class _Unfolding:
             return (
                 name not in there
                 and not name.startswith(parts)
-                and any(one.fullmatch(name) for one in self.gone)
+                and any(pattern.fullmatch(name) for pattern in self.gone)
             )
 
         for section, inside in (("sensors", ("driver",)), ("containers", ()), ("processes", ())):

@@ -24,8 +24,8 @@ _MASS = "it belongs under inertial: {mass: 2 kg}"
 
 #: By the word: the key that has its meaning, where that is known, and what to write.
 _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
-    word: meanings
-    for words, meanings in (
+    habit_word: meanings
+    for habit_words, meanings in (
         ("robots fleet", (("parts", _ROBOTS),)),
         ("pose origin transform", (("xyz", _POSE),)),
         (
@@ -239,25 +239,25 @@ _OF_THE_LANGUAGE: dict[str, tuple[tuple[str, str], ...]] = {
             (("preset", "the model is preset: realsense/d435i; tfcompose presets lists them"),),
         ),
     )
-    for word in words.split()
+    for habit_word in habit_words.split()
 }
 #: Keys of a process that another format calls so, by the word.
 _OF_PROCESSES: dict[str, tuple[tuple[str, str], ...]] = {
-    word: ((row.name, advice),)
+    habit_word: ((row.name, advice),)
     for row in PROCESS_KEYS
-    for words, advice in row.habits
-    for word in words.split()
+    for habit_words, advice in row.habits
+    for habit_word in habit_words.split()
 }
 _HABITS = {
-    word: _OF_PROCESSES.get(word, ()) + _OF_THE_LANGUAGE.get(word, ())
-    for word in _OF_THE_LANGUAGE.keys() | _OF_PROCESSES.keys()
+    habit_word: _OF_PROCESSES.get(habit_word, ()) + _OF_THE_LANGUAGE.get(habit_word, ())
+    for habit_word in _OF_THE_LANGUAGE.keys() | _OF_PROCESSES.keys()
 }
 
 
 #: Values that have another name here.
 _VALUES = {
-    word: value
-    for words, value in (
+    habit_word: value
+    for habit_words, value in (
         ("front forwards ahead", "forward"),
         ("back rear backwards behind", "backward"),
         ("upward upwards top", "up"),
@@ -271,20 +271,20 @@ _VALUES = {
         ("finished exited completed", "done"),
         ("on_failure", "on-failure"),
     )
-    for word in words.split()
+    for habit_word in habit_words.split()
 }
 
 
-def habit(word: str, known: Collection[str], value: object = None) -> str:
+def habit(name: str, known: Collection[str], value: object = None) -> str:
     """Return what to write instead of another format's key, given the ``known`` keys.
 
     ``value`` is what stands there.
     """
-    advice = next((advice for key, advice in _HABITS.get(word, ()) if key in known), "")
-    return advice.replace("WORD", word).replace("VALUE", value if isinstance(value, str) else "…")
+    advice = next((advice for key, advice in _HABITS.get(name, ()) if key in known), "")
+    return advice.replace("WORD", name).replace("VALUE", value if isinstance(value, str) else "…")
 
 
-def usual_value(word: str, allowed: Collection[str]) -> str:
+def usual_value(text: str, allowed: Collection[str]) -> str:
     """Return the allowed word that means the same, or the word itself."""
-    value = _VALUES.get(word.lower(), word)
-    return value if value in allowed else word
+    value = _VALUES.get(text.lower(), text)
+    return value if value in allowed else text

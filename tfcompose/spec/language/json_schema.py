@@ -52,7 +52,7 @@ def json_schema(
     is_robot = language in {"robot", "overlay"}
     root = model_of("robot" if is_robot else language)
     own = _with_named_types(
-        root.model_json_schema(schema_generator=_Generator), {one for _, one in walk(root)}
+        root.model_json_schema(schema_generator=_Generator), {model for _, model in walk(root)}
     )
     if not is_robot:
         own = _without_expressions(own)
@@ -100,7 +100,11 @@ def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict
     Beside ``$ref`` editors read nothing.
     """
     names = {kind.__name__ for kind in mappings}
-    types = {f"#/$defs/{name}": one for name, one in schema["$defs"].items() if name not in names}
+    types = {
+        f"#/$defs/{name}": definition
+        for name, definition in schema["$defs"].items()
+        if name not in names
+    }
 
     def inlined(value: Any) -> Any:
         if isinstance(value, list):
@@ -112,7 +116,7 @@ def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict
             return other
         return dict(sorted((inlined(types[other.pop("$ref")]) | other).items()))
 
-    inside = {name: one for name, one in schema["$defs"].items() if name in names}
+    inside = {name: definition for name, definition in schema["$defs"].items() if name in names}
     made: dict[str, Any] = inlined(schema | {"$defs": inside})
     return made
 
@@ -203,10 +207,10 @@ def _examples(field: FieldInfo, form: dict[str, Any]) -> list[Any]:
 
 
 def _exclude(
-    schema: dict[str, Any], several: Iterable[frozenset[str]], definitions: dict[str, Any]
+    schema: dict[str, Any], groups: Iterable[frozenset[str]], definitions: dict[str, Any]
 ) -> None:
     """Let a mapping hold only one key of each set."""
-    for keys in map(sorted, several):
+    for keys in map(sorted, groups):
         name = f"OneOf_{'_'.join(keys)}"
         definitions[name] = {
             "allOf": [
@@ -223,7 +227,10 @@ def _exclude(
 def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
     """Let a file that is merged over another omit required keys and remove with null."""
     own["required"] = ["preset"]
-    for model in (own, *(one for one in definitions.values() if "properties" in one)):
+    for model in (
+        own,
+        *(definition for definition in definitions.values() if "properties" in definition),
+    ):
         if model is not own:
             model.pop("required", None)
         for name, schema in model["properties"].items():

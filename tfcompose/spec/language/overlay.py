@@ -150,7 +150,8 @@ def _with_full_args(source: Source) -> Source:
     """
     declared = source.data.get("args")
     if not isinstance(declared, dict) or all(
-        isinstance(one, dict) or one is None for one in declared.values()
+        isinstance(declared_value, dict) or declared_value is None
+        for declared_value in declared.values()
     ):
         return source
     place = source.places.inside["args"]

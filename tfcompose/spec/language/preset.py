@@ -274,12 +274,12 @@ def _frames(preset: PresetSpec) -> Iterator[SpecRefusal]:
             advice = did_you_mean(name, known, f"there is {', '.join(known)}")
             yield SpecRefusal("TF606", path, f"{preset.model} has no frame {name}", advice)
     for name in known:
-        for word in _HOLE.findall(name):
-            if word != "name" and word not in preset.words:
+        for hole in _HOLE.findall(name):
+            if hole != "name" and hole not in preset.words:
                 yield SpecRefusal(
                     "TF606",
                     ("words",),
-                    f"{name}: no word {word}",
+                    f"{name}: no word {hole}",
                     "there is {name}, and what words has",
                 )
     if preset.mount in preset.frames:
@@ -318,8 +318,8 @@ def _options(preset: PresetSpec) -> Iterator[SpecRefusal]:
             tuple(option.variants) if option.type == "choice" else option.values
         )
         if option.type in {"choice", "set"}:
-            given = option.default if option.type == "set" else [option.default]
-            for value in given if isinstance(given, list) else [given]:
+            chosen = option.default if option.type == "set" else [option.default]
+            for value in chosen if isinstance(chosen, list) else [chosen]:
                 if value not in known:
                     message = f"the option {name} cannot be {value!r}"
                     yield SpecRefusal(
@@ -353,10 +353,10 @@ def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[SpecRefu
         else {}
     )
     values: tuple[Any, ...] = known.get(option.type, ()) if option else _TF
-    for one in wanted if isinstance(wanted, list) else [wanted]:
-        if values and one not in values:
+    for choice in wanted if isinstance(wanted, list) else [wanted]:
+        if values and choice not in values:
             advice = f"one of: {', '.join(map(str, values))}"
-            yield SpecRefusal("TF606", path, f"{name} is never {one!r}", advice)
+            yield SpecRefusal("TF606", path, f"{name} is never {choice!r}", advice)
 
 
 def _conditions(preset: PresetSpec) -> Iterator[tuple[Path, dict[str, Any]]]:

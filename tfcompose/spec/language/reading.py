@@ -57,17 +57,17 @@ class SpecRefusal:
         span = source.at_key(self.path) if self.on_key else source.at(self.path)
         notes = [Note("the other one", source.at_key(self.other))] if self.other else []
         edits = [Edit(span, self.instead)] if self.instead is not None else []
-        meant = (
+        replacement = (
             _laid_over_nothing(source, self.path)
             if self.code == "TF102" and source.is_variant
             else ""
         )
-        if meant:  # one finding, whatever it lacks
+        if replacement:  # one finding, whatever it lacks
             return finding(
                 "TF102",
                 f"{self.path[-1]} does not exist, and is not complete as a new entry",
                 span,
-                help=meant,
+                help=replacement,
                 notes=notes,
             )
         return finding(self.code, self.message, span, help=self.help, notes=notes, edits=edits)
@@ -98,7 +98,10 @@ def read(
         try:
             return model.model_validate(rest, context=None if attempt else FIRST), refusals
         except ValidationError as error:
-            errors = [(_path_of(one["loc"], data), one) for one in error.errors(include_url=False)]
+            errors = [
+                (_path_of(problem["loc"], data), problem)
+                for problem in error.errors(include_url=False)
+            ]
         follows = {path[:end] for path in gone for end in range(1, len(path) + 1)}
         new = []
         for path, refused in errors:
@@ -205,11 +208,11 @@ def _refusals(
 ) -> list[SpecRefusal]:
     """Return what pydantic refused in one turn, in this project's words."""
     unknown = [path for path, error in errors if error["type"] in UNKNOWN_KEYS]
-    meant = Counter((path[:-1], _slip(model, path)) for path in unknown)
+    slips = Counter((path[:-1], _slip(model, path)) for path in unknown)
     refusals = []
     for path, error in errors:
         if error["type"] in UNKNOWN_KEYS:
-            refusals.append(_unknown_key(model, path, data, meant))
+            refusals.append(_unknown_key(model, path, data, slips))
         else:
             refusals.append(_refusal(model, path, error))
     return refusals
@@ -225,7 +228,7 @@ def _slip(model: type[Spec], path: Path) -> str | None:
 
 
 def _unknown_key(
-    model: type[Spec], path: Path, data: Any, meant: Counter[tuple[Path, str | None]]
+    model: type[Spec], path: Path, data: Any, slips: Counter[tuple[Path, str | None]]
 ) -> SpecRefusal:
     """Return the refusal of a key.
 
@@ -241,7 +244,7 @@ def _unknown_key(
     if not slip and not usual and _is_a_section(model, path):
         message = f"{path[1]} is a section of its own, not one of {path[0]}"
         return SpecRefusal("TF101", path[:2], message, f"indent it as {path[0]} is", on_key=True)
-    is_safe = slip not in around and meant[path[:-1], slip] == 1 and not usual
+    is_safe = slip not in around and slips[path[:-1], slip] == 1 and not usual
     advice = (
         (absent(name, "key") if len(path) == 1 else "")
         or usual
@@ -301,7 +304,7 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> SpecRefusal:
         advice = f"for example {path[-1]}: {field.examples[0]}" if field.examples else ""
         return SpecRefusal("TF102", path[:-1], f"{path[-1]} is missing", advice, on_key=True)
     if kind == "literal_error":
-        allowed = [str(word) for word in _words_allowed(model, path)]
+        allowed = [str(text) for text in _words_allowed(model, path)]
         advice = f"one of: {', '.join(allowed)}"
         advice = (
             did_you_mean(usual_value(value, allowed), allowed, advice)
@@ -345,10 +348,10 @@ def _example(model: type[Spec], path: Path, value: Any) -> str:
 def _words_allowed(model: type[Spec], path: Path) -> list[Any]:
     """Return the words that may stand at a path, where these are listed."""
     return [
-        word
-        for one in kinds_of(at(model, path))
-        if get_origin(one) is Literal
-        for word in get_args(one)
+        text
+        for kind in kinds_of(at(model, path))
+        if get_origin(kind) is Literal
+        for text in get_args(kind)
     ]
 
 
@@ -361,7 +364,9 @@ def _as_string(value: Any) -> str:
     if isinstance(value, (int, float)):
         return "put it in quotes"
     inside = list(value.values()) if isinstance(value, dict) else value
-    strings = [one for one in inside if isinstance(one, str)] if isinstance(inside, list) else []
+    strings = (
+        [kind for kind in inside if isinstance(kind, str)] if isinstance(inside, list) else []
+    )
     if not strings or len(strings) != len(inside):
         return ""
     return (
@@ -386,10 +391,10 @@ def _as_mapping(model: type[Spec], path: Path, value: Any) -> str:
     usual = next(iter(example.values())) if example else {}
     items = [_pair(item, usual) for item in (value if isinstance(value, list) else [value])]
     if items and None not in items:
-        inside = ", ".join(f"{key}: {_in_yaml(one)}" for key, one in filter(None, items))
+        inside = ", ".join(f"{key}: {_in_yaml(kind)}" for key, kind in filter(None, items))
         return f"write {path[-1]}: {{{inside}}}" if path else f"write {inside}"
     inside = (
-        ", ".join(f"{key}: {_in_yaml(one)}" for key, one in example.items())
+        ", ".join(f"{key}: {_in_yaml(kind)}" for key, kind in example.items())
         if example
         else "NAME: {…}"
     )
@@ -408,7 +413,7 @@ def _pair(item: Any, usual: Any) -> tuple[str, Any] | None:
         return "file", item
     if isinstance(item, str) and item.isidentifier() and isinstance(usual, (str, dict)):
         return item, usual
-    if isinstance(item, list) and len(item) == 2 and all(isinstance(one, str) for one in item):  # noqa: PLR2004 (a pair)
+    if isinstance(item, list) and len(item) == 2 and all(isinstance(kind, str) for kind in item):  # noqa: PLR2004 (a pair)
         return item[0], item[1]
     if isinstance(item, dict) and isinstance(item.get("name"), str):
         return item["name"], {}

@@ -66,28 +66,28 @@ def key_page(path: str) -> str | None:
     ``sensors.laser.place``; or the kind of a section: ``sensor``; or it is a key alone, of which
     every place is explained.
     """
-    words = tuple(path.split("."))
+    steps = tuple(path.split("."))
     root = model_of("robot")
     places = [(pattern, kind) for pattern, kind in walk(root) if pattern]
     holders: list[tuple[Pattern, Any]] = [((), root), *places]
-    if words[0] in fields_of(root) and len(words) == 1:
+    if steps[0] in fields_of(root) and len(steps) == 1:
         holders = holders[:1]
-    elif len(words) > 1:
-        holders = [(at, kind) for at, kind in holders if _is_at(at, words[:-1])]
+    elif len(steps) > 1:
+        holders = [(at, kind) for at, kind in holders if _is_at(at, steps[:-1])]
     found: dict[tuple[str, ...], list[str]] = {}
     for at, kind in holders:
-        field = fields_of(kind).get(words[-1])
+        field = fields_of(kind).get(steps[-1])
         if field is not None:
             default, example = _default(field), _examples(field)
             lines = [described(field), "", f"- type: {_type(field.rebuild_annotation())}"]
             lines += [f"- default: {default}"] * bool(default) + [f"- example: {example}"] * bool(
                 example
             )
-            found.setdefault(tuple(lines), []).append(_place((*at, words[-1])))
+            found.setdefault(tuple(lines), []).append(_place((*at, steps[-1])))
     lines = [line for about, at in found.items() for line in (f"## {_listed(at)}", "", *about, "")]
-    sections = [(at, kind) for at, kind in places if at[-1] != "*" and _is_at(at, words)]
-    sections += [(at, kind) for at, kind in places if at[-1] == "*" and _is_at(at[:-1], words)]
-    sections = sections or [(at, kind) for at, kind in places if words == (_title(kind).lower(),)]
+    sections = [(at, kind) for at, kind in places if at[-1] != "*" and _is_at(at, steps)]
+    sections += [(at, kind) for at, kind in places if at[-1] == "*" and _is_at(at[:-1], steps)]
+    sections = sections or [(at, kind) for at, kind in places if steps == (_title(kind).lower(),)]
     if sections:
         lines += _section(
             sections[0][1], [_place(at) for at, kind in places if kind is sections[0][1]]
@@ -114,13 +114,13 @@ def keys() -> list[str]:
     ]
 
 
-def _is_at(pattern: Pattern, words: tuple[str, ...]) -> bool:
+def _is_at(pattern: Pattern, steps: tuple[str, ...]) -> bool:
     """Return whether words name the place, in which a name may be left out."""
-    if not pattern or not words:
-        return not words and all(step == "*" for step in pattern)
+    if not pattern or not steps:
+        return not steps and all(step == "*" for step in pattern)
     if pattern[0] == "*":
-        return _is_at(pattern[1:], words) or _is_at(pattern[1:], words[1:])
-    return pattern[0] == words[0] and _is_at(pattern[1:], words[1:])
+        return _is_at(pattern[1:], steps) or _is_at(pattern[1:], steps[1:])
+    return pattern[0] == steps[0] and _is_at(pattern[1:], steps[1:])
 
 
 def _place(pattern: Pattern) -> str:
@@ -171,7 +171,7 @@ def _row(name: str, field: FieldInfo) -> str:
 def _examples(field: FieldInfo) -> str:
     """Return examples where the type itself does not list what there is."""
     if field.examples:
-        return " or ".join(f"`{flow(one)}`" for one in examples_of(field))
+        return " or ".join(f"`{flow(example)}`" for example in examples_of(field))
     measure = measure_of(field.rebuild_annotation())
     return f"`{measure.example}`" if measure else ""
 
@@ -192,9 +192,9 @@ def _type(annotation: Any) -> str:
     if origin is Annotated:
         return _annotated(inner[0], inner[1:])
     if origin in {Union, types.UnionType}:
-        return " or ".join(dict.fromkeys(_type(one) for one in inner if one is not type(None)))
+        return " or ".join(dict.fromkeys(_type(kind) for kind in inner if kind is not type(None)))
     if origin is Literal:
-        return " | ".join(f"`{word}`" for word in inner)
+        return " | ".join(f"`{text}`" for text in inner)
     if origin is dict:
         return f"{_plural(_type(inner[1]))} by name"
     if origin is tuple:
@@ -211,18 +211,18 @@ def _type(annotation: Any) -> str:
 
 
 def _annotated(inner: Any, metadata: tuple[Any, ...]) -> str:
-    for one in metadata:
-        if isinstance(one, Measure):
-            return "number" if not one.unit else "quantity"
-        if isinstance(one, InARow):
-            return f"list of {one.count} {_plural(_type(get_args(inner)[0]))}"
-        other = unnamed(getattr(one, "json_schema_input_type", None))
+    for annotation in metadata:
+        if isinstance(annotation, Measure):
+            return "number" if not annotation.unit else "quantity"
+        if isinstance(annotation, InARow):
+            return f"list of {annotation.count} {_plural(_type(get_args(inner)[0]))}"
+        other = unnamed(getattr(annotation, "json_schema_input_type", None))
         if get_origin(other) in {Union, types.UnionType, Literal}:
             return _type(other)
     return _type(inner)
 
 
-def _plural(word: str) -> str:
+def _plural(noun: str) -> str:
     known = {
         "string": "strings",
         "number": "numbers",
@@ -230,5 +230,5 @@ def _plural(word: str) -> str:
         "whole number": "whole numbers",
     }
     return known.get(
-        word, f"lists{word.removeprefix('list')}" if word.startswith("list of ") else word
+        noun, f"lists{noun.removeprefix('list')}" if noun.startswith("list of ") else noun
     )

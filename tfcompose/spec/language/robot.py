@@ -449,12 +449,15 @@ class PartSpec(MountKeys):
                 )
         file = data[kind]
         ending = next(
-            (one for one in _ENDINGS if isinstance(file, str) and file.endswith(one)), ""
+            (ending for ending in _ENDINGS if isinstance(file, str) and file.endswith(ending)), ""
         )
-        meant = _ENDINGS.get(ending, kind)
-        if meant != kind and (kind, meant) != ("xacro", "urdf"):
-            what = "a robot file" if meant == "spec" else f"a {ending[1:]} file"
-            yield (kind,), refused("TF106", f"{file} is {what}", f"{meant}: instead of {kind}:")
+        suffix_kind = _ENDINGS.get(ending, kind)
+        if suffix_kind != kind and (kind, suffix_kind) != ("xacro", "urdf"):
+            what = "a robot file" if suffix_kind == "spec" else f"a {ending[1:]} file"
+            yield (
+                (kind,),
+                refused("TF106", f"{file} is {what}", f"{suffix_kind}: instead of {kind}:"),
+            )
 
 
 # The robot

@@ -68,9 +68,9 @@ class Checked(Spec):
         """Yield what is wrong with the data together, with paths below them."""
         for keys in cls.EXCLUSIVE:
             if len(keys & data.keys()) > 1:
-                first, *others = given = [name for name in data if name in keys]
+                first, *others = present = [name for name in data if name in keys]
                 for name in others:
-                    advice = f"keep one of {', '.join(given)}"
+                    advice = f"keep one of {', '.join(present)}"
                     message = f"{name} and {first} exclude each other"
                     yield (
                         (name,),
@@ -122,10 +122,12 @@ def several(
     lines: list[InitErrorDetails] = [
         {"type": error, "loc": path, "input": None} for path, error in errors
     ]
-    for one in also.errors(include_url=False) if also else ():
-        kind, context = one["type"], one.get("ctx", {})
+    for problem in also.errors(include_url=False) if also else ():
+        kind, context = problem["type"], problem.get("ctx", {})
         error = refused(kind, **context) if kind.startswith("TF") else kind
-        lines.append({"type": error, "loc": one["loc"], "input": one["input"], "ctx": context})
+        lines.append(
+            {"type": error, "loc": problem["loc"], "input": problem["input"], "ctx": context}
+        )
     return ValidationError.from_exception_data("", lines)
 
 
@@ -174,8 +176,8 @@ def kinds_of(annotation: Any) -> Iterator[Any]:
     if origin is Annotated:
         yield from kinds_of(get_args(annotation)[0])
     elif origin in {Union, types.UnionType}:
-        for one in get_args(annotation):
-            yield from kinds_of(one)
+        for base in get_args(annotation):
+            yield from kinds_of(base)
     elif annotation is not type(None):
         yield annotation
 
@@ -200,7 +202,7 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
             field.name: FieldInfo.from_annotated_attribute(hints[field.name], field)
             for field in dataclasses.fields(kind)
         }
-    names = dict.fromkeys(name for one in kind.__mro__ for name in inspect.get_annotations(one))
+    names = dict.fromkeys(name for base in kind.__mro__ for name in inspect.get_annotations(base))
     return {fields[name].alias or name: fields[name] for name in names if name in fields}
 
 
@@ -225,9 +227,11 @@ def measure_of(annotation: Any) -> Measure | None:
     annotation = unnamed(annotation)
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
-        return next((one for one in more if isinstance(one, Measure)), None) or measure_of(inner)
+        return next(
+            (annotation for annotation in more if isinstance(annotation, Measure)), None
+        ) or measure_of(inner)
     if get_origin(annotation) in {Union, types.UnionType, tuple}:
-        return next((found for one in get_args(annotation) if (found := measure_of(one))), None)
+        return next((found for base in get_args(annotation) if (found := measure_of(base))), None)
     return None
 
 
@@ -280,10 +284,10 @@ def examples_of(field: FieldInfo) -> list[Any]:
     measure = measure_of(annotation)
     if measure:
         return [measure.example]
-    words = [
-        word
+    texts = [
+        text
         for kind in kinds_of(annotation)
         if get_origin(kind) is Literal
-        for word in get_args(kind)
+        for text in get_args(kind)
     ]
-    return words or [True for kind in kinds_of(annotation) if kind is bool]
+    return texts or [True for kind in kinds_of(annotation) if kind is bool]

@@ -160,9 +160,9 @@ def levels_of(validated: Validated, limits: Collection[str]) -> Iterator[tuple[s
     Off is that of a code whose entry was refused, or whose limit is not among ``limits``, by code:
     the default would not be what is meant.
     """
-    for section, word in sorted(validated.broken):
-        if section == "rules" and (code := code_of(word)) and can_be_allowed(code):
-            yield word, "off"
+    for section, level in sorted(validated.broken):
+        if section == "rules" and (code := code_of(level)) and can_be_allowed(code):
+            yield level, "off"
     for name, setting in validated.spec.rules.items():
         is_limited = isinstance(setting, RuleSpec) and setting.limit is not None
         yield (

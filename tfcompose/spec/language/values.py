@@ -134,7 +134,7 @@ class InARow:
         if items and len(items) == self.count:
             return f"write [{', '.join(items)}]"
         if isinstance(value, list) and self.count < len(value) <= 2 * self.count:
-            if len(value) == _OF_A_POSE and any(isinstance(one, float) for one in value):
+            if len(value) == _OF_A_POSE and any(isinstance(number, float) for number in value):
                 first, last = (", ".join(map(str, part)) for part in (value[:3], value[3:]))
                 return f"position and rotation are two keys: xyz: [{first}] and rpy: [{last}]"
             return f"decimals take a point: {self.sample}"

@@ -59,8 +59,8 @@ def load_calibration(text: str, file: str) -> tuple[Form, tuple[Source, ...]]:
 
 
 def _is_row(line: str) -> bool:
-    words = _WORD.findall(line) if len(line) < LONGEST_ROW else []
-    return len(words) > 1 and all(map(_NUMBER.fullmatch, words))
+    tokens = _WORD.findall(line) if len(line) < LONGEST_ROW else []
+    return len(tokens) > 1 and all(map(_NUMBER.fullmatch, tokens))
 
 
 def _documents(text: str, file: str) -> Iterator[Source]:
@@ -111,9 +111,9 @@ def _rows(lines: list[str], file: str) -> Source:
             continue
         row = [(m.group(), m.start() + 1, m.end() + 1) for m in _WORD.finditer(line)]
         line_span = Span(file, number, row[0][1], number, row[-1][2])
-        words = {i: Place(Span(file, number, a, number, b)) for i, (_, a, b) in enumerate(row)}
-        places[len(data)] = Place(line_span, words)
-        data.append([word for word, _, _ in row])
+        tokens = {i: Place(Span(file, number, a, number, b)) for i, (_, a, b) in enumerate(row)}
+        places[len(data)] = Place(line_span, tokens)
+        data.append([token for token, _, _ in row])
     first = places[0].span
     return Source(
         file, Place(Span(file, first.line, first.column, len(lines) + 1, 1), places), data
@@ -129,45 +129,45 @@ def _launch(text: str, file: str) -> Source:
     places: dict[str | int, Place] = {}
     data: Any = []
     found = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)
-    for words in found:
-        if not words:
+    for tokens in found:
+        if not tokens:
             continue
         inside = {
-            index: Place(lines.span(start, end)) for index, (_, start, end) in enumerate(words)
+            index: Place(lines.span(start, end)) for index, (_, start, end) in enumerate(tokens)
         }
-        places[len(data)] = Place(lines.span(words[0][1], words[-1][2]), inside)
-        data.append([word for word, _, _ in words])
+        places[len(data)] = Place(lines.span(tokens[0][1], tokens[-1][2]), inside)
+        data.append([token for token, _, _ in tokens])
     return Source(file, Place(Span(file), places), data)
 
 
 def _in_xml(text: str) -> Iterator[list[tuple[str, int, int]]]:
     for tag in _XML.finditer(text):
-        given = (
+        arguments = (
             _ARGS.search(tag.group())
             if PUBLISHER in tag.group() and tag.group()[1] != "!"
             else None
         )
-        if given:
-            which = 1 if given[1] is not None else 2
-            begin = tag.start() + given.start(which)
+        if arguments:
+            which = 1 if arguments[1] is not None else 2
+            begin = tag.start() + arguments.start(which)
             yield [
                 (m.group(), begin + m.start(), begin + m.end())
-                for m in re.finditer(r"\S+", given[which])
+                for m in re.finditer(r"\S+", arguments[which])
             ]
 
 
 def _in_python(text: str) -> Iterator[list[tuple[str, int, int]]]:
     """Yield the texts of the list that follows each mention of the publisher."""
-    words: list[tuple[str, int, int]] = []
+    tokens: list[tuple[str, int, int]] = []
     named = inside = False
     for token in _PYTHON.finditer(text):
         word = token[1] if token[1] is not None else token[2]
         if token.group() == "[":
             inside = named
         elif token.group() == "]" and inside:
-            yield words
-            words, named, inside = [], False, False
+            yield tokens
+            tokens, named, inside = [], False, False
         elif word is not None and inside:
-            words.append((word, token.start(), token.end()))
+            tokens.append((word, token.start(), token.end()))
         elif word == PUBLISHER:
             named = True

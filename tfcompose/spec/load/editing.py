@@ -56,8 +56,8 @@ class MappingKeys:
         """
         text = text_at(self.text, self.mapping.span)
         brace = text.find("{")
-        words = text[:brace].split() if brace >= 0 else [""]
-        return brace if all(word[:1] in {"&", "!"} for word in words) else -1
+        tokens = text[:brace].split() if brace >= 0 else [""]
+        return brace if all(token[:1] in {"&", "!"} for token in tokens) else -1
 
     def insertion(self, values: Mapping[str, str], after: tuple[str, ...] = ()) -> Edit:
         """Return the edit that adds keys after the last of the keys ``after`` that exists."""

@@ -129,7 +129,7 @@ class _ParamsReader:
                 )
                 continue
             name = f"{above}/{key.value}" if above else key.value
-            inner = next((item for one, item in value.value if one.value == PARAMETERS), None)
+            inner = next((item for key, item in value.value if key.value == PARAMETERS), None)
             if inner is None:
                 self.nodes(value, name)
             elif isinstance(inner, yaml.MappingNode):

@@ -47,7 +47,7 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> list[Finding
     )
     if "parsing a flow" in message and "${" in fault.stopped:
         bare = list(bare_expressions(text, file))
-        if any(one.span and one.span.line == fault.at[0] + 1 for one in bare):
+        if any(span.span and span.span.line == fault.at[0] + 1 for span in bare):
             return bare
     diagnosis = next((found for known in _DIAGNOSES if (found := known(fault))), None)
     line, column = diagnosis.at if diagnosis else fault.at
@@ -209,11 +209,11 @@ def _key_without_colon(fault: _Fault) -> _Diagnosis | None:
 
 def _no_colon(line: str, at: tuple[int, int]) -> _Diagnosis:
     """Return the diagnosis of a line without a colon: a key alone, or a key and its value."""
-    words = _WORDS.fullmatch(line)
-    if words:
-        return _Diagnosis(at, f"{words[2]} has no colon", f"write {words[2]}: {words[3].strip()}")
-    word = line.split(" #", maxsplit=1)[0].strip()
-    return _Diagnosis(at, f"{word} has no colon", f"write {word}:")
+    pair = _WORDS.fullmatch(line)
+    if pair:
+        return _Diagnosis(at, f"{pair[2]} has no colon", f"write {pair[2]}: {pair[3].strip()}")
+    text = line.split(" #", maxsplit=1)[0].strip()
+    return _Diagnosis(at, f"{text} has no colon", f"write {text}:")
 
 
 def _is_late(fault: _Fault) -> bool:
@@ -242,8 +242,8 @@ def _pair_above(fault: _Fault) -> _Diagnosis | None:
     if glued:
         message = f"a space after the colon of {glued[2]} is missing"
         return _Diagnosis((above, len(glued[1])), message, f"write {glued[2]}: {glued[3]}")
-    words = _WORDS.fullmatch(line)
-    return _no_colon(line, (above, len(words[1]))) if words else None
+    pair = _WORDS.fullmatch(line)
+    return _no_colon(line, (above, len(pair[1]))) if pair else None
 
 
 def _two_in_a_line(fault: _Fault) -> _Diagnosis | None:

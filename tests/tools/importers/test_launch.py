@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -250,12 +251,17 @@ def test_files_that_a_launch_file_writes_come_with_the_robot_file(
     _, data = import_of(source(tmp_path, "a.launch.py", WRITING))
     process = data["processes"]["n"]
     assert process["params"]["file"] == "a_params/tmp0.yaml"
-    assert process["run"]["args"] == ["-d", "${file(a_params/view.rviz)}"]
+    assert process["run"]["args"] == [
+        "-d",
+        "${file(a_params/view.rviz)}",
+        "${file(a_params/tmp1.txt)}",
+    ]
     made = {path.name: path.read_text("utf-8") for path in (tmp_path / "a_params").iterdir()}
     assert yaml.safe_load(made["tmp0.yaml"])["n"]["ros__parameters"] == {"speed": 1.5}
     assert made["view.rviz"] == "Fixed Frame: map\n"
+    assert made["tmp1.txt"] == "left right"
     assert not (tmp_path / "cache").exists()
-    lines = [f"a.launch.py:{line}" for line in (16, 17)]
+    lines = [f"a.launch.py:{line}" for line in (20, 21)]
     assert places(printed_errors(capsys), "TF020") == lines, "an empty folder, an unused file"
 
 
@@ -268,6 +274,10 @@ def generate_launch_description():
     here = Path(__file__).parent
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
         yaml.dump({"n": {"ros__parameters": {"speed": 1.5}}}, file)
+    number, path = tempfile.mkstemp(suffix=".txt")
+    os.write(number, b"left ")
+    with os.fdopen(number, "a") as more:
+        more.write("right")
     os.makedirs(here / "cache", exist_ok=True)
     view = here / "cache" / "view.rviz"
     view.write_text("Fixed Frame: map\\n")
@@ -277,7 +287,7 @@ def generate_launch_description():
     os.mkdir(here / "empty")
     open(here / "unused", "w").close()
     return LaunchDescription([Node(package="p", executable="e", name="n", parameters=[file.name],
-                                   arguments=["-d", str(view)])])
+                                   arguments=["-d", str(view), path])])
 """
 
 
@@ -326,22 +336,105 @@ def generate_launch_description():
 """
 
 
-def test_a_root_key_that_a_parameter_file_would_be_put_below_is_named(
+#: What nav2_common makes of PARAMETERS, by the arguments of its RewrittenYaml.
+REWRITES: dict[str, tuple[str, dict[str, Any]]] = {
+    "a_key_at_any_depth": (
+        "{'verbose': 'True'}",
+        {"n": {"verbose": True, "plugin": {"rate": 5.0}}, "m": {"verbose": True}},
+    ),
+    "a_mapping_by_its_key": (
+        "{'plugin': 'none'}",
+        {"n": {"verbose": False, "plugin": "none"}, "m": {"verbose": False}},
+    ),
+    "a_path": (
+        "{'n.ros__parameters.plugin.rate': '7', 'm.ros__parameters.verbose': 'true'},",
+        {"n": {"verbose": False, "plugin": {"rate": "7"}}, "m": {"verbose": True}},
+    ),
+    "a_path_that_is_added": (
+        "{'n.ros__parameters.map.file': 'a.yaml', 'n.plugin.depth': '1'}",
+        {
+            "n": {"verbose": False, "plugin": {"rate": 5.0}, "map": {"file": "a.yaml"}},
+            "m": {"verbose": False},
+        },
+    ),
+    "types": (
+        "{'rate': '3', 'verbose': '1.2.3'}, convert_types=True",
+        {"n": {"verbose": "1.2.3", "plugin": {"rate": 3}}, "m": {"verbose": "1.2.3"}},
+    ),
+    "no_types": (
+        "{'rate': '3'}",
+        {"n": {"verbose": False, "plugin": {"rate": "3"}}, "m": {"verbose": False}},
+    ),
+    "keys_and_values": (
+        "{}, key_rewrites={'plugin': 'other'}, value_rewrites={'5.0': '6'}, convert_types=True",
+        {"n": {"verbose": False, "other": {"rate": 6}}, "m": {"verbose": False}},
+    ),
+}
+PARAMETERS = """
+n: {ros__parameters: {verbose: false, plugin: {rate: 5.0}}}
+m: {ros__parameters: {verbose: false}}
+"""
+REWRITTEN = """
+from launch import LaunchDescription
+from launch.conditions import IfCondition
+from launch_ros.actions import Node
+from launch_ros.descriptions import ParameterFile
+from nav2_common.launch import HasNodeParams, ReplaceString, RewrittenYaml
+def generate_launch_description():
+    params = MADE
+    return LaunchDescription([Node(package="p", executable="e", name="n", parameters=[params])])
+"""
+
+
+@pytest.mark.parametrize(("rewrites", "expected"), REWRITES.values(), ids=REWRITES)
+def test_nav2_common_rewrites_a_parameter_file_beside_the_robot_file(
+    rewrites: str, expected: dict[str, Any], tmp_path: Path
+) -> None:
+    made = f"RewrittenYaml('{source(tmp_path, 'nav2.yaml', PARAMETERS)}', {rewrites})"
+    written = rewritten(made, tmp_path)
+    assert {name: one["ros__parameters"] for name, one in written.items()} == expected
+
+
+def rewritten(made: str, folder: Path) -> Any:
+    """Return the one parameter file that import writes for what nav2_common makes."""
+    _, data = import_of(source(folder, "a.launch.py", REWRITTEN.replace("MADE", made)))
+    assert data["processes"]["n"]["params"] == {"file": "a_params/nav2.yaml"}
+    (file,) = (folder / "a_params").iterdir()
+    return yaml.safe_load(file.read_text("utf-8"))
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        "RewrittenYaml(FILE, {}, root_key='front')",
+        "RewrittenYaml(ReplaceString(FILE, {'5.0': '5.0'}), {}, root_key='front')",
+        "RewrittenYaml(FILE, {}, root_key=HasNodeParams(FILE, 'n'), key_rewrites={})",
+        "ParameterFile(RewrittenYaml(FILE, {}, root_key='$(env NAME front)'), allow_substs=True)",
+    ],
+)
+def test_what_nav2_common_makes_of_a_file_it_makes_more_of(made: str, tmp_path: Path) -> None:
+    path = repr(str(source(tmp_path, "nav2.yaml", PARAMETERS)))
+    (name,) = rewritten(made.replace("FILE", path), tmp_path)
+    assert name == ("True" if "HasNode" in made else "front")
+
+
+def test_a_file_that_nav2_common_leaves_as_it_is_is_named(tmp_path: Path) -> None:
+    source(tmp_path, "nav2.yaml", PARAMETERS)
+    path = repr(str(tmp_path / "nav2.yaml"))
+    made = f"ReplaceString({path}, {{'5.0': '6.0'}}, condition=IfCondition('false'))"
+    for unchanged in (made, f"RewrittenYaml({path}, {{}})"):
+        file = source(tmp_path, "a.launch.py", REWRITTEN.replace("MADE", unchanged))
+        assert import_of(file)[1]["processes"]["n"]["params"] == {"file": "nav2.yaml"}
+
+
+def test_changes_in_a_file_of_a_package_that_is_not_found_are_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text, _ = import_of(source(tmp_path, "a.launch.py", ROOT_KEY), code=None)
-    assert places(printed_errors(capsys), "TF020") == ["a.launch.py:6"]
-    assert "below front" in text
-
-
-ROOT_KEY = """
-from launch import LaunchDescription
-from launch_ros.actions import Node
-from nav2_common.launch import RewrittenYaml
-def generate_launch_description():
-    params = RewrittenYaml(source_file="a.yaml", root_key="front", param_rewrites={}, convert_types=True)
-    return LaunchDescription([Node(package="p", executable="e", name="n", parameters=[params])])
-"""  # noqa: E501 (a text as its reader has it)
+    made = "RewrittenYaml('package://nav2/a.yaml', {'verbose': 'true'}, root_key='front')"
+    file = source(tmp_path, "a.launch.py", REWRITTEN.replace("MADE", made))
+    text, _ = import_of(file, code=None)
+    assert "a.launch.py:8" in places(printed_errors(capsys), "TF020")
+    assert "verbose: true, all of it below: front" in text
 
 
 def test_an_argument_that_is_the_clock_of_all_nodes_is_the_robots(tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 """Modules that launch files import, in the place of others or of what is not installed.
 
 ``ament_index_python`` finds packages around the launch file too, xacro and MoveIt keep which files
-they read, and nav2_common names what it would change in a parameter file. Modules that are not
-installed give values that do nothing, and are named.
+they read, and nav2_common changes parameter files without a disk. Modules that are not installed
+give values that do nothing, and are named.
 
 This runs in the process that reads launch files (``launch_process``), with ROS's own ``launch``.
 """
@@ -20,18 +20,17 @@ from typing import TYPE_CHECKING, Any
 import ament_index_python.packages
 import launch
 import launch_ros.substitutions.find_package
-import yaml
-from launch.substitutions import LaunchConfiguration
 
 from tfcompose.tools.importers.launch_moveit import MoveItConfigsBuilder
-from tfcompose.tools.importers.launch_objects import here
-from tfcompose.tools.importers.launch_parameters import text_of
-from tfcompose.tools.importers.launch_records import (
-    PACKAGE,
-    FailedError,
-    placeholder,
-    with_package,
+from tfcompose.tools.importers.launch_nav2 import (
+    HasNodeParams,
+    LaunchConfigAsBool,
+    ParseMultiRobotPose,
+    ReplaceString,
+    RewrittenYaml,
 )
+from tfcompose.tools.importers.launch_objects import here
+from tfcompose.tools.importers.launch_records import PACKAGE, FailedError, placeholder
 
 if TYPE_CHECKING:
     from tfcompose.tools.importers.launch_context import RecordingContext
@@ -81,11 +80,11 @@ def _replaced(context: RecordingContext) -> dict[str, dict[str, Any]]:
             "process_doc": lambda *_args, **_more: None,
         },
         "nav2_common": {
-            "RewrittenYaml": _Rewritten,
-            "ReplaceString": _Rewritten,
-            "HasNodeParams": _HasNode,
-            "LaunchConfigAsBool": _AsBool,
-            "ParseMultiRobotPose": functools.partial(_RobotPoses, context),
+            "RewrittenYaml": RewrittenYaml,
+            "ReplaceString": ReplaceString,
+            "HasNodeParams": HasNodeParams,
+            "LaunchConfigAsBool": LaunchConfigAsBool,
+            "ParseMultiRobotPose": functools.partial(ParseMultiRobotPose, context),
         },
         "moveit_configs_utils": {
             "MoveItConfigsBuilder": functools.partial(MoveItConfigsBuilder, share, context)
@@ -216,73 +215,3 @@ class _Document:
         return self.text
 
     toprettyxml = toxml
-
-
-class _AsBool(LaunchConfiguration):  # type: ignore[misc]
-    """nav2_common's: an argument as True or False, however it is written."""
-
-    def __init__(self, name: Any) -> None:
-        super().__init__(name)
-
-    def perform(self, context: Any) -> str:
-        text = super().perform(context)
-        return str(text.strip().lower() in {"true", "1", "yes", "on", "y", "t"})
-
-
-class _FromFile(launch.Substitution):  # type: ignore[misc]
-    """A substitution of nav2_common's about a parameter file."""
-
-    def __init__(self, **given: Any) -> None:
-        super().__init__()
-        self.at, self.given = here(), given
-
-    def _file(self, context: Any) -> str:
-        return with_package(text_of(self.given.get("source_file", ""), context))
-
-
-class _Rewritten(_FromFile):
-    """nav2_common's RewrittenYaml and ReplaceString.
-
-    The file as it is, and what would be changed in it.
-    """
-
-    def perform(self, context: Any) -> str:
-        file = self._file(context)
-        changes = self.given.get("param_rewrites") or self.given.get("replacements") or {}
-        root = text_of(self.given.get("root_key") or "", context).strip("/")
-        several = [f"all is put below {root}"] if root else []
-        several += [
-            f"{text_of(key, context)}: {text_of(value, context)}" for key, value in changes.items()
-        ]
-        if several:
-            context.todo(self.at, f"changes in {Path(file).name}: {', '.join(several)}")
-        return file
-
-
-class _HasNode(_FromFile):
-    """nav2_common's HasNodeParams: whether a parameter file has a node."""
-
-    def perform(self, context: Any) -> str:
-        file, node = self._file(context), text_of(self.given.get("node_name", ""), context)
-        try:
-            data = yaml.safe_load(Path(file).read_text("utf-8"))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise FailedError(f"{file} cannot be read: {error}") from None
-        return str(isinstance(data, dict) and node in data)
-
-
-class _RobotPoses:
-    """nav2_common's ParseMultiRobotPose.
-
-    Poses of robots, which it takes from the command line of ``ros2 launch``.
-    """
-
-    def __init__(self, context: RecordingContext, argument: str) -> None:
-        context.todo(
-            here(),
-            f"the argument {argument}, which ParseMultiRobotPose takes from the command line",
-        )
-
-    def value(self) -> dict[str, Any]:
-        """Return no robots."""
-        return {}

@@ -221,7 +221,15 @@ def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
     if "$(" not in source:
         return file
     parts = evaluated(lambda _: parse_substitution(source), context)
-    text = text_of(parts, context)
+    return made_file(file, source, text_of(parts, context), at, context)
+
+
+def made_file(file: str, source: str, text: str, at: Any, context: RecordingContext) -> str:
+    """Return the path that stands for what launch makes of a file's text.
+
+    Raises:
+        FailedError: if it holds what a command makes of a file.
+    """
     if files_in(with_files(text)):
         raise FailedError(f"{relative(file)} takes what a command makes of a file")
     unknown = set(re.findall(rf"{PACKAGE}\w+", text)) - set(re.findall(rf"{PACKAGE}\w+", source))

@@ -142,7 +142,7 @@ def _watch(  # noqa: C901 (one hook after another)
     With ``readable`` paths it may do nothing else but read these.
     """
     noted: set[str] = set()
-    saved = SavedFiles(recording)
+    saved = SavedFiles(recording, null)
 
     def note(what: str) -> None:
         if what not in noted:
@@ -195,10 +195,10 @@ def _watch(  # noqa: C901 (one hook after another)
         return 0
 
     def opened(file: Any, mode: str = "r", *args: Any, **more: Any) -> Any:
-        path = with_package(os.fspath(file)) if isinstance(file, (str, os.PathLike)) else ""
+        path = with_package(os.fspath(file)) if isinstance(file, (str, os.PathLike)) else file
         if path == os.devnull:
             return plain_open(os.dup(null), mode, *args, **more)
-        kept = saved.open(str(path), mode) if path else None
+        kept = saved.open(path, mode) if isinstance(path, (str, int)) else None
         if kept is not None:
             return kept
         if str(path).startswith(PACKAGE):
@@ -208,6 +208,7 @@ def _watch(  # noqa: C901 (one hook after another)
     plain_open = builtins.open
     hooks: list[tuple[Any, str, Any]] = [
         (os, "system", system),
+        (os, "write", saved.write),
         (os, "makedirs", saved.folder),
         (os, "mkdir", saved.folder),
         (Path, "mkdir", saved.folder),
@@ -220,6 +221,7 @@ def _watch(  # noqa: C901 (one hook after another)
         (builtins, "open", opened),
         (io, "open", opened),
         (tempfile, "mktemp", saved.temporary),
+        (tempfile, "mkstemp", saved.described),
         (tempfile, "NamedTemporaryFile", saved.named),
     ]
     for owner, name, hook in hooks:

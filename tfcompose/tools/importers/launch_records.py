@@ -56,7 +56,7 @@ class LaunchRecording:
         #: Those whose value decided something that stands in the robot file as it is now.
         self.decided: set[str] = set()
         self.depth = 0
-        #: The texts of files that launch makes, by the paths that stand for them.
+        #: The texts of files that launch or its file makes, by the paths that stand for them.
         self.files: dict[str, str] = {}
 
     def here(self) -> tuple[str, int]:
@@ -71,8 +71,10 @@ class LaunchRecording:
 
     def made_file(self, source: str, text: str) -> str:
         """Keep the text that launch makes of a file; return the path that stands for it."""
+        source = os.path.abspath(source)  # noqa: PTH100 (links stay)
+        begin = source.rpartition("#")[0] if source in self.files else source
         for number in itertools.count(1):
-            path = f"{source}#{number}"
+            path = f"{begin}#{number}"
             if self.files.setdefault(path, text) == text:
                 return path
         raise AssertionError

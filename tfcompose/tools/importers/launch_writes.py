@@ -19,24 +19,31 @@ if TYPE_CHECKING:
 #: So much one file may hold, in characters or bytes.
 MOST = 1_000_000
 _READABLE = frozenset("rbt")
+_write = os.write
 
 
 class SavedFiles:
     """What a launch file has written, by path.
 
-    It reads its files back as others. ``finish`` hands them to the recording, and says what else
-    it would have made: folders without such a file, and temporary names without one.
+    It reads its files back as others, and those that launch makes. ``finish`` says what else it
+    would have made: folders without such a file, and temporary names without one.
     """
 
-    def __init__(self, recording: LaunchRecording) -> None:
-        self.texts: dict[str, str] = {}
+    def __init__(self, recording: LaunchRecording, null: int) -> None:
+        self.texts = recording.files
+        self._null = null
+        #: The paths of files that are open by a number alone.
+        self._descriptors: dict[int, str] = {}
         self._recording = recording
         self._folders: dict[str, tuple[str, int]] = {}
         self._temporary: dict[str, tuple[str, int]] = {}
 
-    def open(self, path: str, mode: str) -> Any | None:
+    def open(self, file: str | int, mode: str) -> Any | None:
         """Return a file as ``open`` does, or None where it is to be opened on the disk."""
-        path = os.path.abspath(path)  # noqa: PTH100 (links stay)
+        name = self._descriptors.get(file) if isinstance(file, int) else file
+        if name is None:
+            return None
+        path = os.path.abspath(name)  # noqa: PTH100 (links stay)
         kind = _BytesFile if "b" in mode else _TextFile
         if set(mode) <= _READABLE:
             return kind(path, self.texts[path], lambda _: None) if path in self.texts else None
@@ -46,9 +53,9 @@ class SavedFiles:
         if path not in self.texts:
             self.texts[path] = ""
             self._recording.record("file", self._recording.here(), path=path)
-        file = kind(path, before, lambda text: self.texts.update({path: text[:MOST]}))
-        file.seek(0, io.SEEK_END)
-        return file
+        made = kind(path, before, lambda text: self.texts.update({path: text[:MOST]}))
+        made.seek(0, io.SEEK_END)
+        return made
 
     def named(
         self,
@@ -61,6 +68,29 @@ class SavedFiles:
     ) -> Any:
         """Return a file with a name, as tempfile's NamedTemporaryFile does."""
         return self.open(self._name(suffix, prefix, dir), mode.replace("+", ""))
+
+    def described(
+        self,
+        suffix: str | None = None,
+        prefix: str | None = None,
+        dir: str | None = None,  # noqa: A002 (as tempfile has it)
+        text: bool = False,  # noqa: FBT001, FBT002 (as tempfile has it)
+    ) -> tuple[int, str]:
+        """Return a descriptor and a name, as tempfile's mkstemp does."""
+        del text
+        path = self._name(suffix, prefix, dir)
+        self.open(path, "w")
+        descriptor = os.dup(self._null)
+        self._descriptors[descriptor] = path
+        return descriptor, path
+
+    def write(self, descriptor: int, data: bytes) -> int:
+        """Write as ``os.write`` does."""
+        file = self.open(descriptor, "ab")
+        if file is None:
+            return _write(descriptor, data)
+        with file:
+            return int(file.write(data))
 
     def temporary(
         self,
@@ -83,8 +113,7 @@ class SavedFiles:
         self._folders.setdefault(name, self._recording.here())
 
     def finish(self) -> None:
-        """Hand what was written to the recording."""
-        self._recording.files |= self.texts
+        """Say what else would have been made."""
         for path, at in self._folders.items():
             if not any(PurePath(file).is_relative_to(path) for file in self.texts):
                 self._recording.todo(at, f"the folder {path} would be made: not done")

@@ -387,12 +387,12 @@ def generate_launch_description():
 
 
 @pytest.mark.parametrize(("rewrites", "expected"), REWRITES.values(), ids=REWRITES)
-def test_nav2_common_rewrites_a_parameter_file_beside_the_robot_file(
+def test_a_parameter_file_has_the_rewrites_of_nav2_common(
     rewrites: str, expected: dict[str, Any], tmp_path: Path
 ) -> None:
     made = f"RewrittenYaml('{source(tmp_path, 'nav2.yaml', PARAMETERS)}', {rewrites})"
-    written = rewritten(made, tmp_path)
-    assert {name: one["ros__parameters"] for name, one in written.items()} == expected
+    nodes = rewritten(made, tmp_path)
+    assert {name: node["ros__parameters"] for name, node in nodes.items()} == expected
 
 
 def rewritten(made: str, folder: Path) -> Any:

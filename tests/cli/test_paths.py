@@ -143,7 +143,6 @@ EXCEPTIONS = {
     "tools/deploy/command.py": "wheels, as above",
     "tools/view/page.py": "its own data",
     "tools/importers/launch_process.py": "runs confined, and answers errors",
-    "tools/importers/launch_modules.py": "runs confined",
     "tools/importers/launch_moveit.py": "runs confined",
     "tools/importers/launch_records.py": "runs confined, but for names that it shows",
     "tools/importers/launch_ros1.py": "runs confined",

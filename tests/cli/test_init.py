@@ -9,6 +9,7 @@ import pytest
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tfcompose.cli.commands.init import FOLDER, TEMPLATES
+from tfcompose.model.plan.file import read_plan
 
 
 @pytest.mark.parametrize("template", TEMPLATES)
@@ -20,6 +21,25 @@ def test_a_template_lints_in_every_profile_and_builds_under_its_new_name(
     assert linted.returncode == 0, linted.stdout
     assert tfcompose_in(tmp_path, "build").returncode == 0
     assert (tmp_path / "build" / "my_robot" / "plan.json").is_file()
+
+
+@pytest.mark.parametrize(
+    ("template", "process", "program"),
+    [
+        ("diffbot", "base_drive", "${executable:ros_gz_bridge/parameter_bridge}"),
+        ("rover", "base_drive", "${executable:ros_gz_bridge/parameter_bridge}"),
+        ("arm", "simulator", "${executable:mujoco_ros2_control/ros2_control_node}"),
+    ],
+)
+def test_profile_sim_starts_what_takes_the_simulators_place_with_its_clock(
+    template: str, process: str, program: str, tmp_path: Path
+) -> None:
+    assert tfcompose_in(tmp_path, "init", template).returncode == 0
+    assert tfcompose_in(tmp_path, "build", "-p", "sim", "-o", "out").returncode == 0
+    plan = read_plan((tmp_path / "out" / "plan.json").read_text("utf-8"), "plan.json")
+    started = plan.process(process)
+    assert started.argv[0] == program
+    assert started.argv[-1] == "use_sim_time:=true"
 
 
 def test_every_template_is_listed_and_no_file_is_left_out() -> None:

@@ -125,11 +125,26 @@ def test_the_guard_names_the_switch_of_a_node_that_publishes_by_default(switch: 
     expect(history.only(), "TF801", "/diff", "by default", switch)
 
 
-def test_the_tree_of_a_simulator_is_named_as_such_with_its_switch() -> None:
+@pytest.mark.parametrize(
+    ("node", "simulator", "switch"),
+    [
+        ("/sim/ros_gz_bridge", "Gazebo", "config_file"),
+        ("/_World_Graph_ros2_publish_transform_tree_01", "Isaac Sim", "targetPrims"),
+    ],
+)
+def test_the_tree_of_a_simulator_is_named_as_such_with_its_switch(
+    node: str, simulator: str, switch: str
+) -> None:
     history = History().clear()
     history.repeat(history.joins("/drive"), "odom base", 5)
-    history.repeat(history.joins("/sim/ros_gz_bridge"), "odom base", 10)
-    expect(history.only(), "TF801", "/sim/ros_gz_bridge", "Gazebo", "config_file")
+    history.repeat(history.joins(node), "odom base", 10)
+    expect(history.only(), "TF801", node, simulator, switch)
+
+
+def test_undeclared_edges_of_a_simulator_are_named_as_its_tree() -> None:
+    history = History().clear()
+    history.repeat(history.joins("/ros_gz_bridge"), "rover rover/cup", 10)
+    expect(history.only(), "TF803", "/ros_gz_bridge", "Gazebo", "config_file")
 
 
 def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:

@@ -484,8 +484,9 @@ def node_text(preset: dict[str, Any], columns: int | None = None) -> str:
     parts = [
         f"{preset['name']}  the node {preset['node']} of {preset['package']}\n{preset['about']}"
     ]
+    claims = [_claim_text(claim) for claim in preset["publishes"]] or ["no edge by itself"]
     parts.append("publishes" + (", one of these" if preset["one_of"] else ""))
-    parts[-1] += "".join(f"\n  {_claim_text(claim)}" for claim in preset["publishes"])
+    parts[-1] += "".join(f"\n  {claim}" for claim in claims)
     if preset["frames"]:
         width = max(map(len, preset["frames"]))
         lines = [

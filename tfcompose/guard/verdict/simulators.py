@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-#: The trees that nodes pass on, by the nodes' names, and where each is switched off. ros_gz_bridge
-#: has no parameter for it: its ``config_file``, or its arguments, say what is passed on.
+#: What nodes publish of a simulator, and where that is switched off, by patterns of the nodes'
+#: names. None of them has a parameter for it. ros_gz_bridge passes on what its ``config_file`` or
+#: its arguments name. Isaac Sim's node has the name of a prim of an action graph, with ``_`` for
+#: each ``/``; its name by default is that of its type.
 _TREES = {
-    "ros_gz_bridge": "the tree of Gazebo: take /tf out of its config_file or its arguments, or"
-    " give that another ROS topic there"
+    "ros_gz_bridge": "passes on the tree of Gazebo: take /tf out of its config_file or its"
+    " arguments, or give that another ROS topic there",
+    "*publish_transform_tree*": "publishes the tree of Isaac Sim: take the robot out of its"
+    " targetPrims, or give it another topicName than tf",
 }
 
 
 def switch_of_simulator(nodes: Iterable[str]) -> str:
-    """Return whose tree one of these nodes passes on and its switch, empty for other nodes."""
+    """Return whose tree one of these nodes publishes and its switch, empty for other nodes."""
     for node in nodes:
-        if tree := _TREES.get(node.rpartition("/")[2]):
-            return f"{node} passes on {tree}"
+        for pattern, tree in _TREES.items():
+            if fnmatchcase(node.rpartition("/")[2], pattern):
+                return f"{node} {tree}"
     return ""

@@ -1,4 +1,4 @@
-"""How the options of one command are read, and what is said where they are wrong."""
+"""Parser of one command's options, with a way out in each error."""
 
 from __future__ import annotations
 

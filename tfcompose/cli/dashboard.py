@@ -1,6 +1,4 @@
-"""What the live view of ``up`` shows.
-
-Pages of lines for a terminal of any size, and what each key does.
+"""Live view of ``up``: pages of lines for a terminal of any size, and the keys that change them.
 
 It knows what it is given: notices and answers of the launcher, the plan, what processes use, and
 lines of logs. Lines are rich's texts, because characters of several columns count there as a

@@ -1,7 +1,4 @@
-"""What the commands share that observe a running tree, or read a recording.
-
-The topics, and what can be in the way.
-"""
+"""Options, topics and checks shared by the commands that observe a tree or read a recording."""
 
 from __future__ import annotations
 

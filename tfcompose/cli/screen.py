@@ -1,4 +1,4 @@
-"""What is drawn again in its place on a terminal.
+"""Screen that redraws its changed rows in place on a terminal.
 
 A drawing sends the rows that changed since the last one: a view that changes 20 times a second
 costs a slow link a few rows, and not a screen, each time.

@@ -1,6 +1,6 @@
-"""How ``up`` starts a robot here.
+"""Start of a robot on this machine by ``up``.
 
-It checks first all that the plan needs, then makes the runtime directory.
+It checks all that the plan needs, and then makes the runtime directory.
 
 With ``-d`` the launcher goes on in the background, and the command follows it until the robot is
 up.

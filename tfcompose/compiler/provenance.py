@@ -1,4 +1,4 @@
-"""Where the values stand that an edge was made of."""
+"""Provenance of an edge: the places of the values that it was made of."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tfcompose says about a robot: findings with a code, a place and a way out.
+"""Findings about a robot: a code, a message, a place and a way out.
 
 One space of codes serves lint, guard and the live tools, so that a second publisher that was
 predicted and one that was seen read alike. A code is never used again for something else.

@@ -1,6 +1,4 @@
-"""How commands and processes of tfcompose's own take signals.
-
-None is lost, and each ends whoever waits.
+"""Signals for tfcompose's commands and processes: none is lost, and each ends any wait.
 
 While a command loads, Ctrl-C ends it also where Python can raise nothing: Python throws an
 exception away that comes up in a callback of its own, such as those that its import system has,

@@ -1,6 +1,4 @@
-"""What the guard has containers load and unload.
-
-By orders of the launcher, or, where there is none, by itself.
+"""Loading and unloading of components in containers, with or without a launcher's orders.
 
 A container is asked one thing at a time, in the order of the orders. Where no launcher gives
 orders, in units and containers of an export, the guard looks at each container now and then, and

@@ -1,6 +1,4 @@
-"""What the guard requests from nodes.
-
-Whether gates that the plan waits for are open, and whether switches apply.
+"""Checks that the guard makes on nodes: gates that the plan waits for, and switches.
 
 Gates are topics, services, and the lifecycle states of nodes, which the guard may also drive.
 Where no launcher gives orders, in units and containers, the guard brings nodes into their states

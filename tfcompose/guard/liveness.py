@@ -1,4 +1,4 @@
-"""Whether owners send what they own, often enough: arrivals, judged at given times.
+"""Liveness of owners: arrivals of their edges, judged at given times.
 
 Edges that have always come together share one history. At first those of one owner do, and a
 message that holds only some of them parts them; so a message costs what it brings, however many

@@ -1,6 +1,4 @@
-"""What a strict guard passes on.
-
-Of what the plan's own processes send, which is fenced off, that which is theirs.
+"""Relay of a strict guard: it passes on what each process owns, of all that it sends.
 
 A message that is all its sender's goes on as it is, byte for byte. Of others what is not is left
 out. Each sender of fixed edges has a latched publisher here, so that late joiners get all of them

@@ -1,4 +1,4 @@
-"""What the launcher answers to other commands, and what another plan changes about a run."""
+"""Answers of the launcher to other commands, and the effects of a changed plan on a run."""
 
 from __future__ import annotations
 

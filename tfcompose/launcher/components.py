@@ -1,4 +1,4 @@
-"""What becomes of components: nodes that the guard has containers load and unload.
+"""Lifecycle of components: nodes that the guard has containers load and unload.
 
 A component has no operating system's process of its own. It is started by an order to the guard,
 runs once its container has answered, and goes with the container; a guard that follows another is

@@ -1,4 +1,4 @@
-"""What can happen to the process machine, and what it decides: values only.
+"""Events and actions of the process machine, as values.
 
 What the guard reports and what other commands request are events too; they are in
 ``tfcompose.model.messages``.

@@ -1,4 +1,4 @@
-"""What the kernel is told of a process before its program begins, and what it would refuse.
+"""Kernel settings of a process: applied before its program starts, and checked beforehand.
 
 A setting is a row of ``SETTINGS``: the process's key, what sets it for the calling process, and
 what asks beforehand without leaving a trace in this one.

@@ -1,4 +1,4 @@
-"""What the launcher does next: a pure function of what is known, what happened, and the time.
+"""Process machine: the next state and actions, as a function of state, event and time.
 
 The guard is started first, after what it waits for itself, and listens; once it reports that
 nobody publishes a planned edge, the others follow in the plan's order, each when what it waits for

@@ -1,6 +1,4 @@
-"""Where the launcher's notices and the output of processes go.
-
-To a person, to the control socket, and into files.
+"""Output of the launcher and its processes: to the terminal, the control socket and log files.
 
 The robot does not wait for its reader: a terminal that was stopped, a pipe to a pager. What cannot
 be written at once is kept, up to a limit; beyond it, lines of processes are left out and counted,

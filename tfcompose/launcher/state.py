@@ -1,6 +1,4 @@
-"""What the process machine knows, and one step of it while it is being taken.
-
-What is known, and what is to be done.
+"""State of the process machine, and one transition of it with its actions.
 
 Times are seconds of one monotonic clock. What is known are values only: a step replaces them.
 """

@@ -1,4 +1,4 @@
-"""How everything, or one process, is stopped, and what becomes of a process that ended.
+"""Stop of the robot or of one process, and the end of a process: restart, failure or removal.
 
 A process is first sent its own signal, then SIGTERM, then SIGKILL, each when the one before did
 not help. One that ends is started again after a while, is requested by name, or leaves the plan.

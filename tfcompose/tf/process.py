@@ -1,6 +1,4 @@
-"""What every process of tfcompose's own begins with.
-
-Arguments, signals, the plan, the word to go on, and its output.
+"""Common start of tfcompose's own processes: arguments, signals, plan, release and output.
 
 Publishers and the guard are such processes: ``tfcompose KIND PLAN_FILE PROCESS_NAME``. This
 module imports no ROS.

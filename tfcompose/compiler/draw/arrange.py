@@ -1,4 +1,4 @@
-"""Whether a picture goes to the right, down, or in columns.
+"""Arrangement of a picture: to the right, down, or in columns.
 
 In columns the subtrees below the frame where the tree first branches stand side by side. The
 frames above it stay in a row on top, from where one line runs along the top of all columns, and

@@ -1,4 +1,4 @@
-"""What sensors see of their own robot: rays from a stream's frame, and the bodies that they hit.
+"""Rays from the frame of a sensor's stream, and the bodies of the robot that they hit.
 
 Pure functions of a ``Robot``; boxes, cylinders, spheres and capsules need no library, and meshes
 are hit where trimesh is installed.

@@ -1,6 +1,6 @@
-"""What nodes publish by themselves.
+"""Settlement of claims: the edges that a node publishes by itself.
 
-Switched off where another process owns the edge, under the names of its frames.
+They are switched off where another process owns them, and get the names of the robot's frames.
 
 A claim that cannot be settled by parameters of a process that tfcompose starts is a finding, with
 the exact switch.

@@ -1,4 +1,4 @@
-"""What the streams of a sensor see: the preset's values, with the user's over them."""
+"""Optics of a sensor's streams: the preset's values, with the user's over them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a robot file sets about rules.
-
-The limits of codes, and the zones that sensors have to see.
-"""
+"""Rules of a robot file, resolved: limits of codes, and zones that sensors must cover."""
 
 from __future__ import annotations
 

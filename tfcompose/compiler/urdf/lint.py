@@ -1,7 +1,4 @@
-"""What is wrong with a URDF, or a xacro file, that tfcompose did not write.
-
-Places are those of that file.
-"""
+"""Lint of a URDF or xacro file that tfcompose did not write, with places in that file."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Where packages and files are.
+"""Lookup of packages and files.
 
-By the robot's ``packages:``, then by the ament index, then around the file that asks.
+It asks the robot's ``packages:``, then the ament index, then the folders around the file.
 
 Nothing is opened here. What may be asked about files is handed in, so that a robot can be compiled
 from text alone.

@@ -1,8 +1,6 @@
-"""Whether a written URDF is the robot that was meant.
+"""Comparison of a written URDF with the robot it was written from, value by value.
 
-Yourdfpy reads it, and the two are compared value by value.
-
-yourdfpy reads links and joints with what URDF says of them. It does not read other elements
+yourdfpy reads the links and joints of the URDF. It does not read other elements
 (``ros2_control``, ``gazebo``, ``transmission``), takes the first of elements that are there twice,
 and puts URDF's defaults where an element or an attribute is missing, so that none of this is
 noticed.

@@ -1,4 +1,4 @@
-"""What a xacro file defines, how one of its macros is called, and what xacro makes.
+"""Macros of a xacro file: what they define, how one is called, and the result.
 
 ``expand`` runs xacro, ``macro`` writes a macro.
 """

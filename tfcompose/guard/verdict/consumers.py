@@ -1,4 +1,4 @@
-"""Whether a tree serves what needs it: scans, points, images and joint states.
+"""Checks whether a tree serves its consumers: scans, points, images and joint states.
 
 A message with a frame and a stamp needs that frame at that time, and a moving joint needs its
 state.

@@ -1,4 +1,4 @@
-"""Who may publish which edge: the rules that guard, verify and tree share."""
+"""Ownership rules that guard, verify and tree share: which publisher may send an edge."""
 
 from __future__ import annotations
 

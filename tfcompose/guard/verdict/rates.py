@@ -1,4 +1,4 @@
-"""How often edges come: never, not any more, too seldom, or with gaps."""
+"""Findings about rates: edges that never came, stopped, are slow, or have gaps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which joints' positions a message determines: those that it names, and those that mimic them."""
+"""Joints whose positions a message determines: those it names, and those that mimic them."""
 
 from __future__ import annotations
 

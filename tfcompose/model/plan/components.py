@@ -1,4 +1,4 @@
-"""What a container is asked to load, as the launcher and the guard know it.
+"""Load requests for component containers, shared by the launcher and the guard.
 
 Names are those of rclcpp_components (ROS 2 Jazzy): a container offers ``~/_container/load_node``
 and others beside it. A component takes nothing from the container's command line, so that its

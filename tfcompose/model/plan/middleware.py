@@ -1,6 +1,4 @@
-"""What a plan's processes need for the middleware (rmw) that it names.
-
-Variables, and Zenoh's router.
+"""Middleware (rmw) settings of a plan: environment variables, and Zenoh's router.
 
 Facts of rmw_zenoh_cpp (its README and design): sessions are peers that find each other through one
 router, which listens on port 7447 of their own computer. ``ZENOH_CONFIG_OVERRIDE`` holds

@@ -1,4 +1,4 @@
-"""What a link carries: shapes, materials, mass."""
+"""Body of a link: shapes, materials and mass."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ros2_control drives, and elements that stand in the URDF as they were written."""
+"""Hardware of ros2_control, and elements that the URDF keeps verbatim."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sensor sees: one stream's field of view, resolution and range."""
+"""Optics of a sensor: field of view, resolution and range of each stream."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which argument decides what: the values that arguments can have, and what they make true."""
+"""Analysis of arguments: the values that each can have, and what each decides."""
 
 from __future__ import annotations
 

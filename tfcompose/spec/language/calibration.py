@@ -1,4 +1,4 @@
-"""What a calibration file says: poses with a direction and a place.
+"""Calibration files: poses with a parent, a child and a place in the file.
 
 Every entry is the pose of its ``child`` in its ``parent``. Sources of the formats:
 

@@ -1,6 +1,6 @@
-"""What other formats call a key, and what is written here instead.
+"""Keys of other formats, and the key to write instead.
 
-URDF, launch files, ROS messages, compose files.
+The formats are URDF, launch files, ROS messages and compose files.
 """
 
 from __future__ import annotations

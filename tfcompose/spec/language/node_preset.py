@@ -1,4 +1,4 @@
-"""What nodes publish by themselves: claims on edges, written by hand or in presets of known nodes.
+"""Node presets and hand-written claims: the edges that a node publishes by itself.
 
 In a preset ``{map}``, ``{odom}`` … stand for the frames of the robot that have these roles.
 """

@@ -1,4 +1,4 @@
-"""What the streams of a sensor see, as presets and users write it."""
+"""Optics in the language: the streams of a sensor, in presets and robot files."""
 
 import math
 from collections.abc import Iterator

@@ -1,7 +1,4 @@
-"""What a robot file sets about rules.
-
-Severities and limits, and the zones that sensors have to see.
-"""
+"""Rules in the language: severities, limits, and zones that sensors must cover."""
 
 from typing import Annotated, Any, Literal
 

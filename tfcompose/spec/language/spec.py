@@ -1,4 +1,4 @@
-"""What every model of the language has in common, and a walk over what models are made of."""
+"""Base of all models of the language, and a walk over the models' fields."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""How often something arrives, how evenly, and how late.
-
-Sums over a recent stretch of time, of bounded size.
+"""Statistics of arrivals: rate, jitter and delay over a recent time, of bounded size.
 
 Times are integer nanoseconds; what comes back is in seconds and hertz.
 """

@@ -1,4 +1,4 @@
-"""Who publishes which edge, how often and how late, for monitor, verify, the live tree and doctor.
+"""Observation of edges for monitor, verify, view and doctor: publisher, rate and delay of each.
 
 An observer is given messages as they come, from a subscription or a bag, and who is in the graph;
 it reads no clock and no topic. What it keeps does not grow with time, and with strange names up to

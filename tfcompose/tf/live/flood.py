@@ -1,7 +1,4 @@
-"""What one publisher that sends ever new edges may cost an observer.
-
-How many are kept, and how long reading takes.
-"""
+"""Bounds on what a publisher of ever new edges costs an observer: edges kept, and time to read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who sends which joints: a topic of joint states, by publisher."""
+"""Senders of joint states: the joints that each publisher of a topic sends."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What a process needs around it to speak ROS.
-
-Rclpy, and the variables that ROS reads when it starts.
+"""Environment of a process that speaks ROS: rclpy, and the variables that ROS reads at its start.
 
 Some settings make ROS end the process that starts a node, without a sentence: ``ros_trouble``
 finds them before. This module imports no ROS, so that everything can ask whether there is one.

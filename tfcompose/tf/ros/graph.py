@@ -1,4 +1,4 @@
-"""Who publishes and who listens, as the graph says, and whose messages are whose.
+"""Publishers and subscribers of the ROS graph, and the sender of each message.
 
 rmw says a publisher's id twice: with each message, and in the graph, where its node's name stands.
 With rmw_fastrtps the two are equal. With rmw_cyclonedds that which comes with a message is a

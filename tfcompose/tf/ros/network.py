@@ -1,4 +1,4 @@
-"""Whether this computer has a network, and the wait for one.
+"""Detection of a network on this computer, and the wait for one.
 
 DDS reads a computer's addresses once, when a process joins. One that joins without a network, as
 at boot before Wi-Fi is there, or while a cable is out, is not heard on another computer, and hears

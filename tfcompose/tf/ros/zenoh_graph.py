@@ -1,4 +1,4 @@
-"""Who publishes on rmw_zenoh, and what: from its liveliness tokens and attachments, without rclpy.
+"""Publishers on rmw_zenoh, from liveliness tokens and attachments, without rclpy.
 
 Facts of rmw_zenoh_cpp (docs/design.md, liveliness_utils.cpp, attachment_helpers.cpp; the same in
 Jazzy, Kilted and Rolling). Every publisher declares the liveliness token

@@ -1,4 +1,4 @@
-"""What a buffer keeps of each edge, and the way through the edges from one frame to another.
+"""Cache of each edge's poses, and the chain of edges from one frame to another.
 
 ``TimeCache`` holds one frame's poses in its parent over time, as tf2's ``TimeCache`` and
 ``StaticCache`` do. ``Chain`` is the product of the edges between two frames, with neighbouring

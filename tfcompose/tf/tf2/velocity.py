@@ -1,7 +1,4 @@
-"""How fast one frame moves as seen from another.
-
-The mean over some time, from the poses at its two ends.
-"""
+"""Velocity of one frame seen from another: the mean of a time, from the poses at its ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether launchers of one plan can follow another without a full restart."""
+"""Check whether the launchers of a plan can follow another one without a full restart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of a robot file its export for ros2 launch decides itself: which arguments stay arguments.
+"""Arguments of a robot file that stay arguments of the exported launch file.
 
 An argument stays one where it decides no more than whether processes are started, and words,
 parameters, remappings and variables that they are given. One that decides anything else has the

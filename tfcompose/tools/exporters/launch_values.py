@@ -1,6 +1,4 @@
-"""What of a robot file a launch file decides at its own start.
-
-Arguments, the environment, and conditions.
+"""Values that an exported launch file decides at its start: arguments, environment, conditions.
 
 A plan has the values with which it was built. Where they decide no more than whether processes are
 started and what these are told, a launch file can have the arguments themselves.

@@ -1,4 +1,4 @@
-"""What is wrong with a fleet's file: edges that clash, and robots that are in no common tree."""
+"""Checks of a fleet file: edges that clash, and robots that are in no common tree."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What leaves a robot: its fleet file's edges, from TF topics, onto Zenoh."""
+"""Sharing of a robot's edges: from its TF topics to Zenoh, as the fleet file says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot file cannot hold of a URDF: it is left out or changed, with a note."""
+"""Parts of a URDF that a robot file cannot hold: left out or changed, with a note."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What a ``static_transform_publisher`` is told by its arguments.
-
-Of ROS 2 by name or in order, of ROS 1 in order.
+"""Arguments of ``static_transform_publisher``: by name or in order in ROS 2, in order in ROS 1.
 
 Read in geometry2 (``static_transform_broadcaster_program.cpp``) and in ROS 1's ``tf`` and
 ``tf2_ros``: all orders have yaw first, all angles are radians about fixed axes, and nothing is

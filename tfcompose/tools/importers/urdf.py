@@ -1,7 +1,4 @@
-"""What a robot_state_publisher is given, in the draft of a robot.
-
-A xacro file as a part, a URDF as links.
-"""
+"""Import of a robot_state_publisher's description: a xacro file as a part, a URDF as links."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the camera is: named views of all that a scene shows, in perspective or parallel."""
+"""Camera of a scene: named views that show all of it, in perspective or parallel."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What somebody chose to see of a robot, by names.
+"""Selection and visibility chosen in a view, by name.
 
-It outlives the panel that is made anew when a file changes.
+It outlives the panel, which is rebuilt when a file changes.
 """
 
 from __future__ import annotations

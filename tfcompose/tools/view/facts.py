@@ -1,4 +1,4 @@
-"""What is known of a frame of a robot, as lines that people read."""
+"""Facts about one frame of a robot, as lines of text."""
 
 from __future__ import annotations
 

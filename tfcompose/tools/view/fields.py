@@ -1,4 +1,4 @@
-"""What sensors see: each stream's field of view, and rays blocked by the robot."""
+"""Fields of view of each stream, and rays that the robot blocks."""
 
 from __future__ import annotations
 

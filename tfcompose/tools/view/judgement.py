@@ -1,7 +1,4 @@
-"""What is wrong with a tree that was observed.
-
-The verdicts of ``verify``, by the frames of a scene.
-"""
+"""Findings of ``verify`` about an observed tree, by the frames of a scene."""
 
 from __future__ import annotations
 

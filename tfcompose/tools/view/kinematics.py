@@ -1,4 +1,4 @@
-"""Where the frames of a robot are when its joints are somewhere."""
+"""Poses of a robot's frames at given joint positions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Where everything is that a scene shows, from the newest transforms of each frame.
-
-A ``Picture``, as data.
-"""
+"""Picture of a tree: the pose of each frame in a scene, from its newest transforms."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a panel and a scene show of a tree that runs, or was recorded.
-
-Frames as published, ghosts, what is wrong, and the robot's processes.
-"""
+"""Published tree of a running or recorded robot: frames, ghosts, findings and processes."""
 
 from __future__ import annotations
 

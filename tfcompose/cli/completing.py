@@ -45,8 +45,8 @@ def complete(commands: Mapping[str, CommandModule]) -> None:
         SystemExit: always, with 0.
     """
     line, point = os.environ["COMP_LINE"], int(os.environ["COMP_POINT"])
-    _quote, _prefix, _suffix, words, _break = split_line(line, point)
-    argv = list(map(_expanded, words[1:]))
+    _quote, _prefix, _suffix, typed, _break = split_line(line, point)
+    argv = list(map(_expanded, typed[1:]))
     if argv and argv[0] not in commands:
         commands = {}
     parser = ArgumentParser(prog="tfcompose")

@@ -229,7 +229,7 @@ def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
         driver, preset, ("versions", "naming", "on", "about")
     )
     fields["also"] = {
-        f"{NAME}_{suffix}": _process(one, preset) for suffix, one in driver.also.items()
+        f"{NAME}_{suffix}": _process(extra, preset) for suffix, extra in driver.also.items()
     }
     fields["tf"] = driver.tf if published else "tfcompose"
     fields["off"] = _plain(driver.off, preset) if published else None
@@ -314,10 +314,10 @@ def _started(process: dict[str, Any]) -> str:
 
 def _driver_text(preset: dict[str, Any]) -> str:
     driver = preset["driver"]
-    rows = [("starts", _started(one)) for one in (driver, *driver["also"].values())]
+    rows = [("starts", _started(started)) for started in (driver, *driver["also"].values())]
     rows += [
-        (word, driver[key])
-        for word, key in (("versions", "versions"), ("note", "about"))
+        (label, driver[key])
+        for label, key in (("versions", "versions"), ("note", "about"))
         if key in driver
     ]
     rows += [("names", _pairs(driver["naming"]))] if "naming" in driver else []
@@ -391,14 +391,14 @@ def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
 
     Each document once, with what it is and what it gives.
     """
-    given: dict[tuple[str, str], list[str]] = {}
+    places: dict[tuple[str, str], list[str]] = {}
     for optics in streams:
         for source in optics.get("source", ()):
-            keys = given.setdefault((source["where"], source["quality"]), [])
+            keys = places.setdefault((source["where"], source["quality"]), [])
             keys.append(f"{optics['stream']} {', '.join(source['of'])}")
     return [
         f"  {where} ({quality.replace('_', ' ')}): {'; '.join(keys)}"
-        for (where, quality), keys in given.items()
+        for (where, quality), keys in places.items()
     ]
 
 

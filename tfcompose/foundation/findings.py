@@ -177,7 +177,7 @@ def edited(text: str, edits: Sequence[Edit]) -> str | None:
     return text
 
 
-def nearest(word: str, known: Iterable[str], cutoff: float = 0.61) -> str | None:
+def nearest(text: str, known: Iterable[str], cutoff: float = 0.61) -> str | None:
     """Return the known word that a person most likely meant by ``word``, or None.
 
     1 is as near as the word itself.
@@ -185,7 +185,7 @@ def nearest(word: str, known: Iterable[str], cutoff: float = 0.61) -> str | None
     import difflib
 
     found = difflib.get_close_matches(
-        word.lower(), {name.lower(): name for name in known}, n=1, cutoff=cutoff
+        text.lower(), {name.lower(): name for name in known}, n=1, cutoff=cutoff
     )
     return next((name for name in known if name.lower() == found[0]), None) if found else None
 
@@ -196,15 +196,15 @@ def slip_of(name: str, known: Iterable[str]) -> str | None:
     return near[0] if len(near) == 1 else None
 
 
-def slips_of(word: str, known: Iterable[str]) -> list[str]:
+def slips_of(text: str, known: Iterable[str]) -> list[str]:
     """Return the known words that ``word`` is a slip of the pen away from.
 
     That is: another case; or else one letter too many, too few, wrong, or changed for its
     neighbour.
     """
-    others = [name for name in known if name != word]
-    cased = [name for name in others if name.lower() == word.lower()]
-    return cased or [name for name in others if len(word) > 1 and _is_one_slip(word, name)]
+    others = [name for name in known if name != text]
+    cased = [name for name in others if name.lower() == text.lower()]
+    return cased or [name for name in others if len(text) > 1 and _is_one_slip(text, name)]
 
 
 def _is_one_slip(a: str, b: str) -> bool:

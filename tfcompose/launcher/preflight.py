@@ -380,8 +380,8 @@ def _launch_command(
     process: PlanProcess, ros: RosSettings, argv: tuple[str, ...], env: Mapping[str, str]
 ) -> tuple[tuple[str, ...], dict[str, str]] | NotFound | Finding:
     """Return the command and what its environment needs besides, or what is missing or wrong."""
-    meant = _LAUNCH.fullmatch(argv[0])
-    package, name = (meant[1], meant[2]) if meant else ("", "")
+    parsed = _LAUNCH.fullmatch(argv[0])
+    package, name = (parsed[1], parsed[2]) if parsed else ("", "")
     path = env.get("PATH", os.defpath)
     ros2 = shutil.which("ros2", path=path)
     if ros2 is None:
@@ -398,7 +398,7 @@ def _launch_command(
     if odd:
         message = f"{process.name}: {odd[0]} is no argument of a launch file"
         return finding("TF902", message, None, help="give name: value, or name:=value")
-    given = {
+    settings = {
         "file": str(file),
         "arguments": arguments,
         "namespace": ros.namespace if process.namespace is None else process.namespace,
@@ -406,7 +406,7 @@ def _launch_command(
         "sim_time": ros.clock == "sim",
     }
     # By default ros2 launch writes its nodes' output to files of its own.
-    more = {LAUNCH: json.dumps(given, sort_keys=True), _OUTPUT: env.get(_OUTPUT) or "both"}
+    more = {LAUNCH: json.dumps(settings, sort_keys=True), _OUTPUT: env.get(_OUTPUT) or "both"}
     return (ros2, "launch", "--noninteractive", str(_WRAPPER)), more
 
 

@@ -67,14 +67,14 @@ def _explain_frames(file: str, a: str, b: str, arguments: Namespace) -> None:
     _explain_chain(robot, compiled.sources, a, b)
 
 
-def _explain_code(word: str) -> None:
+def _explain_code(text: str) -> None:
     from tfcompose.foundation.catalogue import CATALOGUE, absent_code, code_of, similar_words
     from tfcompose.foundation.findings import did_you_mean
 
-    code = code_of(word)
+    code = code_of(text)
     if code is None:
-        advice = did_you_mean(word, similar_words(word), "lint prints codes: TF301")
-        fail(absent_code(word) or f"no code {word}; {advice}", UNREADABLE)
+        advice = did_you_mean(text, similar_words(text), "lint prints codes: TF301")
+        fail(absent_code(text) or f"no code {text}; {advice}", UNREADABLE)
     sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{CATALOGUE.page(code)}\n")
 
 

@@ -304,9 +304,9 @@ def serial_missing(robot: Robot) -> Iterator[Finding]:
 def _names_device(process: Process) -> bool:
     """Whether a parameter names the device."""
     return any(
-        word in re.split(r"[_.]", key) or (len(word) > _SHORT_WORD and word in key)
+        hint in re.split(r"[_.]", key) or (len(hint) > _SHORT_WORD and hint in key)
         for key in process.params
-        for word in _DEVICE_WORDS
+        for hint in _DEVICE_WORDS
     )
 
 

@@ -167,8 +167,8 @@ class _Claims:
             parameter = described.parameter
             if described.instead in claimant.given:
                 parameter = described.instead
-            given = claimant.given.get(parameter)
-            if given is not None and not claimant.roles.is_bound(role) and self._is_frame(given):
+            own = claimant.given.get(parameter)
+            if own is not None and not claimant.roles.is_bound(role) and self._is_frame(own):
                 continue  # the tree leaves it open
             self._set(claimant, parameter, self.robot.final(frame))
         for key, value in preset.set.items():
@@ -178,13 +178,13 @@ class _Claims:
         return any(name == self.robot.final(frame) for frame in self.robot.frames)
 
     def _set(self, claimant: Claimant, key: str, value: Any) -> None:
-        given = claimant.given.get(key)
-        if given is None:
+        own = claimant.given.get(key)
+        if own is None:
             claimant.computed[key] = value
-        elif given != value:
+        elif own != value:
             claimant.contradicting.add(key)
             message = (
-                f"{key} of {claimant.process.name} is {given!r}, but in the tree it is {value!r}"
+                f"{key} of {claimant.process.name} is {own!r}, but in the tree it is {value!r}"
             )
             advice = "remove it: tfcompose writes it"
             if not claimant.takes_parameters:

@@ -212,7 +212,7 @@ def _blocks(root: Element) -> Iterator[Block]:
             counts[element.tag] = counts.get(element.tag, 0) + 1
             name = f"{element.tag.replace(':', '_')}_{counts[element.tag]}"
             places = (
-                tuple(one.at for one in element.walk()) if element.tag == "ros2_control" else ()
+                tuple(node.at for node in element.walk()) if element.tag == "ros2_control" else ()
             )
             yield Block(name, element.at, _with_namespaces(element, root), places)
 

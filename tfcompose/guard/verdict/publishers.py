@@ -84,13 +84,13 @@ def flooded(state: TreeState) -> Iterator[Finding]:
     """A node publishes more edges than are kept."""
     named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.beyond.items():
-        one = named.get(gid) if gid is not None else None
-        node = one.node if one and one.node else NAMELESS
+        sender = named.get(gid) if gid is not None else None
+        node = sender.node if sender and sender.node else NAMELESS
         message = (
             f"{node} publishes more edges than are kept: {counted(number, 'transform')} of further"
             " ones came"
         )
-        notes = [Note(f"{node} runs {one.where}")] if one and one.where else []
+        notes = [Note(f"{node} runs {sender.where}")] if sender and sender.where else []
         yield finding(
             "TF853",
             message,
@@ -315,9 +315,9 @@ def unreadable(state: TreeState) -> Iterator[Finding]:
     """Bytes come that are no TFMessage."""
     named = {publisher.gid: publisher for publisher in state.publishers}
     for gid, number in state.malformed.items():
-        one = named.get(gid) if gid is not None else None
+        sender = named.get(gid) if gid is not None else None
         node, topic = (
-            (one.node or NAMELESS, one.topic) if one else (NAMELESS, listed(state.topics))
+            (sender.node or NAMELESS, sender.topic) if sender else (NAMELESS, listed(state.topics))
         )
         message = (
             f"{counted(number, 'message')} on {topic} from {node} cannot be read as {TF_MESSAGE}"
@@ -354,15 +354,15 @@ def isolation_leak(state: TreeState) -> Iterator[Finding]:
         else set()
     )
     for name in [name for name in topics if name not in GLOBAL and name.endswith(GLOBAL)]:
-        word = "/tf_static" if name.endswith("/tf_static") else "/tf"
-        inside = name.removesuffix(word)
+        root = "/tf_static" if name.endswith("/tf_static") else "/tf"
+        inside = name.removesuffix(root)
         if not topics[name].publishers or (
             state.topics not in {GLOBAL, (f"{inside}/tf", f"{inside}/tf_static")}
         ):
             continue
-        for node in topics[word].publishers if word in topics else ():
+        for node in topics[root].publishers if root in topics else ():
             if node.startswith(f"{inside}/") or (node in own and state.topics != GLOBAL):
-                yield leak(node, word, name)
+                yield leak(node, root, name)
 
 
 def _together(edges: Sequence[EdgeState]) -> bool:

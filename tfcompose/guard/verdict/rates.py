@@ -41,10 +41,10 @@ NAMED_AT_MOST = 6
 
 def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Finding:
     """Return the finding for edges of one owner that did not come."""
-    several = len(edges) > 1
+    are_many = len(edges) > 1
     named = with_more(edges[0].name, len(edges) - 1)
     message = (
-        f"{named} {'were' if several else 'was'} never received; {'their' if several else 'its'}"
+        f"{named} {'were' if are_many else 'was'} never received; {'their' if are_many else 'its'}"
         " owner is "
     )
     return finding(

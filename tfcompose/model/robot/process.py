@@ -71,11 +71,11 @@ def _flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
 
 _TRUTHS = {
     form: truth
-    for word, truth in {
+    for text, truth in {
         **dict.fromkeys(("y", "yes", "true", "on"), True),
         **dict.fromkeys(("n", "no", "false", "off"), False),
     }.items()
-    for form in (word, word.capitalize(), word.upper())
+    for form in (text, text.capitalize(), text.upper())
 }
 _HEX = re.compile(r"[+-]?0[xX][0-9A-Fa-f]+")
 _OCTAL = re.compile(r"[+-]?0[0-7]*")

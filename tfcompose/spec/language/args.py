@@ -172,11 +172,11 @@ class ArgSpec(Checked):
         if self.choices:
             choices = [self.typed(choice) for choice in self.choices]
             if value not in choices:
-                words = [as_given(choice) for choice in self.choices]
+                texts = [as_given(choice) for choice in self.choices]
                 raise ArgError(
                     "TF106",
                     f"{shown(given)} is not one of the choices",
-                    _one_of(inserted(value), words),
+                    _one_of(inserted(value), texts),
                 )
         for bound, sign, what in ((self.min, 1, "less"), (self.max, -1, "greater")):
             limit = self.typed(bound) if bound is not None else None

@@ -237,12 +237,12 @@ class _Unfolding:
                 "a list, or ${range(3)}, or ${range(1, 4)}",
             )
         found: list[Value] = []
-        for one in value:
-            if isinstance(one, (dict, list)) or one is None:
+        for element in value:
+            if isinstance(element, (dict, list)) or element is None:
                 raise ExpressionError(
-                    f"{shown(one)} cannot be an item of a loop", "a string, or a number"
+                    f"{shown(element)} cannot be an item of a loop", "a string, or a number"
                 )
-            item = self.variables.value_in(one, {}) if isinstance(one, str) else one
+            item = self.variables.value_in(element, {}) if isinstance(element, str) else element
             found.append(
                 Quantity(item)
                 if isinstance(item, (int, float)) and not isinstance(item, bool)

@@ -161,13 +161,13 @@ def _in_python(text: str) -> Iterator[list[tuple[str, int, int]]]:
     tokens: list[tuple[str, int, int]] = []
     named = inside = False
     for token in _PYTHON.finditer(text):
-        word = token[1] if token[1] is not None else token[2]
+        literal = token[1] if token[1] is not None else token[2]
         if token.group() == "[":
             inside = named
         elif token.group() == "]" and inside:
             yield tokens
             tokens, named, inside = [], False, False
-        elif word is not None and inside:
-            tokens.append((word, token.start(), token.end()))
-        elif word == PUBLISHER:
+        elif literal is not None and inside:
+            tokens.append((literal, token.start(), token.end()))
+        elif literal == PUBLISHER:
             named = True

@@ -99,15 +99,15 @@ class SensorTopics:
     def take(self, clock_ns: int | None) -> None:
         """Take what has come; ``clock_ns`` is the newest simulated time or None."""
         for topic, subscription in self._headers.items():
-            taken = subscription.take_headers() if subscription else []
-            for frame, stamp_ns, received_ns in taken:
+            headers = subscription.take_headers() if subscription else []
+            for frame, stamp_ns, received_ns in headers:
                 times = [received_ns] if clock_ns is None else [received_ns, clock_ns]
                 delay_ns = min((time - stamp_ns for time in times), key=abs)
                 self._delays.setdefault((topic, frame), []).append(delay_ns / 1e9)
                 self._newest[topic, frame] = (stamp_ns, received_ns)
             heard = (
                 sum(len(some) for (name, _), some in self._delays.items() if name == topic)
-                if taken
+                if headers
                 else 0
             )
             if subscription and heard >= ENOUGH:

@@ -290,12 +290,12 @@ def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
         InvalidArgumentException: if there is no x, y or z of type float32 or float64, or too
             little data.
     """
-    given = (
+    raw = (
         cloud.data
         if isinstance(cloud.data, (array, bytes, bytearray, memoryview))
         else bytes(cloud.data)
     )
-    data = np.frombuffer(given, np.uint8).copy()
+    data = np.frombuffer(raw, np.uint8).copy()
     columns = [_column(cloud, name, data) for name in "xyz"]
     turned, to = rotation_and_translation(pose)
     for row in range(cloud.height):

@@ -82,13 +82,13 @@ def _plan(arguments: Namespace) -> Plan:
 async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _HostPrinter) -> int:
     printer.width = max(map(len, commands))
     codes = await asyncio.gather(
-        *(_run_on(plan, name, words, printer) for name, words in commands.items())
+        *(_run_on(plan, name, argv, printer) for name, argv in commands.items())
     )
     printer.end(list(commands))
     return max(codes)
 
 
-async def _run_on(plan: Plan, name: str, words: list[str], printer: _HostPrinter) -> int:
+async def _run_on(plan: Plan, name: str, argv: list[str], printer: _HostPrinter) -> int:
     from tfcompose.tools.deploy.connection import ConnectedHost, connected, settings_of
 
     host = plan.hosts[name]
@@ -97,13 +97,13 @@ async def _run_on(plan: Plan, name: str, words: list[str], printer: _HostPrinter
         print_findings([there], sys.stderr)
         return FAILED
     try:
-        return await _printed(there, words, printer)
+        return await _printed(there, argv, printer)
     finally:
         await there.close()
 
 
-async def _printed(host: ConnectedHost, words: list[str], printer: _HostPrinter) -> int:
-    process = await host.execute(words)
+async def _printed(host: ConnectedHost, argv: list[str], printer: _HostPrinter) -> int:
+    process = await host.execute(argv)
 
     async def errors() -> None:
         while line := await process.stderr.readline():

@@ -58,8 +58,8 @@ def agent_command(python: str) -> str:
 
     It takes no module from a user's folder.
     """
-    word = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
-    return f"exec {word} -I -c {shlex.quote(START)}"
+    program = f"~/{shlex.quote(python[2:])}" if python.startswith("~/") else shlex.quote(python)
+    return f"exec {program} -I -c {shlex.quote(START)}"
 
 
 def agent_input(settings: Settings) -> bytes:
@@ -149,9 +149,9 @@ class ConnectedHost:
             readings.append((after - before, there - (before + after) / 2))
         return min(readings)[1]
 
-    async def execute(self, words: list[str]) -> asyncssh.SSHClientProcess[bytes]:
+    async def execute(self, argv: list[str]) -> asyncssh.SSHClientProcess[bytes]:
         """Let the agent become tfcompose with these words, and return its process."""
-        self._process.stdin.write(f'["execute", {json.dumps({"words": words})}]\n'.encode())
+        self._process.stdin.write(f'["execute", {json.dumps({"words": argv})}]\n'.encode())
         return self._process
 
     async def close(self) -> None:

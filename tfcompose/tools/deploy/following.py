@@ -48,7 +48,7 @@ def same_files(before: Mapping[str, str], after: Mapping[str, str]) -> bool:
     """
     kinds = (f"{NAMED}/", f"{WHEELS}/")
     named = [
-        {path: digest for path, digest in one.items() if path.startswith(kinds)}
-        for one in (before, after)
+        {path: digest for path, digest in plan.items() if path.startswith(kinds)}
+        for plan in (before, after)
     ]
     return named[0] == named[1]

@@ -201,8 +201,8 @@ def _named_in(path: Path) -> list[str]:
     """Return the files that a file names by paths that begin in its own folder."""
     if path.suffix.lower() not in _NAMING or path.stat().st_size > _MOST_NAMING_BYTES:
         return []
-    words = {word.decode().strip() for word in _WORD.findall(path.read_bytes())}
-    files = (path.parent / word for word in words if not word.startswith("/") and len(word) < 200)  # noqa: PLR2004
+    names = {name.decode().strip() for name in _WORD.findall(path.read_bytes())}
+    files = (path.parent / name for name in names if not name.startswith("/") and len(name) < 200)  # noqa: PLR2004
     return [os.path.normpath(file) for file in files if is_file(file)]
 
 

@@ -95,7 +95,7 @@ class LiveTree(ShownTree):
         A line for each publisher, then what is wrong.
         """
         edges = self._pictures.edges
-        lines = [line for one in self._states.get(frame, ()) for line in _published(one)]
+        lines = [line for state in self._states.get(frame, ()) for line in _published(state)]
         if not lines and frame in edges:
             lines = [f"nothing came from {edges[frame].owner} yet"]
         return lines + self.judgement.about(frame)

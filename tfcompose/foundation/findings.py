@@ -196,8 +196,12 @@ def slip_of(name: str, known: Iterable[str]) -> str | None:
     return near[0] if len(near) == 1 else None
 
 
+#: Of more words than this that are as near, one is proposed.
+_MOST_NEAR = 3
+
+
 def slips_of(text: str, known: Iterable[str]) -> list[str]:
-    """Return the known words that ``word`` is a slip of the pen away from.
+    """Return the known words that ``text`` is a slip of the pen away from.
 
     That is: another case; or else one letter too many, too few, wrong, or changed for its
     neighbour.
@@ -219,6 +223,12 @@ def _is_one_slip(a: str, b: str) -> bool:
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str = "") -> str:
-    """Return advice that names the nearest word, or ``otherwise`` if none is near."""
-    near = nearest(name, list(known))
-    return f"did you mean {near}?" if near else otherwise
+    """Return advice that names the nearest words, or ``otherwise`` if none is near."""
+    names = list(dict.fromkeys(known))
+    near = slips_of(name, names)
+    if not 1 < len(near) <= _MOST_NEAR:
+        near = [one for one in (nearest(name, names),) if one]
+    if not near:
+        return otherwise
+    *others, last = near
+    return f"did you mean {' or '.join(filter(None, (', '.join(others), last)))}?"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic_core import PydanticCustomError, core_schema
 
-from tfcompose.foundation.findings import did_you_mean, slip_of, slips_of
+from tfcompose.foundation.findings import did_you_mean, slip_of
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
@@ -202,9 +202,6 @@ def _instead_of(unit: str, wanted: Dimension | None) -> str:
     known = [name for name, (_, its) in UNITS.items() if wanted in {None, its}]
     if _SPELLINGS.get(unit) in known:
         return f"write {_SPELLINGS[unit]}"
-    near = slips_of(unit, known)
-    if len(near) in {2, 3}:
-        return f"did you mean {' or '.join(near)}?"
     what = "known units" if wanted is None else f"units of {dimension_name(wanted)}"
     return did_you_mean(
         unit, known, f"{what}: {', '.join(known)}" if known else "leave the unit out"
@@ -369,7 +366,8 @@ class Measure:
         number = self._in_si(value)
         if self.least is not None and number < self.least:
             what = "is not greater than 0" if number <= 0 else f"is less than {self.least:g}"
-            raise refused("TF106", f"{shown(value)} {what}")
+            advice = f"for example {example(self.dimensions[0])}"
+            raise refused("TF106", f"{shown(value)} {what}", advice)
         return number
 
     def _in_si(self, value: Any) -> float:

@@ -21,7 +21,7 @@ links:
   base_link: {visual: {box: [1, 1, 1]}, inertial: {mass: 3}}
   wheel: {visual: {sphere: {radius: 0.1}, material: {name: it}}, inertial: {mass: 1}}
   lens: {visual: {sphere: {radius: 0.1}, material: {name: it, rgba: [1, 1, 1, 1]}}}
-joints: {wheel_joint: {type: continuous, parent: base_link, child: wheel}}
+joints: {wheel_joint: {type: continuous, parent: base_link, child: wheel, axis: [0, 1, 0]}}
 frames:
   map: {}
   dock: {parent: map, xyz: [3, 0, 0]}

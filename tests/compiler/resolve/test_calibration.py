@@ -519,6 +519,41 @@ def test_a_quaternion_that_fits_with_its_w_first_is_given_in_the_right_order() -
     assert "x: 0, y: 0, z: 0.707107, w: 0.707107" in found.help
 
 
+@pytest.mark.parametrize(
+    ("frame", "nominal", "measured", "advice"),
+    [
+        (
+            "lens",
+            "quat_xyzw: [0.9659, 0, 0, 0.2588]",
+            "roll: 0, pitch: 0, yaw: !degrees 30",
+            "[0, 0, 0.2588",
+        ),
+        (
+            "lens_optical_frame",
+            "rpy: [0, 0, 30 deg]",
+            "roll: !degrees -90, pitch: 0, yaw: !degrees -60",
+            "x forward",
+        ),
+        (
+            "lens_frame",
+            "rpy: [0, 0, 30 deg]",
+            "roll: !degrees -90, pitch: 0, yaw: !degrees -60",
+            "raise limit",
+        ),
+    ],
+)
+def test_a_nominal_pose_with_w_first_or_of_the_body_is_named(
+    frame: str, nominal: str, measured: str, advice: str
+) -> None:
+    frames = (
+        f"frames: {{{frame}: {{parent: base_link, xyz: [0, 0, 0.05], {nominal}, calibration:"
+        " c.yaml}}\n"
+    )
+    text = f"base_link: {{{frame}: {{x: 0, y: 0, z: 0.05, {measured}}}}}\n"
+    found = [one for one in compiled(frames, c_yaml=text).found if one.code == "TF616"]
+    assert [advice in one.help for one in found] == [True]
+
+
 def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> None:
     robot = (
         "frames: {kit: {parent: base_link, xyz: [5, 0, 0], look: left}, lens: {parent: kit,"

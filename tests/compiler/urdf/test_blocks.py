@@ -154,7 +154,7 @@ def test_two_parts_of_a_kind_have_hardware_blocks_and_colours_of_their_own() -> 
     arm = """tfcompose: 1
 robot: arm
 links: {foot: {}, hand: {visual: {sphere: {radius: 1}, material: {name: paint, rgba: [%s, 0, 0, 1]}}}}
-joints: {wrist: {type: continuous, parent: foot, child: hand}, lid: {type: floating, parent: foot, child: a, owner: x}}
+joints: {wrist: {type: continuous, axis: [0, 0, 1], parent: foot, child: hand}, lid: {type: floating, parent: foot, child: a, owner: x}}
 frames: {a: {}}
 ros2_control: {motors: {plugin: x/Y, joints: {wrist: {command: [effort]}}}}
 xml: {g: '<gazebo reference="hand"><frame>foot</frame><word>footed</word></gazebo>'}

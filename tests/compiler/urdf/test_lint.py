@@ -168,6 +168,8 @@ def test_where_a_tag_does_not_match_is_reported() -> None:
     assert found.code == "TF018"
     assert found.span
     assert found.span.line == 3
+    assert "<link>" in found.message
+    assert [note.span and note.span.line for note in found.notes] == [2]
 
 
 def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from tfcompose.foundation.text import with_more
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.model.robot import Link, Material, Robot, Shape
+    from tfcompose.model.robot import Inertial, Link, Material, Robot, Shape
 
 
 @rule("TF709", of_urdf=True)
@@ -66,19 +66,23 @@ def impossible_inertia(robot: Robot) -> Iterator[Finding]:
         inertial = link.inertial
         if inertial is None or inertial.at is None:
             continue
-        low, middle, high = _principal(inertial.tensor)
-        why = ""
-        if low <= 0:
-            why = f"smallest principal moment is {low:.3g} kg m²"
-        elif high > (low + middle) * (1 + _ROUNDING):
-            why = f"principal moment {high:.3g} exceeds {low:.3g} + {middle:.3g} kg m²"
-        if why:
+        if why := _impossible(inertial.tensor):
             advice = "remove inertia: it is computed from mass and shape"
             if robot.is_foreign(inertial.at):
                 advice = "take the tensor from CAD, in kg m² and about the centre of mass"
             yield finding(
                 "TF710", f"impossible inertia of {link.name}: {why}", inertial.at, help=advice
             )
+
+
+def _impossible(tensor: tuple[float, float, float, float, float, float]) -> str:
+    """Return why no body has the inertia; empty if one may."""
+    low, middle, high = _principal(tensor)
+    if low <= 0:
+        return f"smallest principal moment is {low:.3g} kg m²"
+    if high > (low + middle) * (1 + _ROUNDING):
+        return f"principal moment {high:.3g} exceeds {low:.3g} + {middle:.3g} kg m²"
+    return ""
 
 
 def _principal(
@@ -123,8 +127,8 @@ _TIMES, _TIMES_OF_BOX = 10, 100
 def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
     for link in robot.links.values():
         inertial = link.inertial
-        if inertial is None or _density(link) > _DENSEST:
-            continue
+        if inertial is None or _density(link) > _DENSEST or _impossible(inertial.tensor):
+            continue  # TF732, TF710
         of_shapes, times = inertial.of_shapes, _TIMES
         if not of_shapes:
             of_shapes, times = _of_boxes(inertial.mass, link), _TIMES_OF_BOX
@@ -155,7 +159,7 @@ _DENSE_IN_GRAMS = 100_000.0
 _LEAST_BODY_M3 = 1e-5
 
 
-@rule("TF732", of_urdf=True)
+@rule("TF732", of_urdf=True, follows="pose")
 def density_of_no_material(robot: Robot) -> Iterator[Finding]:
     for link in robot.links.values():
         density = _density(link)
@@ -171,6 +175,35 @@ def density_of_no_material(robot: Robot) -> Iterator[Finding]:
             if density > _DENSE_IN_GRAMS:
                 advice = f"if grams are meant, write {grams}; otherwise check its sizes, in m"
             yield finding("TF732", message, inertial.mass_at or link.at, help=advice)
+        elif inertial := _lighter_than_air(link):
+            volume = _most_volume((*link.visuals, *link.collisions))
+            message = (
+                f"{link.name} has {inertial.mass:g} kg in {volume:.3g} m³, and air of that volume"
+                f" has {volume * _AIR:.2g} kg"
+            )
+            advice = "check its mass, in kg, and the sizes of its shapes, in m"
+            yield finding("TF732", message, inertial.mass_at or link.at, help=advice)
+
+
+#: Of air at sea level, in kg/m³.
+_AIR = 1.2
+#: A smaller body has a mass only because a simulator asks for one; of a larger one the sizes are
+#: not in metres (TF414).
+_LEAST_LIGHT_M3, _MOST_LIGHT_M3 = 1e-3, 1e3
+
+
+def _lighter_than_air(link: Link) -> Inertial | None:
+    """Return the inertial of a link that is lighter than air of its shapes' volume.
+
+    Boxes around meshes say nothing: most of a frame's is empty.
+    """
+    lists = [shapes for shapes in (link.visuals, link.collisions) if shapes]
+    if link.inertial is None or any(shape.mesh for shapes in lists for shape in shapes):
+        return None
+    least = min(map(_most_volume, lists), default=0.0)
+    is_light = 0 < link.inertial.mass < _AIR * least
+    is_light = is_light and _LEAST_LIGHT_M3 < least < _MOST_LIGHT_M3
+    return link.inertial if is_light else None
 
 
 def _density(link: Link) -> float:

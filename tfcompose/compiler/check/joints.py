@@ -302,19 +302,22 @@ def negative_damping(robot: Robot) -> Iterator[Finding]:
                 yield finding("TF731", message, joint.at, help="give 0 or more, or remove it")
 
 
+#: What a joint does about its axis, of those that do not turn.
+_ABOUT = {"prismatic": "moves along", "planar": "lies across"}
+
+
 @rule("TF736", of_urdf=True)
 def joint_without_axis(robot: Robot) -> Iterator[Finding]:
     for edge in robot.edges:
         joint = edge.joint or edge.free
-        if joint is None or joint.axis_at or not robot.is_foreign(joint.at):
+        if joint is None or joint.axis_at or joint.type == "floating":
             continue
-        if joint.type != "floating":
-            message = f"{joint.type} joint {joint.name} has no axis, and so turns about x"
-            if joint.type in {"prismatic", "planar"}:
-                what = "moves along" if joint.type == "prismatic" else "lies across"
-                message = f"{joint.type} joint {joint.name} has no axis, and so {what} x"
+        about = _ABOUT.get(joint.type, "turns about")
+        message = f"{joint.type} joint {joint.name} has no axis, and so {about} x"
+        advice = "write axis: [1, 0, 0] if x is right, else for example [0, 0, 1]"
+        if robot.is_foreign(joint.at):
             advice = 'write <axis xyz="1 0 0"/> if x is right, else for example "0 0 1"'
-            yield finding("TF736", message, joint.at, help=advice)
+        yield finding("TF736", message, joint.at, help=advice)
 
 
 #: A revolute finger or slide that moves by less, in rad, has its limits in metres.

@@ -56,6 +56,12 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
             yield _invalid(process.node, process.at, "node name")
 
 
+def valid_name(name: str) -> str:
+    """Return the name with an underscore for what is not valid; empty if that does not do."""
+    better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
+    return better if _GOOD.fullmatch(better) else ""
+
+
 def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Finding:
     bare = name.lstrip("/")
     if what == "name" and bare != name and _GOOD.fullmatch(bare):
@@ -65,12 +71,8 @@ def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Fi
             at,
             help=f"write {bare}: tf2 drops a leading slash",
         )
-    better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
-    advice = (
-        f"for example {better}"
-        if _GOOD.fullmatch(better) and better != name.strip("/")
-        else _ALLOWED
-    )
+    better = valid_name(name)
+    advice = f"for example {better}" if better and better != name.strip("/") else _ALLOWED
     message = f"invalid {what} {name!r}"
     if severity == "warning":
         message = f"{what} {name!r} has characters that no parameter or topic can have"

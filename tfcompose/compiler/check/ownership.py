@@ -124,6 +124,22 @@ def one_node_two_levels(robot: Robot) -> Iterator[Finding]:
                 yield finding("TF306", message, edge.owner_at or edge.at, help=advice, notes=notes)
 
 
+@rule("TF336")
+def slower_than_declared(robot: Robot) -> Iterator[Finding]:
+    simulated = {process.name: process for process in robot.processes if process.simulate}
+    for edge in robot.edges:
+        process = simulated.get(edge.owner)
+        if process is None or process.simulate is None or edge.rate is None:
+            continue
+        rate = process.simulate.rate
+        if edge.is_slower(rate):
+            message = f"{process.name} is simulated at {rate:g} Hz, but {edge.name} is declared"
+            message += f" with {edge.rate:g} Hz"
+            notes = [Note("declared here", edge.rate_at or edge.at)]
+            advice = "remove rate under simulate: the declared rate is its default"
+            yield finding("TF336", message, process.at, help=advice, notes=notes)
+
+
 def _is_edge(edge: Edge, parent: str, children: set[str]) -> bool:
     return edge.parent.rpartition("/")[2] == parent and edge.child.rpartition("/")[2] in children
 

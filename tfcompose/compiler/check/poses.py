@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Span
     from tfcompose.foundation.geometry import Vector
-    from tfcompose.model.robot import Edge, Link, Robot
+    from tfcompose.model.robot import Edge, Link, MountedSensor, Robot
 
 
 #: Degrees that people write. Read as radians, all but 5 are more than a full turn, which nobody
@@ -45,19 +45,13 @@ _ROUND_DEG = frozenset(
         135.0,
     }
 )
-_ROUND_LIMITS_DEG = _ROUND_DEG | {
-    150.0,
-    165.0,
-    170.0,
-    175.0,
-    180.0,
-    185.0,
-    190.0,
-    270.0,
-    350.0,
-    360.0,
-    720.0,
-}
+#: As limits, -5 to 5 and -10 to 10 are radians: two or three turns, or none that is known.
+_ROUND_LIMITS_DEG = _ROUND_DEG - {5.0, 10.0}
+#: No joint with limits turns farther than the first, but a reel, whose limits are not whole; more
+#: than the second says that there is none.
+_FARTHEST_RAD, _MOST_LIMIT_DEG = 20.0, 720.0
+#: No joint with limits turns faster.
+_FASTEST_RAD_S = 45.0
 #: A full turn, with a margin for rounding.
 _FULL_CIRCLE_RAD = 6.29
 
@@ -76,22 +70,30 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
         for index, (number, with_unit) in enumerate(
             zip(value.numbers, value.with_unit, strict=True)
         ):
-            size = abs(number)
-            if not with_unit and (
-                size in _ROUND_LIMITS_DEG
-                if is_limit
-                else size in _ROUND_DEG or size > _FULL_CIRCLE_RAD
-            ):
-                message = (
-                    f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
-                )
-                at = value.place(index)
-                advice_value = (
-                    f"{math.radians(number):.17g}" if robot.is_foreign(at) else f"{number:g} deg"
-                )
-                yield finding(
-                    "TF410", message, at, help=f"if degrees are meant, write {advice_value}"
-                )
+            step = dict(enumerate(value.steps)).get(index, "")
+            if with_unit or not _is_in_degrees(value.key, step, abs(number)):
+                continue
+            per_s = "/s" * (step == "velocity")
+            message = (
+                f"{value.entry}: {value.key} is {number:g} rad{per_s},"
+                f" {number / math.tau:.3g} turns{per_s}"
+            )
+            at = value.place(index)
+            advice_value = f"{number:g} deg{per_s}"
+            if robot.is_foreign(at):
+                advice_value = f"{math.radians(number):.17g}"
+            yield finding("TF410", message, at, help=f"if degrees are meant, write {advice_value}")
+
+
+def _is_in_degrees(key: str, step: str | int, size: float) -> bool:
+    """Return whether a bare number of radians, at a key and a step in it, is one of degrees."""
+    if step == "velocity":
+        return size >= _FASTEST_RAD_S
+    if key == "limit":
+        return size in _ROUND_LIMITS_DEG or (
+            size.is_integer() and _FARTHEST_RAD < size <= _MOST_LIMIT_DEG
+        )
+    return size in _ROUND_DEG or size > _FULL_CIRCLE_RAD
 
 
 #: 1.5708 is good enough: it is 0.0002 degrees off, and no mount is that accurate.
@@ -171,19 +173,30 @@ def _listed(numbers: tuple[float, ...]) -> str:
     return f"[{', '.join(f'{number:g}' for number in numbers)}]"
 
 
-#: Words in a name, the sign of z that they imply, and by how much (sine) the view may contradict
-#: it. "up" and "down" may also mean the upper and the lower camera, so the contradiction must be
-#: clear.
+_X, _Z = 0, 2
+#: Words in a name, the axis of the base and its sign that they imply, and by how much (sine) the
+#: view may contradict it. "up" and "down" may also mean the upper and the lower camera, "front"
+#: and "rear" where it is mounted, so the contradiction must be clear.
 _VIEWS = {
-    "floor": (-1, 0.1),
-    "ground": (-1, 0.1),
-    "downward": (-1, 0.1),
-    "downwards": (-1, 0.1),
-    "down": (-1, 0.5),
-    "ceiling": (1, 0.1),
-    "upward": (1, 0.1),
-    "upwards": (1, 0.1),
-    "up": (1, 0.5),
+    "floor": (_Z, -1, 0.1),
+    "ground": (_Z, -1, 0.1),
+    "downward": (_Z, -1, 0.1),
+    "downwards": (_Z, -1, 0.1),
+    "down": (_Z, -1, 0.5),
+    "ceiling": (_Z, 1, 0.1),
+    "upward": (_Z, 1, 0.1),
+    "upwards": (_Z, 1, 0.1),
+    "up": (_Z, 1, 0.5),
+    "front": (_X, 1, 0.8),
+    "rear": (_X, -1, 0.8),
+    "back": (_X, -1, 0.8),
+}
+#: Where a camera looks, by the axis and its sign.
+_DIRECTIONS = {
+    (_X, 1): "front",
+    (_X, -1): "rear",
+    (_Z, 1): "up",
+    (_Z, -1): "down",
 }
 #: Above this a camera named after the ceiling is probably mounted there.
 _OVERHEAD_M = 1.5
@@ -204,14 +217,29 @@ def camera_looks_away(robot: Robot) -> Iterator[Finding]:
         )
         pose = poses[optical or sensor.mount]
         axis = rotate(pose.quat_xyzw, (0.0, 0.0, 1.0) if optical else (1.0, 0.0, 0.0))
-        sign, tolerance = view
+        index, sign, tolerance = view
         overhead = "ceiling" in sensor.name and pose.xyz[2] > _OVERHEAD_M
-        if axis[2] * sign < -tolerance and not overhead:
-            angle = math.degrees(math.asin(min(1.0, abs(axis[2]))))
-            up, named = ("up", "down") if axis[2] > 0 else ("down", "up")
-            message = f"{sensor.name} looks {up} by {angle:.0f} deg, but its name says {named}"
+        if axis[index] * sign >= -tolerance or overhead:
+            continue
+        actual, named = _DIRECTIONS[index, -sign], _DIRECTIONS[index, sign]
+        direction = f"to the {actual}"
+        advice = "turn it by left: 180 deg under look, or by rpy: [0, 0, 180 deg]"
+        if index == _Z:
+            angle = math.degrees(math.asin(min(1.0, abs(axis[_Z]))))
+            direction = f"{actual} by {angle:.0f} deg"
             advice = f"write look: {{{named}: {angle:.0f} deg}}; looking down is positive pitch"
-            yield finding("TF413", message, sensor.at, help=advice)
+        message = f"{sensor.name} looks {direction}, but its name says {named}"
+        yield finding("TF413", message, _rotation_at(robot, sensor), help=advice)
+
+
+def _rotation_at(robot: Robot, sensor: MountedSensor) -> Span:
+    """Return the place of the rotation of a sensor's mount, or of the sensor without one."""
+    places = (
+        value.place(0)
+        for value in robot.source_numbers
+        if value.path[:-1] == ("sensors", sensor.name) and value.key != "xyz"
+    )
+    return next(places, sensor.at)
 
 
 _ROUNDING_RAD = 1e-6
@@ -336,6 +364,8 @@ _MESH_TIMES, _LARGE_MESH_M = 20, 5.0
 _LONE_MESH_M = 50.0
 #: No mesh that is scaled down ends up smaller than the first, and no body than the second.
 _SMALL_MESH_M, _TINY_MESH_M = 0.005, 0.0005
+#: The mark of a frame is as long as wide, but for this part.
+_CUBE = 0.99
 #: Ground planes are thinner than this part of their length.
 _FLAT = 1e-3
 
@@ -353,6 +383,9 @@ def _meshes_in_other_units(robot: Robot) -> Iterator[Finding]:
             done.add(mesh.at)
             largest, scale = max(size), max(map(abs, shape.size))
             is_small = 0 < largest < (_SMALL_MESH_M if scale < 1 else _TINY_MESH_M)
+            is_mark = scale >= 1 and min(size) > _CUBE * largest
+            if is_small and is_mark:
+                continue
             if not is_small and (largest <= limit or min(size) < _FLAT * largest):
                 continue
             factor = 1000 if is_small else 0.001

@@ -17,8 +17,9 @@ from tfcompose.compiler.check.poses import (
 )
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.geometry import IDENTITY_XYZW, Pose, angle_between, norm
+from tfcompose.foundation.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, angle_between, norm
 from tfcompose.foundation.text import listed
+from tfcompose.model.robot import is_optical
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -104,6 +105,13 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
                 advice = "the file's positions are probably in millimetres: convert them to metres"
             elif swapped := _with_w_first(measured):
                 advice = f"the file's quaternion probably has w first: write {swapped}"
+            elif swapped := _nominal_with_w_first(measured):
+                advice = f"the pose beside it probably has w first: write quat_xyzw: {swapped}"
+            elif _is_of_body(measured):
+                advice = (
+                    f"the pose beside it probably has x forward: that of {measured.child}, an"
+                    " optical frame, has z forward"
+                )
             notes = [Note("measured here", measured.at)]
             yield finding("TF616", message, measured.named_at, help=advice, notes=notes)
 
@@ -117,6 +125,21 @@ def _with_w_first(measured: Calibration) -> str:
     if not is_far or measured.off(pose)[1] > measured.limit_rad:
         return ""
     return f"x: {x:g}, y: {y:g}, z: {z:g}, w: {w:g}"
+
+
+def _nominal_with_w_first(measured: Calibration) -> str:
+    """Return the nominal quaternion as it is meant, if it fits the file with its w first."""
+    w, x, y, z = measured.nominal.quat_xyzw if measured.nominal else measured.pose.quat_xyzw
+    turned = angle_between(measured.pose.quat_xyzw, (x, y, z, w))
+    return f"[{x:g}, {y:g}, {z:g}, {w:g}]" if turned <= measured.limit_rad else ""
+
+
+def _is_of_body(measured: Calibration) -> bool:
+    """Return whether the nominal pose of an optical frame is that of the body around it."""
+    if measured.nominal is None or not is_optical(measured.child):
+        return False
+    optical = measured.nominal @ Pose((0.0, 0.0, 0.0), OPTICAL_XYZW)
+    return angle_between(measured.pose.quat_xyzw, optical.quat_xyzw) <= measured.limit_rad
 
 
 #: From here on angles are shown rounded to degrees.
@@ -206,7 +229,7 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
             )
 
 
-@rule("TF622", follows="pose")
+@rule("TF622", of_urdf=True, follows="pose")
 def mount_copied(robot: Robot) -> Iterator[Finding]:
     mounts: dict[str, Edge] = {}
     for edge in robot.edges:
@@ -216,16 +239,22 @@ def mount_copied(robot: Robot) -> Iterator[Finding]:
         twin = next((other for other in others if are_mirrored(other, edge)), None)
         mounts.setdefault(edge.child, edge)
         if twin:
+            axis, sign = side_of(edge.child, twin.child)
+            wrong, right = (edge, twin) if edge.pose.xyz[axis] * sign < 0 else (twin, edge)
             x, y, z = edge.pose.xyz
             message = (
-                f"{edge.child} and {twin.child} are both at [{x:g}, {y:g}, {z:g}] in {edge.parent}"
+                f"{wrong.child} and {right.child} are both at [{x:g}, {y:g}, {z:g}] in"
+                f" {edge.parent}"
             )
-            notes = [Note(f"{twin.child} is defined here", twin.xyz_at or twin.at)]
-            advice = "change the sign of one: y is positive to the left, x to the front"
-            yield finding("TF622", message, edge.xyz_at or edge.at, help=advice, notes=notes)
+            notes = [Note(f"{right.child} is defined here", right.xyz_at or right.at)]
+            advice = (
+                f"change the sign of {'xy'[axis]} of {wrong.child}: y is positive to the left,"
+                " x to the front"
+            )
+            yield finding("TF622", message, wrong.xyz_at or wrong.at, help=advice, notes=notes)
 
 
-@rule("TF625", follows="pose")
+@rule("TF625", of_urdf=True, follows="pose")
 def sides_swapped(robot: Robot) -> Iterator[Finding]:
     poses = placed(robot, moving=True)
     edges: dict[str, Edge] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import count
 from typing import TYPE_CHECKING
 
+from tfcompose.compiler.check.names import valid_name
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, Span, did_you_mean, finding
 from tfcompose.foundation.tree import below, children_of
@@ -83,6 +84,7 @@ _MOST_SEARCHES = 50
 def unknown_frame(robot: Robot) -> Iterator[Finding]:
     searches = count(1)
     moved = {edge.child for edge in robot.edges if edge.joint_name}
+    invalid = {valid_name(name) for name in robot.frames} - robot.frames.keys()  # TF501
 
     def advice(name: str, at: Span, section: str, child: str = "") -> str:
         if conditional := left_out_by(robot.conditions, name):
@@ -97,7 +99,7 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
 
     for edge in robot.edges:
         for parent in (edge.parent, *edge.switched) if edge.given else ():
-            if parent not in robot.frames and not robot.excuses(parent):
+            if parent not in robot.frames and parent not in invalid and not robot.excuses(parent):
                 message = f"{edge.child}: unknown parent frame {parent}"
                 section = "links" if parent in moved else "frames"
                 yield finding(

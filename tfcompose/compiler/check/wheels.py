@@ -7,7 +7,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.check.poses import placed, side_of, twins, without_side
+from tfcompose.compiler.check.poses import are_mirrored, placed, side_of, twins, without_side
 from tfcompose.compiler.check.rule import rule
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.geometry import Pose, norm, rotate
@@ -73,14 +73,16 @@ def wheel_axis(robot: Robot) -> Iterator[Finding]:
     odd = _odd_axes(robot, wheels)
     for edge in wheels:
         joint, shape = edge.joint, _cylinder(robot.links.get(edge.child))
-        if joint is None or (joint.axis_at is None and robot.is_foreign(joint.at)):
-            continue  # that the axis is missing is a finding already
-        axis, at = _listed(joint.axis), joint.axis_at or joint.at
+        if joint is None or joint.axis_at is None:
+            continue  # TF736
+        axis, at = _listed(joint.axis), joint.axis_at
         if edge.child in odd:
             sibling, right = odd[edge.child]
             message = f"{edge.child} turns about {axis}, across the axis of {sibling.child}"
             notes = [Note(f"{sibling.child} is mounted here", sibling.at)]
             advice = f"write {_axis(robot, edge, right)}"
+            if max(map(abs, right)) < _PARALLEL:
+                advice = "correct its rotation, or its axis"
             yield finding("TF733", message, at, help=advice, notes=notes)
         elif shape and not _SWIVEL.search(f"{edge.child} {joint.name}".lower()):
             along = rotate(shape.pose.quat_xyzw, _Z)
@@ -171,6 +173,8 @@ def wheels_not_mirrored(robot: Robot) -> Iterator[Finding]:
             if edge.parent != twin.parent or axis != 1 or max(off) <= _MIRRORED_M:
                 continue
             others = [wheel for wheel in wheels.values() if wheel not in (edge, twin)]
+            if any(are_mirrored(one, other) for one in (edge, twin) for other in others):
+                continue  # TF622
             odd, pattern = edge, twin
             if _is_alike(edge, others) and not _is_alike(twin, others):
                 odd, pattern = twin, edge

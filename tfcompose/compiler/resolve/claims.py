@@ -8,13 +8,14 @@ the exact switch.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.presets import node_preset, preset_of, unknown_node_preset
-from tfcompose.foundation.findings import Finding, RejectedError, Span, finding
+from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.model.plan import switch_text
 from tfcompose.model.robot import BUILT_IN, Claim, Edge, Node, Process
 
@@ -221,8 +222,24 @@ class _Claims:
         else:
             self._foreign(claimant, claim, f"{parent} → {child}", other)
 
+    def _compare_rate(self, claimant: Claimant, edge: Edge) -> None:
+        """Find a parameter by which the node sends its edge less often than is declared."""
+        preset = claimant.preset
+        key, rate = preset.rate_in(claimant.given) if preset else ("", math.inf)
+        if edge.rate and edge.is_slower(rate):
+            message = f"{key} of {claimant.process.name} gives {edge.name} {rate:.3g} Hz, but"
+            message += f" {edge.rate:g} Hz is declared"
+            notes = [Note("declared here", edge.rate_at)] if edge.rate_at else []
+            advice = f"raise {key}, or declare the rate that it has"
+            if key == (preset and preset.period):
+                advice = f"write {key}: {1 / edge.rate:.3g}, or declare the rate that it has"
+            self.found.append(
+                finding("TF336", message, self._at(claimant, key), help=advice, notes=notes)
+            )
+
     def _own(self, claimant: Claimant, claim: ClaimSpec, edge: Edge) -> None:
         self.publishers[claimant.process.name, edge.child] = claimant.node.name
+        self._compare_rate(claimant, edge)
         for key, value in claim.chosen_by.items():
             self._set(claimant, key, claimant.roles.final(value))
         for key, value in claim.on.items() if not claim.by_default else ():

@@ -197,7 +197,7 @@ _LISTS = frozenset({"xyz", "rpy", "quat_xyzw"})
 _MAPPINGS = {
     "axis_angle": ("angle",),
     "look": ("up", "down", "left", "right", "roll"),
-    "limit": ("lower", "upper"),
+    "limit": ("lower", "upper", "velocity"),
 }
 
 

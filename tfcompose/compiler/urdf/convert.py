@@ -260,7 +260,16 @@ def _edge(element: Element, values: AttributeReader) -> Edge | None:
         joint_name=name,
         joint_at=element.at_value("name"),
         child_at=ends["child"].at_value("link"),
+        xyz_at=_xyz_at(element),
     )
+
+
+def _xyz_at(element: Element) -> Span | None:
+    """Return the place of a joint's position, if it has one."""
+    origin = element.first("origin")
+    if origin is None or "xyz" not in origin.attributes:
+        return None
+    return origin.at_value("xyz")
 
 
 def _joint(name: str, kind: Any, element: Element, values: AttributeReader) -> Joint:

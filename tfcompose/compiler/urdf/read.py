@@ -14,7 +14,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from tfcompose.foundation.findings import RejectedError, Span, finding
+from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.spec.load import MOST_VALUES, refuse_unreadable
 
 if TYPE_CHECKING:
@@ -228,6 +228,13 @@ def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) 
     return reader.read()
 
 
+#: expat's errors where a tag is not closed.
+_UNCLOSED = frozenset(
+    expat.errors.codes[text]
+    for text in (expat.errors.XML_ERROR_TAG_MISMATCH, expat.errors.XML_ERROR_NO_ELEMENTS)
+)
+
+
 class _UrdfReader:
     def __init__(self, text: str, file: str) -> None:
         self.source = _Text(text, file)
@@ -245,13 +252,20 @@ class _UrdfReader:
             self.parser.Parse(self.source.data, True)  # noqa: FBT003 (the last piece; it takes no keywords)
         except expat.ExpatError as error:
             at = self._at(self.parser.ErrorByteIndex, 1)
-            reason = expat.ErrorString(error.code) or "not XML"
-            raise RejectedError(
-                [finding("TF018", reason, at, help="fix it; other parsers stop here too")]
-            ) from None
+            raise RejectedError([self._not_xml(error.code, at)]) from None
         if self.root is None:
             raise RejectedError([finding("TF018", "no element", Span(self.source.file))])
         return self.root
+
+    def _not_xml(self, code: int, at: Span) -> Finding:
+        """Return the finding about a place where the text stops being XML."""
+        reason = expat.ErrorString(code) or "not XML"
+        if not self.stack or code not in _UNCLOSED:
+            return finding("TF018", reason, at, help="fix it; other parsers stop here too")
+        inner = self.stack[-1]
+        message = f"{reason}: <{inner.tag}> is not closed"
+        notes = [Note(f"{inner.tag} begins here", inner.at)]
+        return finding("TF018", message, at, help=f"write </{inner.tag}> before it", notes=notes)
 
     def add_text(self, piece: str) -> None:
         if self.stack:

@@ -162,6 +162,10 @@ class Calibration:
         return (far, angle_between(pose.quat_xyzw, self.nominal.quat_xyzw))
 
 
+#: This part of the declared rate will do.
+_NEARLY = 0.9
+
+
 @dataclass(frozen=True, slots=True)
 class Edge(PlanEdge):
     """An edge of the plan, with what only the compiler knows of it.
@@ -199,6 +203,10 @@ class Edge(PlanEdge):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", SourceLine(self.at.file, self.at.line))
+
+    def is_slower(self, rate: float) -> bool:
+        """Return whether a rate in Hz is below the declared one, as the guard judges it."""
+        return self.rate is not None and rate < _NEARLY * self.rate
 
     def planned(self, **made: Any) -> PlanEdge:
         """Return the edge as the plan has it, with fields that follow from the whole robot."""

@@ -5,6 +5,7 @@ In a preset ``{map}``, ``{odom}`` … stand for the frames of the robot that hav
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator
@@ -80,7 +81,22 @@ class NodePresetSpec(Spec):
     set: Parameters = key(
         {}, "parameters without which its frames would not have the names that it is given"
     )
+    rate: Text = key("", "the parameter that says how often it sends, in Hz", "frequency")
+    period: Text = key("", "the same, where it is a time in s", "transform_publish_period")
     hint: Text = key(
         "", "where its switch is, if it is not among the parameters that can be given at the start"
     )
     source: tuple[Fact, ...] = key(..., "where this was read")
+
+    def rate_in(self, params: dict[str, Any]) -> tuple[str, float]:
+        """Return the parameter that says how often the node sends, and that in Hz.
+
+        Empty, and infinitely often, where these parameters do not say it.
+        """
+        period = params.get(self.period)
+        if isinstance(period, (int, float)) and period > 0:
+            return self.period, 1 / period
+        rate = params.get(self.rate)
+        if isinstance(rate, (int, float)):
+            return self.rate, rate
+        return "", math.inf

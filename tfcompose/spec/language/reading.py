@@ -213,7 +213,7 @@ def _refusals(
     for path, error in errors:
         if error["type"] in UNKNOWN_KEYS:
             refusals.append(_unknown_key(model, path, data, slips))
-        else:
+        elif error["type"] != "missing" or not slips[path[:-1], str(path[-1])]:
             refusals.append(_refusal(model, path, error))
     return refusals
 

@@ -342,7 +342,13 @@ class DocumentReader:
         elif key in top.keys:
             note = Note("first defined here", top.keys[key].span)
             self.found.append(
-                finding("TF003", f"the key {key} is given twice", place.span, notes=[note])
+                finding(
+                    "TF003",
+                    f"the key {key} is given twice",
+                    place.span,
+                    notes=[note],
+                    help="remove one of the two, or rename it",
+                )
             )
             top.keeps = False
         else:

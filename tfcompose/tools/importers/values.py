@@ -32,6 +32,8 @@ _DECIMALS = 4
 _SAME_RAD = 1e-12
 
 _SOFT_LIMITS = ("soft_lower_limit", "soft_upper_limit")
+#: The axis of a joint that gives none.
+_X = (1.0, 0.0, 0.0)
 _DIAGONAL = ("ixx", "iyy", "izz")
 
 
@@ -109,7 +111,7 @@ class RobotFileValues:
     def joint(self, edge: Edge, owner: str | None) -> dict[str, Any]:
         """Return the joint with its edge."""
         joint = edge.joint or edge.free
-        values = {
+        values: dict[str, Any] = {
             "type": joint.type if joint else "fixed",
             "parent": edge.parent,
             "child": edge.child,
@@ -117,11 +119,9 @@ class RobotFileValues:
         values |= self.pose(edge.pose) | ({"owner": owner} if owner else {})
         if joint is None:
             return values
-        return (
-            values
-            | ({"axis": _axis(joint)} if joint.axis != (1.0, 0.0, 0.0) else {})
-            | _motion(joint)
-        )
+        if joint.axis != _X or (joint.axis_at and joint.type != "floating"):
+            values["axis"] = _axis(joint)
+        return values | _motion(joint)
 
 
 def angle(value: float) -> str | float:

@@ -30,7 +30,8 @@ def record(action: Any, context: Any) -> None:
     files = [
         Path(file).read_text("utf-8") for word, file in pairwise(words) if word == "--params-file"
     ]
-    STARTED.append({"words": words, "params": [yaml.unsafe_load(text) for text in files]})
+    params = [yaml.unsafe_load(text) for text in files]
+    STARTED.append({"words": words, "params": params, "texts": files})
 
 
 def record_loaded(action: Any, requests: list[Any], _context: Any) -> None:

@@ -418,6 +418,32 @@ def test_what_nav2_common_makes_of_a_file_it_makes_more_of(made: str, tmp_path: 
     assert name == ("True" if "HasNode" in made else "front")
 
 
+def test_a_parameter_can_be_the_path_of_a_file_that_launch_makes(tmp_path: Path) -> None:
+    path = source(tmp_path, "bridge.yaml", "- topic: old")
+    made = f"{{'config': ReplaceString('{path}', {{'old': 'new'}})}}"
+    _, data = import_of(source(tmp_path, "a.launch.py", REWRITTEN.replace("MADE", made)))
+    assert data["processes"]["n"]["params"] == {"config": "${file(a_params/bridge.yaml)}"}
+    assert (tmp_path / "a_params/bridge.yaml").read_text("utf-8") == "- topic: new"
+
+
+def test_a_parameter_of_the_name_file_is_an_argument(tmp_path: Path) -> None:
+    made = "{'file': 'model.sdf', 'x': 1.5}"
+    text, data = import_of(source(tmp_path, "a.launch.py", REWRITTEN.replace("MADE", made)))
+    process = data["processes"]["n"]
+    assert process["params"] == {"x": 1.5}
+    assert process["run"]["args"] == ["--ros-args", "-p", "file:='model.sdf'"]
+    assert compiled(text, tmp_path).robot
+
+
+def test_a_parameter_file_that_is_not_there_is_named_and_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = source(tmp_path, "a.launch.py", REWRITTEN.replace("MADE", "'/none/of/it.yaml'"))
+    _, data = import_of(file)
+    assert "params" not in data["processes"]["n"]
+    assert "a.launch.py:9" in places(printed_errors(capsys), "TF020")
+
+
 def test_a_file_that_nav2_common_leaves_as_it_is_is_named(tmp_path: Path) -> None:
     source(tmp_path, "nav2.yaml", PARAMETERS)
     path = repr(str(tmp_path / "nav2.yaml"))
@@ -455,6 +481,52 @@ def generate_launch_description():
     clock = {"use_sim_time": LaunchConfiguration("use_sim_time")}
     return LaunchDescription([DeclareLaunchArgument("use_sim_time", default_value="true")] + [
         Node(package="p", executable="e", name=name, parameters=[clock]) for name in ("a", "b")])
+"""
+
+
+SIMULATED = """<launch>
+  <node pkg="p" exec="e" name="a"><param from="$(dirname)/sim.yaml"/></node>
+  <node pkg="p" exec="e" name="b">
+    <param from="$(dirname)/sim.yaml"/> <param name="use_sim_time" value="CLOCK"/>
+  </node>
+  <node pkg="p" exec="e" name="c" namespace="left"/>
+  <executable cmd="ros2 topic list" name="listed"/>
+</launch>
+"""
+
+
+def test_the_clock_of_parameter_files_is_the_robots_if_all_agree(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source(tmp_path, "sim.yaml", "a: {ros__parameters: {use_sim_time: true}}")
+    file = source(tmp_path, "a.launch.xml", SIMULATED.replace("CLOCK", "true"))
+    text, data = import_of(file)
+    assert data["ros"]["clock"] == "sim"
+    assert "for c: here the clock is sim" in text, "a source without a clock for it"
+    assert "a.launch.xml:6" in places(printed_errors(capsys), "TF020")
+    text, data = import_of(source(tmp_path, "a.launch.xml", SIMULATED.replace("CLOCK", "false")))
+    assert data["rules"] == {"TF335": "warning"}, "a clock of the source is no error"
+    built = compiled(text, tmp_path)
+    assert built.robot
+    clocks = {one.name: one.params.get("use_sim_time") for one in built.robot.processes}
+    assert (clocks["a"], clocks["b"], clocks["c"]) == ("true", False, None)
+
+
+def test_a_command_is_given_no_namespace(tmp_path: Path) -> None:
+    _, data = import_of(source(tmp_path, "a.launch.xml", AROUND_A_COMMAND))
+    assert data["ros"]["namespace"] == "left"
+    assert data["processes"]["outside"]["namespace"] == "/"
+    assert "namespace" not in data["processes"]["listed"]
+
+
+AROUND_A_COMMAND = """<launch>
+  <node pkg="robot_state_publisher" exec="robot_state_publisher" namespace="left">
+    <param name="robot_description" value="&lt;robot name='r'>&lt;link name='l'/>&lt;/robot>"/>
+  </node>
+  <node pkg="p" exec="e" name="inside" namespace="left"/>
+  <node pkg="p" exec="e" name="outside"/>
+  <executable cmd="ros2 topic list" name="listed"/>
+</launch>
 """
 
 

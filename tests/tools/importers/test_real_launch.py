@@ -313,6 +313,17 @@ ORDERS: dict[str, tuple[str, list[Any]]] = {
         "name='n', namespace='a',",
         [{"x": 3}, "/*/n: {ros__parameters: {x: 1}}", ALL],
     ),
+    "arguments_come_before": (
+        "name='n', arguments=['--ros-args', '-p', 'x:=7', '-p', 'y:=8'],",
+        [ALL],
+    ),
+    "arguments_of_a_full_name": (
+        "name='n', namespace='', arguments=['--ros-args', '-p', 'x:=7'],",
+        [{"y": 3}],
+    ),
+    "a_text_that_yaml_leaves_bare": ("name='n',", [{"y": "1e5"}]),
+    "a_text_that_is_infinite": ("name='n', namespace='',", [{"y": "inf"}]),
+    "a_text_that_yaml_quotes": ("name='n',", [{"y": "1.0"}]),
     "no_name": ("", [N, {"x": 3}]),
     "no_name_and_a_mapping_whose_section_is_before": ("", [ALL + N, {"x": 3}]),
     "no_name_and_a_file_for_all": ("", [{"x": 3, "y": 3}, N + ALL]),
@@ -355,10 +366,10 @@ def test_a_real_node_has_the_parameters_that_it_has_with_launch(
     text = ORDER.replace("NAMED", named).replace("GIVEN", repr(params))
     file = Path(file_of("a.launch.py", text))
     (launched,) = recorded(file)
-    contents, words = iter(launched["params"]), launched["words"]
+    texts, words = iter(launched["texts"]), launched["words"]
     for at, word in enumerate(words):
         if word == "--params-file":
-            words[at + 1] = file_of(f"launched_{at}.yaml", json.dumps(next(contents)))
+            words[at + 1] = file_of(f"launched_{at}.yaml", next(texts))
     robot = compiled(import_of(file)[0], tmp_path).robot
     assert robot
     built = {one.path: one.text for one in emit(robot)}

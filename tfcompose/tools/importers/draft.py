@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from tfcompose.compiler.compile import Compiled
     from tfcompose.foundation.geometry import Pose, Vector
+    from tfcompose.model.files import Target
 
 #: A section and the name of an entry in it; both are empty for the file itself.
 Entry = tuple[str, str]
@@ -49,6 +50,11 @@ SECTIONS = (
 )
 #: So near to 1 a quaternion's length is left as the source has it.
 _UNIT = 1e-7
+#: Errors of a robot file that are warnings where its source is so, and why.
+_OF_SOURCE = {
+    "TF335": "the clocks are those of the source, whose nodes do not agree",
+    "TF501": "the names are those of the source",
+}
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 
 
@@ -81,6 +87,8 @@ class ImportDraft:
     neighbours: dict[str, str] = field(default_factory=dict)
     #: Those of ``made`` that are among them.
     used: set[str] = field(default_factory=set)
+    #: Each process with its use_sim_time, None where the source does not set it, and its place.
+    clocks: list[tuple[str, Any, Span | None]] = field(default_factory=list)
 
     def note(self, at: Entry, *texts: str) -> None:
         """Put comments above an entry, each once."""
@@ -205,6 +213,26 @@ class ImportDraft:
         return {**self.sections, "frames": {**roots, **frames}}
 
 
+def path_from(target: Target, path: str) -> str:
+    """Return a path as the robot file has it.
+
+    From its folder, or absolute where they have but the root in common.
+    """
+    begin = posixpath.normpath(posixpath.join(target.top, target.folder))
+    is_near = posixpath.commonpath([begin, posixpath.join(target.top, path)]) != "/"
+    return (
+        target.from_folder(path)
+        if is_near
+        else posixpath.normpath(posixpath.join(target.top, path))
+    )
+
+
+def where(at: Span | None, what: str = "") -> str:
+    """Return the place of a value as a comment has it."""
+    place = f"{posixpath.basename(at.file)}:{at.line}" if at and at.file else ""
+    return ": ".join(word for word in (place, what) if word)
+
+
 def _described(parent: str, keys: Mapping[str, Any]) -> str:
     return flow({"parent": parent, **keys})
 
@@ -245,7 +273,7 @@ def text_with_findings(
 ) -> tuple[str, Compiled]:
     """Return the robot file, and what ``lint`` finds in it.
 
-    Names of the source are no errors, and a source without frames gives a robot of one.
+    Names and clocks of the source are no errors, and a source without frames gives a robot of one.
     """
     if not any(
         draft.sections[title] for title in ("links", "joints", "frames", "sensors", "parts")
@@ -258,8 +286,11 @@ def text_with_findings(
             "the source says nothing of frames: those of the robot belong here",
         )
     compiled = lint(draft.text())
-    if any(one.code == "TF501" for one in compiled.errors):
-        draft.sections["rules"]["TF501"] = "warning"
-        draft.note(("rules", "TF501"), "the names are those of the source")
+    errors = {error.code for error in compiled.errors}
+    for code, why in _OF_SOURCE.items():
+        if code in errors:
+            draft.sections["rules"][code] = "warning"
+            draft.note(("rules", code), why)
+    if draft.sections["rules"]:
         compiled = lint(draft.text())
     return draft.text(), compiled

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.foundation.findings import RejectedError, Span, finding
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
 from tfcompose.foundation.reading import is_file, is_folder, names_in
-from tfcompose.tools.importers.draft import pose_keys
-from tfcompose.tools.importers.programs import where
+from tfcompose.tools.importers.draft import pose_keys, where
 from tfcompose.tools.importers.texts import Argument, Text, concatenated
 from tfcompose.tools.importers.yaml_text import ExpressionText
 

@@ -15,6 +15,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import yaml
+
 from tfcompose.foundation import confined
 from tfcompose.foundation.confined import Outcome, run_confined
 from tfcompose.foundation.findings import RejectedError, Span, finding
@@ -30,24 +32,24 @@ from tfcompose.model.process_keys import (
     Seconds,
     launch_keywords,
 )
-from tfcompose.tools.importers.launch_records import relative, scalar_of
+from tfcompose.model.robot import value_of_word
+from tfcompose.tools.importers.draft import path_from, where
+from tfcompose.tools.importers.launch_records import PACKAGE, relative, scalar_of
 from tfcompose.tools.importers.launch_ros1 import has_only_transforms, is_of_ros1
-from tfcompose.tools.importers.programs import (
+from tfcompose.tools.importers.program import (
     CONTAINERS,
     JOINT_PUBLISHERS,
-    PACKAGE,
-    SEVERAL,
     STATE_PUBLISHER,
     Description,
     Program,
-    add_program,
-    is_finite,
+)
+from tfcompose.tools.importers.programs import add_program
+from tfcompose.tools.importers.robot_settings import (
+    SEVERAL,
     is_setting,
     isolated,
     one_clock,
     one_namespace,
-    path_from,
-    where,
 )
 from tfcompose.tools.importers.static_transforms import PLUGIN as STATIC_PLUGIN
 from tfcompose.tools.importers.static_transforms import PROGRAM, static_words
@@ -594,6 +596,8 @@ class _LaunchImport:
     def _program(self, record: dict[str, Any], span: Span) -> Program:
         todo: list[str] = []
         params, description = _split_description(record.get("params", []), todo)
+        if record["kind"] != "component":
+            params = list(map(_as_in_file, params))
         keys = self._keys(record, todo)
         argv = tuple(record.get("argv", ()))
         if record.get("executable") in _READ:
@@ -837,12 +841,30 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
                 description = _description(value)
             elif files := files_in(value):
                 todo.append(f"the parameter {key}, which is the text of {files[0].file}")
-            elif value is None or value == [] or not is_finite(value) or not _is_uniform(value):
+            elif value is None or value == [] or not _is_uniform(value):
                 todo.append(f"the parameter {key}: {value!r}")
             else:
                 own[key] = value
         kept.append(own)
     return kept, description
+
+
+def _as_in_file(value: Any) -> Any:
+    """Return parameters as rcl reads them in the file that launch writes.
+
+    Its YAML leaves 1e5 without quotes, which is a text there and a number here.
+    """
+    if isinstance(value, dict):
+        return {key: _word(item) for key, item in value.items()}
+    return value
+
+
+def _word(value: Any) -> Any:
+    if isinstance(value, list):
+        return list(map(_word, value))
+    if not isinstance(value, str) or isinstance(value, Text) or value_of_word(value) == value:
+        return value
+    return value if yaml.safe_dump(value).startswith(("'", '"')) else value_of_word(value)
 
 
 def _is_uniform(value: Any) -> bool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import functools
 import importlib.abc
 import importlib.machinery
+import importlib.util
 import sys
 import types
 from pathlib import Path
@@ -40,6 +41,8 @@ def attach(context: RecordingContext) -> None:
     """Let launch files import these modules."""
     _find_in_index(context)
     replaced = _replaced(context)
+    if importlib.util.find_spec("moveit_configs_utils"):
+        del replaced["moveit_configs_utils"]  # its own code knows best what it reads
     for name in [name for name in sys.modules if name.partition(".")[0] in replaced]:
         del sys.modules[name]
     sys.meta_path.insert(0, _Replaced(replaced))

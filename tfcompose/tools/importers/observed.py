@@ -17,7 +17,7 @@ from tfcompose.foundation.numbers import number
 from tfcompose.foundation.yaml_text import flow
 from tfcompose.model.robot import Edge, Robot
 from tfcompose.tools.importers.draft import pose_keys
-from tfcompose.tools.importers.programs import STATE_PUBLISHER
+from tfcompose.tools.importers.program import STATE_PUBLISHER
 from tfcompose.tools.importers.robot_file import sensor_keys
 from tfcompose.tools.importers.sensors import recognised
 

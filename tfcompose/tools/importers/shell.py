@@ -14,14 +14,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import RejectedError, Span, finding
-from tfcompose.tools.importers.programs import (
-    BEFORE,
-    Program,
-    add_program,
-    is_setting,
-    one_clock,
-    one_namespace,
-)
+from tfcompose.tools.importers.command_lines import BEFORE
+from tfcompose.tools.importers.program import Program
+from tfcompose.tools.importers.programs import add_program
+from tfcompose.tools.importers.robot_settings import is_setting, one_clock, one_namespace
 from tfcompose.tools.importers.static_transforms import PROGRAM
 
 if TYPE_CHECKING:

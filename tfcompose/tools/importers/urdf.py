@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from tfcompose.compiler.urdf.lint import read_urdf
 from tfcompose.compiler.urdf.packages import Packages
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.tools.importers.programs import PACKAGE, path_from, where
+from tfcompose.tools.importers.draft import path_from, where
+from tfcompose.tools.importers.launch_records import PACKAGE
 from tfcompose.tools.importers.robot_file import imported, put_into
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from tfcompose.compiler.resolve import Library
     from tfcompose.model.files import Target
     from tfcompose.tools.importers.draft import ImportDraft
-    from tfcompose.tools.importers.programs import Description
+    from tfcompose.tools.importers.program import Description
 
 _OUTSIDE = "--package NAME=FOLDER names its package; --trust is for files of your own"
 #: As what the text of a description is read.

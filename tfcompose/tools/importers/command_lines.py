@@ -1,0 +1,154 @@
+"""Command lines: which program they start, and what its ROS arguments say."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import shlex
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.spec.load.params import load_params
+from tfcompose.tools.importers.node_params import value_in
+from tfcompose.tools.importers.static_transforms import PROGRAM
+from tfcompose.tools.importers.texts import Text, concatenated, partition, parts_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.tools.importers.program import Program
+    from tfcompose.tools.importers.static_transforms import Reader
+
+#: Words that stand before a program and leave it what it is.
+BEFORE = frozenset({"exec", "nohup", "time", "stdbuf", "setsid"})
+
+
+def with_ros_arguments(program: Program) -> Program:
+    """Return the program with what it is a command line of, and with its ROS arguments as keys."""
+    if program.shell:
+        program = _without_shell(program)
+    if program.package is None and not program.shell:
+        program = _of_command(program)
+    return _without_ros_arguments(program) if program.package is not None else program
+
+
+#: What a shell does more with than take it as a part of a word.
+_OF_SHELLS = re.compile(r"[$`|&;<>(){}*?~#\[\]!\n]|^\s*\w+=")
+
+
+def _without_shell(program: Program) -> Program:
+    """Return what a shell would start, where it does nothing but split the text into words.
+
+    The arguments of a package's program are split so too, and what more a shell does with them is
+    left out with a word.
+    """
+    text = concatenated(program.argv, " ")
+    is_known = all(isinstance(part, str) for part in parts_of(text))
+    does_more = not is_known or bool(_OF_SHELLS.search(text))
+    words = program.argv
+    try:
+        words = tuple(shlex.split(text)) if is_known else words
+    except ValueError:
+        does_more = True
+    if program.package is not None:
+        todo = (f"what a shell makes of {text}",) if does_more else ()
+        return replace(program, argv=words, shell=False, todo=(*program.todo, *todo))
+    if not does_more:
+        plain = replace(program, argv=words, shell=False)
+        return plain if _of_command(plain).package else program
+    if PROGRAM in text:
+        return replace(program, todo=(*program.todo, f"the edge of the {PROGRAM} in it"))
+    return program
+
+
+def _of_command(program: Program) -> Program:
+    """Return the package's program that a command starts, if it starts one."""
+    words = list(program.argv)
+    while words and words[0] in BEFORE:
+        words.pop(0)
+    match words:
+        case ["ros2", "run", package, executable, *rest] if not package.startswith("-"):
+            reader: Reader | None = "ros2"
+        case ["rosrun", package, executable, *rest] if not package.startswith("-"):
+            reader = "tf" if package == "tf" else "tf2_ros"
+        case [path, *rest] if posixpath.basename(path) == PROGRAM:
+            package, executable, reader = "tf2_ros", PROGRAM, None
+        case _:
+            return program
+    return replace(
+        program,
+        package=package,
+        executable=executable,
+        argv=tuple(rest),
+        reader=program.reader or reader,
+    )
+
+
+def _without_ros_arguments(program: Program) -> Program:
+    """Return the program with what ``--ros-args`` says as its keys.
+
+    What has no key stays an argument. They stand before what launch itself says: of two rules the
+    first one counts, of two values the last one.
+    """
+    own: list[str] = []
+    kept: list[str] = []
+    params: list[Mapping[str, Any] | str] = []
+    remap: list[tuple[str, str]] = []
+    names: dict[str, str] = {}
+    keys = dict(program.keys)
+    inside = False
+    words = iter(program.argv)
+    for word in words:
+        if not inside or word in {"--ros-args", "--"}:
+            inside = word == "--ros-args" if word in {"--ros-args", "--"} else inside
+            if not inside and word != "--ros-args":
+                own.append(word)
+            continue
+        value = next(words, "") if word in _WITH_VALUE else ""
+        left, _, right = partition(value, ":=")
+        if word in {"-r", "--remap"} and right:
+            if left in _NAMES:
+                names.setdefault(_NAMES[left], right)
+            else:
+                remap.append((left, right))
+        elif word in {"-p", "--param"} and right:
+            params.append({left: _yaml_value(right)})
+        elif word == "--params-file":
+            params.append(value)
+        elif word == "--log-level" and value in _LEVELS:
+            keys["log_level"] = value
+        else:
+            kept += [word, value] if value else [word]
+    argv = (*own, "--ros-args", *kept) if kept else tuple(own)
+    before = len(params)
+    return replace(
+        program,
+        argv=argv,
+        params=(*params, *program.params),
+        exact=range(program.exact.start + before, program.exact.stop + before),
+        remap=(*remap, *program.remap),
+        name=names.get("name", program.name),
+        namespace=names.get("namespace", program.namespace),
+        keys=keys,
+    )
+
+
+#: The rules that give a node its name and namespace.
+_NAMES = {"__node": "name", "__name": "name", "__ns": "namespace"}
+_WITH_VALUE = frozenset(
+    {"-r", "--remap", "-p", "--param", "--params-file", "--log-level", "-e", "--enclave"}
+)
+_LEVELS = frozenset({"debug", "info", "warn", "error", "fatal"})
+
+
+def _yaml_value(text: str) -> Any:
+    """Return a parameter of the command line, which ROS reads as one of a parameter file."""
+    if isinstance(text, Text):
+        return text
+    try:
+        (section,) = load_params(f"n:\n  ros__parameters:\n    value: {text}\n", "").nodes
+    except (RejectedError, ValueError):
+        return text
+    value = section.params.get("value", text)
+    return text if isinstance(value, dict) else value_in(value)

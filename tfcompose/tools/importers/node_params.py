@@ -1,0 +1,181 @@
+"""Parameters of a node, as a robot file has them."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.resolve.param_files import matches
+from tfcompose.compiler.resolve.processes import FILE_KEY
+from tfcompose.foundation.findings import RejectedError
+from tfcompose.foundation.reach import OutsideError
+from tfcompose.foundation.reading import is_file
+from tfcompose.foundation.yaml_text import flow, parameter
+from tfcompose.model.robot import value_of_word
+from tfcompose.spec.load.params import Word, load_params
+from tfcompose.tools.importers.draft import path_from
+from tfcompose.tools.importers.launch_records import PACKAGE
+from tfcompose.tools.importers.texts import MadeFile, Text, concatenated
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from tfcompose.model.files import Target
+    from tfcompose.spec.load.params import NodeParams
+    from tfcompose.tools.importers.draft import ImportDraft
+    from tfcompose.tools.importers.program import Program
+
+#: Parameters by the names of nodes, and where these are not one, by the place in order.
+_Sections = dict[tuple[str, int], dict[str, Any]]
+#: The section of a parameter file that means every node.
+_ANY = "/**"
+_NODE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+#: Of a parameter file.
+MOST_BYTES = 16_000_000
+
+
+def named_in_files(params: Sequence[Mapping[str, Any] | str], draft: ImportDraft) -> str | None:
+    """Return the node that parameter files are written for, where that is one alone.
+
+    None where none is named.
+    """
+    files = [file for file in params if isinstance(file, str)]
+    nodes = [node.name for file in files for node in _nodes_in(file, draft) or ()]
+    names = {node.rpartition("/")[2] for node in nodes if "*" not in node}
+    name = names.pop() if len(names) == 1 else ""
+    return name if _NODE.fullmatch(name) else None
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedParams:
+    """Parameters of a process as a robot file has them.
+
+    ``common`` holds its files, and what counts before them; a node that keeps its name has its
+    ``own`` beside them. ``argv`` are those that a robot file has no key for, ``left`` says what is
+    not taken. ``clock`` is the use_sim_time that counts, None where nothing sets it.
+    """
+
+    common: dict[str, Any] = field(default_factory=dict)
+    own: dict[str, Any] = field(default_factory=dict)
+    argv: list[str] = field(default_factory=list)
+    left: list[str] = field(default_factory=list)
+    clock: Any = None
+
+
+def params_of(
+    program: Program, target: Target, node: str, draft: ImportDraft, *, keeps_name: bool
+) -> ImportedParams:
+    """Return the parameters of a node.
+
+    rcl keeps sections in the order in which their names come first, and of several for a node the
+    last one counts; launch itself gives a component one after the other. A robot file's own
+    parameters count before those of its files: it has those that its files alone do not give.
+    Where a node ``keeps_name``, they are for every node of the process.
+    """
+    files: list[str] = []
+    left = []
+    full = f"{(program.namespace or '').rstrip('/')}/{node}"
+    sections: _Sections = {}
+    of_files: _Sections = {}
+    for index, one in enumerate(program.params):
+        if not isinstance(one, str):
+            params = {key: brought(value, draft) for key, value in one.items()}
+            given = [(full if index in program.exact else _ANY, params)]
+        elif one.startswith(PACKAGE):
+            left.append(f"the parameters of {one}: the package is not found here")
+            continue
+        elif one not in draft.made and not is_file(posixpath.join(target.top, one)):
+            left.append(f"the parameters of {one}, which is not there")
+            continue
+        else:
+            files.append(draft.bring(one) if one in draft.made else path_from(target, one))
+            nodes = _nodes_in(one, draft)
+            if nodes is None and any(sections.values()):
+                left.append(
+                    f"{one} is laid over the parameters before it: here they are laid over the"
+                    " file"
+                )
+            given = [(each.name, dict(_by_full_name(each.params, ""))) for each in nodes or ()]
+            for name, params in given:
+                of_files.setdefault((name, 0), {}).update(params)
+        for name, params in given:
+            sections.setdefault((name, index if program.plugin else 0), {}).update(params)
+    common: dict[str, Any] = {}
+    if keeps_name:
+        in_file = of_files.setdefault((_ANY, 0), {})
+        common = _other_than(in_file, sections.get((_ANY, 0), {}))
+        in_file |= common
+    counting = _that_count(sections, full)
+    own = _other_than(_that_count(of_files, full), counting)
+    argv = _file_parameter(common) + _file_parameter(own)
+    if argv and program.plugin:
+        left.append(f"the parameter {FILE_KEY}")
+        argv = []
+    named: dict[str, Any] = {FILE_KEY: files[0] if len(files) == 1 else files} if files else {}
+    common, own = (_values(common), _values(own)) if keeps_name else (_values(own), {})
+    clock = value_in(counting.get("use_sim_time"))
+    return ImportedParams(named | common, own, argv, left, clock)
+
+
+def _other_than(known: Mapping[str, Any], params: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in params.items() if value is not known.get(key)}
+
+
+def _file_parameter(params: dict[str, Any]) -> list[str]:
+    """Take the parameter that has the name of the key for files; return it as arguments."""
+    if not isinstance(params.get(FILE_KEY), (str, list)):
+        return []
+    value = params.pop(FILE_KEY)
+    text = concatenated(["'", value, "'"]) if isinstance(value, str) else flow(value)
+    return ["--ros-args", "-p", concatenated([f"{FILE_KEY}:=", text])]
+
+
+def brought(value: Any, draft: ImportDraft) -> Any:
+    """Return a text with the path of a file that the source makes at its end as ours."""
+    if isinstance(value, list):
+        return [brought(item, draft) for item in value]
+    made = next((path for path in draft.made if str(value).endswith(path)), None)
+    if made is None or not isinstance(value, str):
+        return value
+    return Text.of((value.removesuffix(made), MadeFile(draft.bring(made))))
+
+
+def _values(params: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: parameter(value_in(value)) for key, value in params.items()}
+
+
+def _that_count(sections: _Sections, node: str) -> dict[str, Any]:
+    """Return the parameters that a node has of sections, which are by their names in order."""
+    several = (params for (name, _), params in sections.items() if matches(name, node))
+    return {key: value for params in several for key, value in params.items()}
+
+
+def value_in(value: Any) -> Any:
+    """Return a parameter's value, also where it is words of a file."""
+    if isinstance(value, list):
+        return list(map(value_in, value))
+    if isinstance(value, Word):
+        return value_of_word(value.text) if value.plain else value.text
+    return value
+
+
+def _by_full_name(params: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
+    for key, value in params.items():
+        if isinstance(value, dict):
+            yield from _by_full_name(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def _nodes_in(file: str, draft: ImportDraft) -> list[NodeParams] | None:
+    """Return what a parameter file has for nodes, or None where it has nothing.
+
+    None, too, if it is not there, or may not be read.
+    """
+    try:
+        text = draft.made.get(file) or draft.reach.read(file, MOST_BYTES).decode()
+        return load_params(text, file).nodes or None
+    except (OSError, OutsideError, UnicodeDecodeError, RejectedError):
+        return None

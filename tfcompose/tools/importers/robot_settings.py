@@ -1,0 +1,108 @@
+"""Settings of the robot that a source gives each program: clock, namespace, domain."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.compiler.resolve.processes import FILE_KEY
+from tfcompose.model.robot import BUILT_IN
+from tfcompose.tools.importers.texts import argument_of, concatenated
+from tfcompose.tools.importers.yaml_text import ExpressionText
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.tools.importers.draft import ImportDraft
+
+_TF = ("/tf", "/tf_static")
+#: What of the environment is a setting of all processes.
+_SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
+#: What several robots are in a robot file.
+SEVERAL = "several robots are parts, each with its namespace, or a fleet: import each on its own"
+
+
+def one_clock(draft: ImportDraft) -> None:
+    """Set the robot's clock from node parameters or their argument, if all agree.
+
+    Parameter files count, too.
+    """
+    clocks = [clock for _, clock, _ in draft.clocks if clock is not None]
+    arguments = {argument_of(clock) for clock in clocks}
+    if clocks and all(clock is True for clock in clocks):
+        draft.sections["ros"]["clock"] = "sim"
+        _without_clock(draft)
+    elif len(arguments) == 1 and (argument := arguments.pop()):
+        draft.sections["ros"]["clock"] = ExpressionText(
+            f"'sim' if args.{argument.name} else 'wall'"
+        )
+
+
+def _without_clock(draft: ImportDraft) -> None:
+    """Leave the clock to the robot, and name the nodes that the source gives none."""
+    for keys in draft.started().values():
+        params = keys.get("params", {})
+        if FILE_KEY not in params and params.pop("use_sim_time", None) and not params:
+            del keys["params"]
+    nodes = {
+        name: at
+        for name, clock, at in draft.clocks
+        if clock is None and _takes_settings(draft.started()[name].get("run", {}))
+    }
+    if nodes:
+        message = f"the source sets no use_sim_time for {', '.join(nodes)}: here the clock is sim"
+        draft.todo(message, next(iter(nodes.values())))
+
+
+def _takes_settings(run: Any) -> bool:
+    """Return whether what a process runs is given the robot's settings as ROS arguments."""
+    return isinstance(run, dict) and "launch" not in run
+
+
+def is_setting(draft: ImportDraft, name: str, value: str) -> bool:
+    """Return whether a variable is a setting of the whole robot, which then has it.
+
+    The first value counts.
+    """
+    if name not in _SETTINGS:
+        return False
+    known = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
+    wanted = known[_SETTINGS[name]]
+    allowed = (
+        wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
+    )
+    return allowed and draft.sections["ros"].setdefault(_SETTINGS[name], wanted) == wanted
+
+
+def isolated(draft: ImportDraft, moved: Mapping[str, str], namespace: str | None) -> bool:
+    """Return whether remappings keep TF, or move it below the draft's namespace."""
+    new = {topic: moved[topic] for topic in _TF if moved.get(topic, topic) != topic}
+    if any(name != topic.strip("/") for topic, name in new.items()):
+        return False
+    space = (namespace or "").strip("/")
+    if not new or not space:
+        return True
+    if draft.sections["ros"].setdefault("namespace", space) != space:
+        return False
+    draft.sections["ros"]["isolate"] = "topics"
+    return True
+
+
+def one_namespace(draft: ImportDraft) -> None:
+    """Give namespaces as the robot's has them below it, and absolute where they are elsewhere."""
+    ros = draft.sections["ros"]
+    space = ros.get("namespace")
+    if not space:
+        return
+    for name, keys in draft.started().items():
+        if name in BUILT_IN:
+            continue
+        own = keys.pop("namespace", "")
+        if not own and not isinstance(keys.get("run", {}), dict):
+            continue  # a command is given no namespace
+        if own.startswith(f"{space}/"):
+            keys["namespace"] = own[len(space) + 1 :]
+        elif own != space:
+            keys["namespace"] = concatenated(["/", own])
+            if ros.get("isolate"):
+                message = f"{name} is not in {space}: its /tf is the robot's, {space}/tf"
+                draft.todo(message, None, draft.entry_of(name), SEVERAL)

@@ -1,6 +1,7 @@
 """Settings of a process reach the plan; impossible ones are refused with their place."""
 
 import json
+import math
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 import yaml
 
 from tfcompose.cli.compiling import disk, library
+from tfcompose.cli.reading import read_text
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit import emit
 from tfcompose.compiler.emit.plan import plan_of
@@ -18,6 +20,7 @@ from tfcompose.launcher.kernel_settings import SETTINGS
 from tfcompose.launcher.preflight import filled_in, folder_of, own_env
 from tfcompose.model.files import Target
 from tfcompose.model.plan import PlanProcess, Ready, StopRule
+from tfcompose.model.plan.components import ros_value
 from tfcompose.model.plan.file import read_plan, write_plan
 from tfcompose.model.robot import Process
 from tfcompose.spec.language.process import keys_of
@@ -105,6 +108,55 @@ def test_no_key_that_a_process_of_the_plan_has_as_well_is_left_out() -> None:
     shared = {one.name for one in fields(Process) if one.init} & keys_of("run")
     shared -= {setting.key for setting in SETTINGS}  # which are followed into the process itself
     assert shared <= {name for words in REACH.values() for name in words}
+
+
+def test_infinite_parameters_reach_a_node_and_a_component() -> None:
+    """JSON, which a component's are in, has no such number, nor has Python's syntax."""
+    params = "params: {far: .inf, near: -.inf, no: .nan, all: [.inf, 1.0]}"
+    text = f"b: {{{EXE}, {params}}}\n  a: {{component: p/C, container: box, {params}}}"
+    head = HEAD.replace("processes:", "containers: {box: {}}\nprocesses:")
+    files = files_of(text, head)
+    of_node = yaml.safe_load(files["params/b.yaml"])["/r1/b"]["ros__parameters"]
+    plan = read_plan(files["plan.json"], "plan.json")
+    assert write_plan(plan) == files["plan.json"]
+    component = plan.process("a").component
+    assert component
+    loaded = {name: ros_value(value) for name, value in component.params.items()}
+    for values in (of_node, loaded):
+        assert repr(values) == repr(
+            {"far": math.inf, "near": -math.inf, "no": math.nan, "all": [math.inf, 1.0]}
+        )
+
+
+SECTIONS = """
+/**: {ros__parameters: {x: 1, in: {x: 2, y: 3}}}
+/*/a: {ros__parameters: {x: 4, z: 5}}
+/r1/b: {ros__parameters: {x: 6}}
+"""
+
+
+def test_a_path_that_the_launcher_fills_in_counts_before_every_section_of_its_node(
+    tmp_path: Path,
+) -> None:
+    """The command line counts for /**, which a pattern that comes later is laid over."""
+    (tmp_path / "a.yaml").write_text(SECTIONS, encoding="utf-8")
+    params = "params: {file: a.yaml, x: '${file(a.png)}', in: {x: '${file(b.png)}'}}"
+    text = f"{HEAD}  a: {{{EXE}, {params}}}\n"
+    robot = compile_robot(text, str(tmp_path / "r.yaml"), library(), read=read_text).robot
+    assert robot
+    files = {file.path: file.text for file in emit(robot)}
+    nodes = yaml.safe_load(files["params/a.yaml"])
+    assert {name: node["ros__parameters"] for name, node in nodes.items()} == {
+        "/**": {"in": {"y": 3}},
+        "/*/a": {"z": 5},
+        "/r1/b": {"x": 6},
+        "/r1/a": {"in": {"y": 3}, "z": 5},
+    }
+    argv = read_plan(files["plan.json"], "plan.json").process("a").argv
+    assert [word.partition(":=")[0] for word in argv if word.startswith(("x:=", "in.x:="))] == [
+        "x",
+        "in.x",
+    ]
 
 
 COMMANDS: dict[str, tuple[str, ...]] = {

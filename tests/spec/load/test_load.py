@@ -88,6 +88,38 @@ def test_what_is_not_finite_is_a_finding_at_its_place(number: str) -> None:
     assert len(found[0].message) < 100
 
 
+@pytest.mark.parametrize(
+    "around",
+    [
+        "processes: {n: {params: {x: NUMBER}}}",
+        "containers: {n: {nodes: {/m: {params: {in: {x: [1.0, NUMBER]}}}}}}",
+        "sensors: {s: {driver: {params: {x: NUMBER}}}}",
+        "profiles: {sim: {processes: {params: {params: {x: NUMBER}}}}}",
+    ],
+)
+def test_parameters_of_nodes_may_be_infinite(around: str) -> None:
+    for number, value in ((".inf", math.inf), ("-.INF", -math.inf), ("+.Inf", math.inf)):
+        source = load(around.replace("NUMBER", number), "f")
+        assert not source.found
+        assert repr(value) in repr(source.data)
+    assert "nan" in repr(load(around.replace("NUMBER", ".nan"), "f").data)
+    assert [one.code for one in load(around.replace("NUMBER", "1e999"), "f").found] == ["TF007"]
+
+
+@pytest.mark.parametrize(
+    "around",
+    [
+        "frames: {params: {xyz: [.inf, 0, 0]}}",
+        "processes: {params: {restart_delay: .inf}}",
+        "sensors: {s: {frames: {params: {xyz: [.inf, 0, 0]}}}}",
+        "parts: {arm: {params: {x: .inf}}}",
+        "xml: {params: {x: .inf}}",
+    ],
+)
+def test_what_is_named_params_elsewhere_may_not_be_infinite(around: str) -> None:
+    assert [one.code for one in load(around, "f").found] == ["TF007"]
+
+
 TEXT = """\
 robot: r
 links:

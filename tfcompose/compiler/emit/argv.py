@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.compiler.resolve.param_files import matches
 from tfcompose.model.plan import PROGRAM, known_at_launch
+from tfcompose.model.plan.components import json_value
 from tfcompose.model.robot import AsInFile, value_of_word
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from tfcompose.model.robot import Process, Robot
 
@@ -136,19 +139,36 @@ def file_params(process: Process) -> dict[str, dict[str, Any]]:
     """Return what the process's parameter file holds, by node.
 
     First what the files that it names say to others, as every node of a process reads the file;
-    its own come last, which takes precedence. All but the paths that only the launcher knows.
+    its own come last, which takes precedence. All but the paths that only the launcher knows: a
+    section that means one of its nodes would count before what the command line says of them.
     """
     if process.kind != "run":
         return {}
+    names = [node.name for node in process.ros_nodes]
     nodes = process.other_params | {node.name: node.params for node in process.ros_nodes}
+    later = dict(_launch_time_params(process.params))
+    for section in [one for one in nodes if any(matches(one, name) for name in names)]:
+        nodes[section] = _without(nodes[section], later)
     known = {node: _known(params) for node, params in nodes.items()}
     return {node: params for node, params in known.items() if params}
+
+
+def _without(params: dict[str, Any], names: Collection[str], above: str = "") -> dict[str, Any]:
+    """Return parameters without those of these full names."""
+    kept = {}
+    for key, value in params.items():
+        if isinstance(value, dict):
+            kept[key] = _without(value, names, f"{above}{key}.")
+        elif f"{above}{key}" not in names:
+            kept[key] = value
+    return kept
 
 
 def component_params(process: Process, robot: Robot) -> dict[str, Any]:
     """Return the parameters of a component, by their full names, as values that ROS has."""
     clock = {"use_sim_time": True} if robot.ros.clock == "sim" else {}
-    return clock | {name: _typed(value) for name, value in process.ros_nodes[0].flat_texts.items()}
+    params = process.ros_nodes[0].flat_texts
+    return clock | {name: json_value(_typed(value)) for name, value in params.items()}
 
 
 def _typed(value: Any) -> Any:
@@ -205,6 +225,8 @@ def _text(value: Any) -> str:
         return str(value)
     if isinstance(value, list):
         return f"[{', '.join(map(_text, value))}]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value).replace("inf", ".inf").replace("nan", ".nan")
     return _ESCAPED.sub(
         lambda found: f"\\u{ord(found[0]):04x}", json.dumps(value, ensure_ascii=False)
     )

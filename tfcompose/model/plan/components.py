@@ -7,6 +7,7 @@ remappings and parameters go with the request.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 
 #: The services, below the container's node.
 LOAD, UNLOAD, LIST = "_container/load_node", "_container/unload_node", "_container/list_nodes"
+
+
+#: In JSON, the key of a number that is infinite or none.
+_DOUBLE = "double"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +83,22 @@ def load_request(
     params = {name: _filled(value, fill) for name, value in component.params.items()}
     loaded = replace(component, params=params)
     return LoadRequest(container.nodes[0], process.nodes[0], loaded, remap)
+
+
+def json_value(value: Any) -> Any:
+    """Return a parameter's value as JSON has it, which has no infinite numbers."""
+    if isinstance(value, list):
+        return [json_value(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return {_DOUBLE: str(value)}
+    return value
+
+
+def ros_value(value: Any) -> Any:
+    """Return the value of a parameter that ``json_value`` made."""
+    if isinstance(value, list):
+        return [ros_value(item) for item in value]
+    return float(value[_DOUBLE]) if isinstance(value, dict) else value
 
 
 def _filled(value: Any, fill: Callable[[str], str]) -> Any:

@@ -284,7 +284,8 @@ class Component:
 
     ``container`` is the process that loads it, ``plugin`` the class, of ``package``. ``params``
     are by their full names, with dots; a value is true or false, a number, a text, or a list of
-    one kind. ``extra_arguments`` are for the container: ``use_intra_process_comms``.
+    one kind, as ``components.json_value`` has them. ``extra_arguments`` are for the container:
+    ``use_intra_process_comms``.
     """
 
     container: str

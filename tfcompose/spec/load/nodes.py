@@ -25,7 +25,7 @@ from yaml.events import (
 )
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, finding
-from tfcompose.spec.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
+from tfcompose.spec.load.scalars import MAP, NOT_FINITE, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
 from tfcompose.spec.load.syntax import no_character, no_syntax
 
 if TYPE_CHECKING:
@@ -207,15 +207,29 @@ class DocumentReader:
                 return text
             return self.tagged(tag, text, place)
         except OverflowError as error:
+            if text.lower() in NOT_FINITE and self._is_parameter():
+                return NOT_FINITE[text.lower()]
             self.found.append(
                 finding(
                     "TF007",
                     str(error),
                     place.span,
-                    help="give a finite number; a node's parameter file may have infinite ones",
+                    help="give a finite number; only a node's params may be .inf or .nan",
                 )
             )
             return 1.0  # which sizes, masses and axes can be: one fault is one finding
+
+    def _is_parameter(self) -> bool:
+        """Return whether what is read is below the parameters of a node."""
+        keys = [part.key for part in self._stack]
+        match keys[2:] if keys[:1] == ["profiles"] else keys:
+            case (
+                ["processes" | "containers", _, "params", *_]
+                | ["processes" | "containers", _, "nodes", _, "params", *_]
+                | ["sensors", _, "driver", "params", *_]
+            ):
+                return True
+        return False
 
     def tagged(self, tag: str, text: str, place: Place) -> Any:
         """Return the value of a scalar with a tag, and note what is wrong with it."""

@@ -30,6 +30,8 @@ IMPLICIT = (
     ),
 )
 
+#: How YAML writes what is no finite number, in lower case.
+NOT_FINITE = {word: float(word.replace(".", "")) for word in (".inf", "+.inf", "-.inf", ".nan")}
 _PATTERNS = {tag: pattern for tag, pattern, _ in IMPLICIT}
 _FIRST = "nN~tTfF-+.0123456789"
 
@@ -84,12 +86,8 @@ def _number(tag: str, text: str) -> int | float:
         return number if len(text) < _MOST_DIGITS else _finite(_rounded(number), text)
     if tag == INT and len(text) < _MOST_DIGITS:
         return int(text)
-    value = (
-        float("nan")
-        if "n" in text.lower().replace("inf", "")
-        else float(text.lower().replace(".inf", "inf"))
-    )
-    return _finite(value, text)
+    value = NOT_FINITE.get(text.lower())
+    return _finite(float(text) if value is None else value, text)
 
 
 def _rounded(number: int) -> float:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from composition_interfaces.srv import ListNodes, LoadNode, UnloadNode
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 
-from tfcompose.model.plan.components import LIST, LOAD, UNLOAD
+from tfcompose.model.plan.components import LIST, LOAD, UNLOAD, ros_value
 from tfcompose.tf.ros.graph import is_offered
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def parameter(name: str, value: Any) -> Any:
     Raises:
         ValueError: if ROS has no parameter of that kind.
     """
+    value = ros_value(value)
     kinds = {type(item) for item in value} if isinstance(value, list) else {type(value)}
     kind = float if kinds == {int, float} else next(iter(kinds)) if len(kinds) == 1 else None
     field, number = (_LISTS if isinstance(value, list) else _SINGLE).get(kind, ("", 0))  # type: ignore[arg-type]

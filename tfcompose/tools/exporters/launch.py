@@ -5,6 +5,7 @@ from __future__ import annotations
 import graphlib
 import io
 import json
+import math
 import re
 import tokenize
 from itertools import pairwise
@@ -16,6 +17,7 @@ from tfcompose.foundation.numbers import number
 from tfcompose.launcher.program import ANYWHERE_PARTS
 from tfcompose.model.files import File
 from tfcompose.model.plan import STOCK_DESCRIPTION
+from tfcompose.model.plan.components import ros_value
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
 from tfcompose.model.process_keys import EXTRA_ARGUMENTS, PROCESS_KEYS, PythonCode
@@ -469,6 +471,8 @@ class _Export:
             return _mapping(
                 {name: self._python(process, item) for name, item in value.items()} | made
             )
+        if isinstance(value, float) and not math.isfinite(value):
+            return f'float("{value}")'
         return repr(value)
 
     def _node(self, process: PlanProcess, more: list[CodeBlock | str]) -> CodeBlock:
@@ -522,7 +526,9 @@ class _Export:
         if process.component is None:
             raise ValueError(f"{process.name} is no component")
         found = process.component
-        params = {name: self._python(process, value) for name, value in found.params.items()}
+        params = {
+            name: self._python(process, ros_value(value)) for name, value in found.params.items()
+        }
         params |= {
             name: parameter_code(text) for name, text in self._texts_of(process, "params").items()
         }

@@ -512,6 +512,17 @@ def test_the_clock_of_parameter_files_is_the_robots_if_all_agree(
     assert (clocks["a"], clocks["b"], clocks["c"]) == ("true", False, None)
 
 
+def test_the_clock_of_a_state_publisher_is_the_robots_and_nodes_without_one_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = '<param name="use_sim_time" value="true"/> </node>'
+    file = source(tmp_path, "a.launch.xml", AROUND_A_COMMAND.replace("</node>", clock))
+    text, data = import_of(file)
+    assert data["ros"]["clock"] == "sim"
+    assert "for inside, outside: here the clock is sim" in text
+    assert "a.launch.xml:5" in places(printed_errors(capsys), "TF020")
+
+
 def test_a_command_is_given_no_namespace(tmp_path: Path) -> None:
     _, data = import_of(source(tmp_path, "a.launch.xml", AROUND_A_COMMAND))
     assert data["ros"]["namespace"] == "left"

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import re
 from collections import defaultdict
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.compiling import disk_of, given_by, library, overlays_of
@@ -23,6 +22,7 @@ from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import OWN_KINDS
 from tfcompose.spec.language import Given, GivenArg, composed, profiles_in, validate, with_includes
 from tfcompose.spec.language.args import as_given
+from tfcompose.spec.language.argument_uses import HOLE, names_of, uses_of
 from tfcompose.spec.language.arguments import values_that_satisfy
 from tfcompose.spec.language.expressions import environment_in, names_in
 from tfcompose.spec.language.values import plain
@@ -38,30 +38,14 @@ from tfcompose.tools.exporters.launch_values import (
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from tfcompose.model.files import File
     from tfcompose.model.plan import Plan, PlanProcess
     from tfcompose.spec.language import ArgSpec
-    from tfcompose.spec.load import Path, Source
+    from tfcompose.spec.language.argument_uses import ArgumentUses
 
-_HOLE = re.compile(r"\$\{([^{}]*)\}")
 _ARGUMENT = re.compile(r"\s*args\.([A-Za-z_][A-Za-z0-9_]*)\s*")
-#: What of a process launch can compute, by the key.
-_PLACES = ("env", "params", "remap")
-
-
-@dataclass(slots=True)
-class _Uses:
-    """Where a robot file names what it is built with.
-
-    ``texts`` are those of processes that launch can compute, by process and place, ``conditions``
-    those of processes; ``fixed`` are arguments and variables that something else needs.
-    """
-
-    texts: dict[tuple[str, str], str] = field(default_factory=dict)
-    conditions: dict[str, str] = field(default_factory=dict)
-    fixed: set[str] = field(default_factory=set)
 
 
 def collect_launch_values(
@@ -77,10 +61,11 @@ def collect_launch_values(
         overlays_of(arguments),
         given_by(arguments),
     )
+    uses = uses_of(source)
     validated = validate(source, profiles_in(source), given_by(arguments))
     specs, values = validated.spec.args, validated.args
     kinds = {name: spec.kind for name, spec in specs.items()}
-    uses = _uses(source, kinds)
+    _fix_conditions(uses, kinds)
     there = {process.name: process for process in plan.managed}
     combined = _Combinations(arguments, plan, specs, values)
     missing = {
@@ -93,7 +78,7 @@ def collect_launch_values(
     }
     for name, expression in uses.conditions.items():
         if name not in there and name not in more:
-            uses.fixed |= set(names_in(f"${{{expression}}}"))
+            uses.fix(f"${{{expression}}}")
     kept, conditions = _settled(uses, kinds)
     texts: dict[str, dict[str, Text]] = defaultdict(dict)
     for (process, place), text in kept.items():
@@ -147,79 +132,17 @@ def _argument(name: str, spec: ArgSpec, value: Any) -> LaunchArgument:
     )
 
 
-def _uses(source: Source, kinds: Mapping[str, str]) -> _Uses:
-    uses = _Uses()
-    for path, text in _strings(
-        {key: value for key, value in source.data.items() if key != "profiles"}
-    ):
-        place = _place(path, source.data)
-        if place is None:
-            uses.fixed |= set(names_in(text)) | _variables_in(text)
-        elif place[1] == "when":
-            try:
-                expression = text.strip().removeprefix("${").removesuffix("}")
-                condition_code(expression, kinds)
-                uses.conditions[place[0]] = expression
-            except ValueError:
-                uses.fixed |= set(names_in(text)) | _variables_in(text)
-        else:
-            uses.texts[place] = text
-    for _, text in _strings(source.data.get("profiles")):
-        uses.fixed |= set(names_in(text)) | _variables_in(text)
-    return uses
-
-
-def _strings(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
-    """Yield the texts with expressions, keys as well, with their paths."""
-    if isinstance(value, str) and "${" in value:
-        yield path, value
-    elif isinstance(value, (dict, list)):
-        for step, item in value.items() if isinstance(value, dict) else enumerate(value):
-            if isinstance(step, str) and "${" in step:
-                yield (), step
-            yield from _strings(item, (*path, step))
-
-
-def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the process and the place in it, or None if launch cannot compute the value."""
-    if len(path) < 3 or path[0] not in {  # noqa: PLR2004
-        "processes",
-        "containers",
-    }:
-        return None
-    process = data[path[0]][path[1]]
-    name, key = str(path[1]), path[2]
-    if not isinstance(process, dict) or "for" in process:
-        return None
-    is_composition = path[0] == "containers" or "component" in process
-    if not is_composition and not isinstance(process.get("run"), (dict, list)):
-        return None
-    if key == "when":
-        return name, "when"
-    if key == "run":
-        match path[3:]:
-            case ("args", step) if isinstance(process["run"], dict):
-                step = list(process["run"]["args"]).index(step) if isinstance(step, str) else step
-                return name, f"args.{step}"
-            case (int(step),) if isinstance(process["run"], list):
-                return name, f"args.{step}"
-        return None
-    is_node = is_composition or (
-        isinstance(process["run"], dict) and "launch" not in process["run"]
-    )
-    if key == "env" or (
-        key in _PLACES and is_node and path[3] != "file" and "nodes" not in process
-    ):
-        return (
-            (name, f"{key}.{'.'.join(map(str, path[3:]))}")
-            if not isinstance(path[-1], int)
-            else None
-        )
-    return None
+def _fix_conditions(uses: ArgumentUses, kinds: Mapping[str, str]) -> None:
+    """Take conditions that launch cannot compute as something else that needs their arguments."""
+    for name, expression in list(uses.conditions.items()):
+        try:
+            condition_code(expression, kinds)
+        except ValueError:
+            uses.fix(f"${{{uses.conditions.pop(name)}}}")
 
 
 def _settled(
-    uses: _Uses, kinds: Mapping[str, str]
+    uses: ArgumentUses, kinds: Mapping[str, str]
 ) -> tuple[dict[tuple[str, str], str], dict[str, str]]:
     """Return the texts and conditions that launch computes.
 
@@ -229,30 +152,24 @@ def _settled(
     for at, text in uses.texts.items():
         if _parts(text, kinds) is None:
             del texts[at]
-            uses.fixed |= set(names_in(text)) | _variables_in(text)
+            uses.fix(text)
     before = -1
     while before != len(uses.fixed):
         before = len(uses.fixed)
         for at, text in list(texts.items()):
-            if uses.fixed & (set(names_in(text)) | _variables_in(text)):
-                uses.fixed |= set(names_in(texts.pop(at))) | _variables_in(text)
+            if uses.fixed & names_of(text):
+                uses.fix(texts.pop(at))
         for name, text in list(conditions.items()):
-            if uses.fixed & set(names_in(f"${{{text}}}")):
-                uses.fixed |= set(names_in(f"${{{conditions.pop(name)}}}"))
+            if uses.fixed & names_of(f"${{{text}}}"):
+                uses.fix(f"${{{conditions.pop(name)}}}")
     return texts, conditions
-
-
-def _variables_in(text: str) -> set[str]:
-    """Return the environment variables that a text reads, as ``env(NAME)``."""
-    found = (environment_in(hole.strip()) for hole in _HOLE.findall(text))
-    return {f"env({one[0]})" for one in found if one}
 
 
 def _parts(text: str, kinds: Mapping[str, str]) -> Text | None:
     """Return what a text consists of, or None where launch cannot compute something of it."""
     parts: list[str | ArgumentValue | VariableValue] = []
     end = 0
-    for hole in _HOLE.finditer(text):
+    for hole in HOLE.finditer(text):
         parts += [text[end : hole.start()]] if text[end : hole.start()] else []
         end = hole.end()
         argument, variable = _ARGUMENT.fullmatch(hole[1]), environment_in(hole[1].strip())

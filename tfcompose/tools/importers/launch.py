@@ -699,8 +699,8 @@ class _LaunchImport:
             self.draft.sections["ros"],
             self.draft.sections["processes"].setdefault("joints", {}),
         )
-        if params.get("use_sim_time") is True:
-            ros["clock"] = "sim"
+        if "use_sim_time" in params:
+            self.draft.clocks.append((STATE_PUBLISHER, params["use_sim_time"], span))
         own = {
             key: params[key] for key in ("publish_frequency", "ignore_timestamp") if key in params
         }

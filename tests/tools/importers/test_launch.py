@@ -502,7 +502,7 @@ def test_the_clock_of_parameter_files_is_the_robots_if_all_agree(
     file = source(tmp_path, "a.launch.xml", SIMULATED.replace("CLOCK", "true"))
     text, data = import_of(file)
     assert data["ros"]["clock"] == "sim"
-    assert "for c: here the clock is sim" in text, "a source without a clock for it"
+    assert "for c: here they have the robot's clock" in text
     assert "a.launch.xml:6" in places(printed_errors(capsys), "TF020")
     text, data = import_of(source(tmp_path, "a.launch.xml", SIMULATED.replace("CLOCK", "false")))
     assert data["rules"] == {"TF335": "warning"}, "a clock of the source is no error"
@@ -519,7 +519,7 @@ def test_the_clock_of_a_state_publisher_is_the_robots_and_nodes_without_one_are_
     file = source(tmp_path, "a.launch.xml", AROUND_A_COMMAND.replace("</node>", clock))
     text, data = import_of(file)
     assert data["ros"]["clock"] == "sim"
-    assert "for inside, outside: here the clock is sim" in text
+    assert "for inside, outside: here they have the robot's clock" in text
     assert "a.launch.xml:5" in places(printed_errors(capsys), "TF020")
 
 

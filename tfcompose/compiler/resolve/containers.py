@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tfcompose.spec.load import Path
 
 #: The program, by isolation and executor, and its arguments.
-_PROGRAMS = {
+PROGRAMS = {
     ("shared", "single"): ("component_container", ()),
     ("shared", "multi"): ("component_container_mt", ()),
     ("isolated", "single"): ("component_container_isolated", ()),
@@ -52,7 +52,7 @@ def container_process(name: str, declared: ContainerSpec, spec: RobotSpec) -> Pr
     process = replace(process, ready=process.ready or Ready("service", f"{node.name}/{LOAD}"))
     if declared.external:
         return process
-    program, arguments = _PROGRAMS[declared.isolation, declared.executor]
+    program, arguments = PROGRAMS[declared.isolation, declared.executor]
     return replace(
         process,
         package=declared.package,

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from tfcompose.compiler.resolve.containers import PROGRAMS
 from tfcompose.foundation import confined
 from tfcompose.foundation.confined import Outcome, run_confined
 from tfcompose.foundation.findings import RejectedError, Span, finding
@@ -24,6 +25,7 @@ from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import Reach
 from tfcompose.foundation.shape import fits
 from tfcompose.foundation.yaml_text import Bare
+from tfcompose.model.plan.stock import STATE_PUBLISHER
 from tfcompose.model.process_keys import (
     EXTRA_ARGUMENTS,
     PROCESS_KEYS,
@@ -39,7 +41,6 @@ from tfcompose.tools.importers.launch_ros1 import has_only_transforms, is_of_ros
 from tfcompose.tools.importers.program import (
     CONTAINERS,
     JOINT_PUBLISHERS,
-    STATE_PUBLISHER,
     Description,
     Program,
 )
@@ -420,6 +421,7 @@ class _LaunchImport:
 
         ``decided`` are arguments whose values stand in what was added.
         """
+        one_clock(self.draft)
         self._args({*decided, *self._read})
         self._into_containers()
         started = self.draft.started()
@@ -433,7 +435,6 @@ class _LaunchImport:
             if known:
                 started[name].setdefault("after", {}).update(known)
         self._delay()
-        one_clock(self.draft)
         one_namespace(self.draft)
         for package, span in self._missing.items():
             self.draft.todo(f"package {package} not found", span, advice=_ADVICE)
@@ -457,7 +458,7 @@ class _LaunchImport:
 
     def _args(self, decided: set[str]) -> None:
         """Add the arguments that entries name, and say of the others which values they had."""
-        used = arguments_in(self.draft.sections) | self._in_conditions()
+        used = arguments_in(self.draft.sections) | self._in_expressions()
         unread = {
             name: span
             for name, (_, span) in self._arguments.items()
@@ -510,13 +511,14 @@ class _LaunchImport:
                 f"what is imported holds for {several}", next(iter(fixed.values())), advice=advice
             )
 
-    def _in_conditions(self) -> set[str]:
+    def _in_expressions(self) -> set[str]:
         texts = [
             keys["when"]
             for entries in self.draft.sections.values()
             for keys in entries.values()
             if isinstance(keys, dict) and "when" in keys
         ]
+        texts.append(self.draft.sections["ros"].get("clock", ""))
         return {
             name
             for text in texts
@@ -640,9 +642,8 @@ class _LaunchImport:
         """
         if record["kind"] != "node":
             return False
-        is_stock = record["package"] == CONTAINERS and record["executable"].startswith(
-            "component_container"
-        )
+        stock = {program for program, _ in PROGRAMS.values()}
+        is_stock = record["package"] == CONTAINERS and record["executable"] in stock
         named = f"{(record['namespace'] or '').rstrip('/')}/{record['name']}"
         return is_stock or bool({str(record["id"]), named} & self._loading)
 

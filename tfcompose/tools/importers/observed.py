@@ -15,9 +15,9 @@ from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE
 from tfcompose.foundation.findings import Span
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.yaml_text import flow
+from tfcompose.model.plan.stock import STATE_PUBLISHER
 from tfcompose.model.robot import Edge, Robot
 from tfcompose.tools.importers.draft import pose_keys
-from tfcompose.tools.importers.program import STATE_PUBLISHER
 from tfcompose.tools.importers.robot_file import sensor_keys
 from tfcompose.tools.importers.sensors import recognised
 

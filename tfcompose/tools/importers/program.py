@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from tfcompose.foundation.findings import Span
     from tfcompose.tools.importers.static_transforms import Reader
 
-STATE_PUBLISHER = "robot_state_publisher"
 JOINT_PUBLISHERS = frozenset({"joint_state_publisher", "joint_state_publisher_gui"})
 #: The package of the stock containers of components.
 CONTAINERS = "rclcpp_components"

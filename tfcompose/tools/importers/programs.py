@@ -11,6 +11,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.compiler.resolve.containers import PROGRAMS
 from tfcompose.compiler.resolve.presets import node_preset, node_preset_names
 from tfcompose.foundation.numbers import number
 from tfcompose.foundation.reach import OutsideError
@@ -226,31 +227,22 @@ def _way(program: Program) -> dict[str, Any]:
     return {"run": _run(program)} | ({"shell": True} if program.shell else {})
 
 
-#: Containers of rclcpp_components, with the keys that name them.
-_CONTAINERS: dict[str, dict[str, Any]] = {
-    "component_container": {},
-    "component_container_mt": {"executor": "multi"},
-    "component_container_isolated": {"isolation": "isolated"},
-}
-_MULTI = "--use_multi_threaded_executor"
-
-
 def _container_keys(program: Program) -> dict[str, Any]:
     """Return what a container is.
 
     By its isolation and executor if it is a stock one, else by its program.
     """
     words = list(program.argv)
-    stock = _CONTAINERS.get(program.executable or "") if program.package == CONTAINERS else None
-    if stock is None:
-        keys: dict[str, Any] = (
-            {"package": program.package} if program.package != CONTAINERS else {}
-        )
-        return keys | {"executable": program.executable} | ({"args": words} if words else {})
-    keys = dict(stock)
-    if keys.get("isolation") and _MULTI in words:
-        words.remove(_MULTI)
-        keys["executor"] = "multi"
+    is_stock = program.package == CONTAINERS
+    keys: dict[str, Any] = {} if is_stock else {"package": program.package}
+    for (isolation, executor), (name, arguments) in reversed(PROGRAMS.items()):
+        if is_stock and program.executable == name and set(arguments) <= set(words):
+            words = [word for word in words if word not in arguments]
+            keys |= {"isolation": isolation} if isolation != "shared" else {}
+            keys |= {"executor": executor} if executor != "single" else {}
+            break
+    else:
+        keys["executable"] = program.executable
     return keys | ({"args": words} if words else {})
 
 

@@ -35,22 +35,28 @@ def one_clock(draft: ImportDraft) -> None:
         draft.sections["ros"]["clock"] = ExpressionText(
             f"'sim' if args.{argument.name} else 'wall'"
         )
+    if "clock" in draft.sections["ros"]:
+        _name_clockless(draft)
 
 
 def _without_clock(draft: ImportDraft) -> None:
-    """Leave the clock to the robot, and name the nodes that the source gives none."""
+    """Leave the clock to the robot, but where a parameter file has one too."""
     for keys in draft.started().values():
         params = keys.get("params", {})
         if FILE_KEY not in params and params.pop("use_sim_time", None) and not params:
             del keys["params"]
+
+
+def _name_clockless(draft: ImportDraft) -> None:
+    """Say which nodes have no clock in the source: here they have the robot's."""
     nodes = {
         name: at
         for name, clock, at in draft.clocks
         if clock is None and _takes_settings(draft.started()[name].get("run", {}))
     }
     if nodes:
-        message = f"the source sets no use_sim_time for {', '.join(nodes)}: here the clock is sim"
-        draft.todo(message, next(iter(nodes.values())))
+        message = f"the source sets no use_sim_time for {', '.join(nodes)}: here they have"
+        draft.todo(f"{message} the robot's clock", next(iter(nodes.values())))
 
 
 def _takes_settings(run: Any) -> bool:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from tfcompose.compiler.rays import View
     from tfcompose.foundation.geometry import Vector
-    from tfcompose.model.robot import MountedSensor, Optics, Robot, Zone
+    from tfcompose.model.robot import Edge, MountedSensor, Optics, Robot, Zone
 
 KINDS = ("camera", "lidar", "radar", "ultrasonic")
 
@@ -42,30 +42,30 @@ def _limit(robot: Robot, code: str) -> float:
 
 @dataclass(slots=True)
 class _Views:
-    """What stands around the frames of a robot, and the views of its sensors."""
+    """What stands around the frames of a robot, their edges, and the views of its sensors."""
 
     robot: Robot
     around: Surroundings
+    edges: dict[str, Edge]
     of_sensors: dict[str, list[View]] = field(default_factory=dict)
 
     def of(self, sensor: MountedSensor) -> list[View]:
         if sensor.name not in self.of_sensors:
-            is_placed = self.robot.links and _is_placed(self.robot, sensor)
+            is_placed = self.robot.links and self._is_placed(sensor)
             streams = different_streams(sensor) if is_placed else ()
             self.of_sensors[sensor.name] = [
                 view_of(self.around, sensor, stream) for stream in streams
             ]
         return self.of_sensors[sensor.name]
 
-
-def _is_placed(robot: Robot, sensor: MountedSensor) -> bool:
-    """Return whether the sensor has a pose; one at the origin of the base is not mounted yet."""
-    edge = robot.parent_edge(sensor.mount)
-    if edge is None or not edge.pose_known:
-        return False
-    return edge.pose != Pose() or not (
-        edge.parent == robot.base or edge.parent.endswith("base_link")
-    )
+    def _is_placed(self, sensor: MountedSensor) -> bool:
+        """Return whether it has a pose; at the origin of the base it is not mounted yet."""
+        edge = self.edges.get(sensor.mount)
+        if edge is None or not edge.pose_known:
+            return False
+        return edge.pose != Pose() or not (
+            edge.parent == self.robot.base or edge.parent.endswith("base_link")
+        )
 
 
 #: Of the robot that was asked for last: several rules need them, one after the other.
@@ -74,7 +74,8 @@ _LAST: list[_Views] = []
 
 def _views_of(robot: Robot) -> _Views:
     if not _LAST or _LAST[0].robot is not robot:
-        _LAST[:] = [_Views(robot, Surroundings(robot))]
+        edges = {edge.child: edge for edge in reversed(robot.edges)}  # a child's first
+        _LAST[:] = [_Views(robot, Surroundings(robot), edges)]
     return _LAST[0]
 
 

@@ -129,7 +129,7 @@ def test_a_plan_whose_lines_moved_is_followed_and_the_same_plan_is_not(tmp_path:
             {},
             lambda base, *_, **__: dict(base),
         )
-        assert change == PlanChange((), (), (), ())
+        assert change == PlanChange((), (), (), (), differs=is_followed)
         assert isinstance(event, NewPlan) == is_followed
 
 

@@ -123,3 +123,50 @@ def test_a_fixed_frame_that_vanished_is_held_by_listeners_and_a_moving_one_is_no
     tmp_path: Path,
 ) -> None:
     assert changed(tmp_path, replace(PLAN, edges=())).held == ("base → laser",)
+
+
+STATE_PUBLISHER = PlanProcess(
+    "joints",
+    "run",
+    argv=("${executable:robot_state_publisher/robot_state_publisher}",),
+    params_file="params/joints.yaml",
+)
+PARAMS = '"/rsp":\n  ros__parameters:\n    "rate": %s\n    "robot_description": "%s"\n'
+
+
+def fixed(child: str, x: float = 0.0) -> PlanEdge:
+    return replace(edge(child, x=x), owner="joints")
+
+
+@pytest.mark.parametrize(
+    ("edges", "params", "difference"),
+    [
+        ((fixed("mast", 0.1), fixed("top")), ("20", "<robot a/>"), ("described", "joints")),
+        ((fixed("mast"), fixed("top"), fixed("new")), ("20", "<robot b/>"), ("changed", "guard")),
+        ((fixed("mast", 0.1), fixed("top")), ("30", "<robot a/>"), ("changed", "joints")),
+        ((fixed("mast"),), ("20", "<robot/>"), ("changed", "joints")),
+        (
+            (fixed("mast"), replace(fixed("top"), kind="joint")),
+            ("20", "<robot/>"),
+            ("changed", "joints"),
+        ),
+        ((fixed("mast"), fixed("top")), ("20", "<robot>"), ("", "")),
+    ],
+)
+def test_a_stock_state_publisher_is_given_a_description_unless_a_fixed_frame_vanishes(
+    edges: tuple[PlanEdge, ...],
+    params: tuple[str, str],
+    difference: tuple[str, str],
+    tmp_path: Path,
+) -> None:
+    old = replace(PLAN, processes=(STATE_PUBLISHER, GUARD), edges=(fixed("mast"), fixed("top")))
+    for name, text in (("old", PARAMS % ("20", "<robot>")), ("new", PARAMS % params)):
+        (tmp_path / name / "params").mkdir(parents=True)
+        (tmp_path / name / "params" / "joints.yaml").write_text(text)
+    found = change(old, tmp_path / "old", replace(old, edges=edges), tmp_path / "new")
+    kind, name = difference
+    assert "joints" not in found.changed or kind == "changed"
+    assert (name in found.described, name in found.changed) == (
+        kind == "described",
+        kind == "changed",
+    )

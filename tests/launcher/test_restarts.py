@@ -10,7 +10,15 @@ from typing import Any
 import pytest
 
 from tests.support.findings import expect
-from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
+from tests.support.machine_history import (
+    GUARD,
+    SLAM,
+    STATIC,
+    History,
+    begin,
+    plan_of,
+    run_process,
+)
 from tfcompose.launcher.answers import status
 from tfcompose.launcher.events import Exited, LogMatched, NewPlan, Signalled
 from tfcompose.launcher.stopping import refusal
@@ -20,6 +28,8 @@ from tfcompose.model.messages import (
     AllReady,
     AllStarted,
     Clear,
+    DescriptionOrder,
+    DescriptionState,
     DownRequest,
     Gate,
     GateState,
@@ -403,6 +413,54 @@ def test_a_guard_that_goes_on_reads_another_plan() -> None:
     assert Reread("new.json") in history.orders
     history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"}), file="newer.json"))
     assert Reread("newer.json") not in history.orders, "the next one reads it itself"
+
+
+DESCRIBED = replace(run_process("rsp"), params_file="params/rsp.yaml", nodes=("/rsp",))
+GIVEN = DescriptionOrder("rsp", "/rsp", "b/params/rsp.yaml")
+
+
+def given_a_description(*, guard: bool = True) -> History:
+    guards = (GUARD,) if guard else ()
+    history = begin(*guards, STATIC, DESCRIBED).feed(*[Clear()] * int(guard))
+    plan = plan_of(*guards, STATIC, DESCRIBED)
+    return history.feed(NewPlan(plan, frozenset(), (), "b/plan.json", frozenset({"rsp"})))
+
+
+def test_the_guard_gives_a_process_its_new_description_and_nothing_is_restarted() -> None:
+    history = given_a_description()
+    assert GIVEN in history.orders
+    history.feed(DescriptionState("rsp"))
+    assert history.killed == []
+    assert history.all(Replanned) == [Replanned(described=("rsp",))]
+
+
+def test_a_process_that_refuses_its_description_is_started_anew() -> None:
+    history = given_a_description().feed(DescriptionState("rsp", "not a URDF"))
+    assert history.killed == [("rsp", SIGINT)]
+    assert history.feed(Exited("rsp", 0)).started[-1] == "rsp"
+    assert history.all(Replanned)[-1] == Replanned(("rsp",))
+    before = list(history.killed)
+    assert history.feed(DescriptionState("rsp", "late")).killed == before, "it was answered"
+
+
+def test_a_guard_that_follows_gives_the_description_that_was_not_taken() -> None:
+    history = given_a_description().feed(Exited("guard", 1))
+    history.sleep_until_due()
+    assert history.orders.count(GIVEN) == 2
+    history.feed(DescriptionState("rsp"), Exited("guard", 1)).sleep_until_due()
+    assert history.orders.count(GIVEN) == 2
+
+
+def test_a_process_that_started_anew_has_read_its_description() -> None:
+    history = given_a_description().feed(ProcessRequest("restart", "rsp"), Exited("rsp", 0))
+    history.feed(DescriptionState("rsp", "it does not answer")).feed(Exited("guard", 1))
+    history.sleep_until_due()
+    assert (history.orders.count(GIVEN), history.killed) == (1, [("rsp", SIGINT)])
+
+
+def test_without_a_guard_a_new_description_is_a_restart() -> None:
+    history = given_a_description(guard=False)
+    assert (history.killed, history.orders) == ([("rsp", SIGINT)], [])
 
 
 def test_a_tree_stays_complete_where_another_plan_changes_nothing_of_it() -> None:

@@ -214,7 +214,12 @@ class Console:
     @_write.register
     def _(self, notice: Replanned) -> None:
         self._width = max(self._width, *map(len, ("", *notice.added)))
-        parts = (("changed", notice.changed), ("new", notice.added), ("gone", notice.removed))
+        parts = (
+            ("changed", notice.changed),
+            ("new", notice.added),
+            ("gone", notice.removed),
+            ("new description", notice.described),
+        )
         changes = "; ".join(f"{label}: {', '.join(names)}" for label, names in parts if names)
         self._say(f"another plan: {changes or 'nothing to restart'}")
         if notice.held:

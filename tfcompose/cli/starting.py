@@ -172,9 +172,16 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     answer = request(place, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
         fail(who)
-    parts = (("restarted", answer.changed), ("started", answer.added), ("stopped", answer.removed))
+    parts = (
+        ("restarted", answer.changed),
+        ("started", answer.added),
+        ("stopped", answer.removed),
+        ("given the new description", answer.described),
+    )
     changes = "; ".join(f"{label}: {', '.join(names)}" for label, names in parts if names)
-    if changes:
+    if answer.differs:
+        print(f"{who}; {changes or 'the plan is another one, and nothing had to be restarted'}")
+    elif changes:
         print(f"{who}; {changes}")
     else:
         warn(f"{who}; the plan is the same; tfcompose down stops it")
@@ -182,7 +189,7 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
         print(vanished(answer.held))
     if arguments.wait:
         return wait_until_ready(place, arguments.timeout)
-    return 0 if changes or arguments.detach or arguments.update else FAILED
+    return 0 if changes or answer.differs or arguments.detach or arguments.update else FAILED
 
 
 def _with_profiles(found: Finding, arguments: Namespace) -> Finding:

@@ -27,6 +27,8 @@ from tfcompose.model.messages import (
     ComponentOrder,
     ComponentState,
     CurrentFindings,
+    DescriptionOrder,
+    DescriptionState,
     Gate,
     GateState,
     GuardEvent,
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.guard.components import Components
+    from tfcompose.guard.descriptions import Descriptions
     from tfcompose.guard.gates import Gates, Switches
     from tfcompose.guard.judge import Judge
     from tfcompose.guard.relay import Relay
@@ -62,6 +65,7 @@ _OBSERVATIONS = (
     Remember,
     Silent,
     ComponentState,
+    DescriptionState,
 )
 #: How often the launcher hears that the guard looks, in seconds.
 ALIVE_EVERY_S = 1.0
@@ -82,11 +86,13 @@ class OrderReader:
         judges: list[Judge],
         gates: Gates,
         components: Components,
+        descriptions: Descriptions,
         reread: Callable[[str], None],
     ) -> None:
         self._judges = judges
         self._gates = gates
         self._components = components
+        self._descriptions = descriptions
         self._reread = reread
         self._fd = int(os.environ[ORDERS_FD]) if ORDERS_FD in os.environ else None
         self._rest = b""
@@ -102,6 +108,7 @@ class OrderReader:
                         judge.absent(process)
                     self._gates.forget(process)
                     self._components.forget(process)
+                    self._descriptions.forget(process)
                 case Present(process):
                     for judge in self._judges:
                         judge.live.present(process)
@@ -109,10 +116,13 @@ class OrderReader:
                     self._gates.add(gate)
                 case ComponentOrder() as order:
                     self._components.take(order)
+                case DescriptionOrder() as order:
+                    self._descriptions.take(order)
                 case Reread(file):
                     self._reread(file)
         self._gates.check()
         self._components.check()
+        self._descriptions.check()
 
     def _lines(self) -> list[bytes]:
         try:

@@ -192,13 +192,26 @@ class Switches:
     """The nodes whose switches are read back."""
 
     def __init__(self, node: Node, plan: Plan, emit: Callable[[GuardEvent], None]) -> None:
+        self._node = node
         self._emit = emit
         self._due = self._finds_until = 0.0
-        self._nodes = [
-            _NodeSwitches(name, wanted, process.drives, _reader(node, name, tuple(wanted)))
-            for process in plan.processes
-            for name, wanted in process.switches.items()
-        ]
+        self._nodes: list[_NodeSwitches] = []
+        self.follow(plan)
+
+    def follow(self, plan: Plan) -> None:
+        """Read the switches of a plan from now on; nodes whose switches are the same go on."""
+        before = {node.node: node for node in self._nodes}
+        self._nodes = []
+        for process in plan.processes:
+            for name, wanted in process.switches.items():
+                known = before.get(name)
+                if known and (known.wanted, known.drives) == (wanted, process.drives):
+                    self._nodes.append(before.pop(name))
+                    continue
+                reader = _reader(self._node, name, tuple(wanted))
+                self._nodes.append(_NodeSwitches(name, wanted, process.drives, reader))
+        for gone in before.values():
+            gone.reader.close()
 
     @property
     def answered(self) -> list[str]:

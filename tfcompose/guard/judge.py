@@ -50,6 +50,11 @@ class JudgeMemory:
     live: LivenessMemory
 
 
+def started_nodes(plan: Plan) -> dict[str, str]:
+    """Return the processes that the plan starts, by their nodes."""
+    return {node: process.name for process in plan.managed for node in process.nodes}
+
+
 @dataclass(slots=True)
 class Judge:
     """The state of a watch over a plan; it observes ``settle_s`` before all clear.
@@ -84,11 +89,14 @@ class Judge:
         self.ledger = Ledger(self.plan, self._senders, self._start)
         self._publishers = PublisherReports(self.plan)
         self._sent = SentPoses(self.plan, self._senders)
-        self._started = {node: each.name for each in self.plan.managed for node in each.nodes}
+        self._started = started_nodes(self.plan)
 
     def follow(self, plan: Plan) -> None:
-        """Follow a plan that differs in its edges' lines, and in poses of fixed ones."""
+        """Follow a plan that differs in its edges' lines and poses, and in other processes."""
         self.plan = plan
+        self._publishers.follow(plan)
+        self._sent.follow(plan)
+        self._started = started_nodes(plan)
         self.live.follow(plan)
         self.ledger.follow(plan)
 

@@ -133,6 +133,9 @@ class Ledger:
         self._ended: dict[Group, list[tuple[Fault, bool]]] = {}
         #: Where publishers ran that have ended, by edges that others of the group go on with.
         self._left: dict[Group, dict[Ends, list[str]]] = {}
+        self._know_processes(plan)
+
+    def _know_processes(self, plan: Plan) -> None:
         self._drives = drives_of(plan)
         self._starts = {process.name: process.kind != "external" for process in plan.processes}
         offenders = [process for process in plan.managed if process.kind != "guard"]
@@ -140,8 +143,9 @@ class Ledger:
         self._nodes = {node for process in offenders for node in process.nodes}
 
     def follow(self, plan: Plan) -> None:
-        """Follow a plan that differs in its edges' lines, and in poses of fixed ones."""
+        """Follow a plan that differs in its edges' lines and poses, and in other processes."""
         self._plan = plan
+        self._know_processes(plan)
         self.planned = {edge.child: edge for edge in plan.edges}
         for entry in self.entries.values():
             entry.fault = self._as_planned(entry.fault)

@@ -31,6 +31,7 @@ from tfcompose.guard.channel import (
     recalled,
 )
 from tfcompose.guard.components import ComponentDriver, Components
+from tfcompose.guard.descriptions import Descriptions
 from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.flood import WAIT_S, FloodReader
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
@@ -362,8 +363,11 @@ def guard(own: Own, stop: Stop) -> None:
         losses = LossWatch(judged, emit)
         wrong = [losses.wrong, joints.wrong, *(judge.wrong for judge in judged)]
         silence = [judge.live.wrong for judge in judged]
-        reread = partial(_reread, own, judged)
-        orders = OrderReader(judged, Gates(node, emit), Components(node, emit), reread)
+        reread = partial(_reread, own, judged, switches)
+        descriptions = Descriptions(node, emit)
+        orders = OrderReader(
+            judged, Gates(node, emit), Components(node, emit), descriptions, reread
+        )
         steps = [orders.take, losses.check, *(watch.step for watch in watches)]
         steps += [memory.hand_on for memory in memories]
         steps += [
@@ -396,7 +400,7 @@ def guard(own: Own, stop: Stop) -> None:
             watch.close()
 
 
-def _reread(own: Own, judges: Sequence[Judge], file: str) -> None:
+def _reread(own: Own, judges: Sequence[Judge], switches: Switches | None, file: str) -> None:
     """Have the judges follow the plan in the file, which starts no guard anew."""
     try:
         plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
@@ -405,6 +409,8 @@ def _reread(own: Own, judges: Sequence[Judge], file: str) -> None:
         return
     for judge, part in zip(judges, plans_by_topics(plan, own.process).values(), strict=True):
         judge.follow(part)
+    if switches:
+        switches.follow(plan)
 
 
 def _watches(

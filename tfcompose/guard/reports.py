@@ -102,10 +102,14 @@ class PublisherReports:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self._plan = plan
-        self._nodes = {node for process in plan.processes for node in process.nodes}
         self._reported: dict[tuple[str, bytes], None] = {}
         self._silent_since: dict[bytes, float] = {}
+        self.follow(plan)
+
+    def follow(self, plan: Plan) -> None:
+        """Follow a plan from now on."""
+        self._plan = plan
+        self._nodes = {node for process in plan.processes for node in process.nodes}
 
     @property
     def changes(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 import time
 from dataclasses import dataclass
@@ -142,10 +143,12 @@ def _update(
         added=tuple(name for name in names if name not in before),
         removed=tuple(name for name in before if name not in names),
         held=different.held,
+        described=tuple(name for name in names if name in different.described & started),
+        differs=plan != state.plan,
     )
-    if plan == state.plan and not different.changed:
+    if plan == state.plan and not (different.changed or different.described):
         return answer, None, None
-    event = NewPlan(plan, different.changed, different.held, str(file))
+    event = NewPlan(plan, different.changed, different.held, str(file), different.described)
     return answer, event, (file, commands)
 
 
@@ -177,27 +180,47 @@ def _plain_file(file: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class PlanDifference:
-    """The processes that differ between two plans, and fixed frames that listeners keep."""
+    """The processes that differ between two plans, and fixed frames that listeners keep.
+
+    ``described`` are those that differ only in the robot's description, which they take as a
+    parameter.
+    """
 
     changed: frozenset[str]
     held: tuple[str, ...]
+    described: frozenset[str] = frozenset()
 
 
 def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDifference:
     """Return what differs; the folders hold the files that belong to the plans."""
     described = _bytes(old_folder, old.description) != _bytes(new_folder, new.description)
     before = {process.name: process for process in old.processes}
-    changed = set()
+    changed, redescribed = set(), set()
     for process in new.processes:
         other = before.get(process.name)
         if other is None:
             continue
-        same = old.started_with(other) == new.started_with(process) and (
-            _bytes(old_folder, other.params_file) == _bytes(new_folder, process.params_file)
-        )
-        if not same or (described and new.describes(process)):
+        files = (_bytes(old_folder, other.params_file), _bytes(new_folder, process.params_file))
+        same = old.started_with(other) == new.started_with(process)
+        if same and _only_described(*files):
+            redescribed.add(process.name)
+        elif not same or files[0] != files[1] or (described and new.describes(process)):
             changed.add(process.name)
-    return PlanDifference(frozenset(changed), _held(old, new))
+    return PlanDifference(frozenset(changed), _held(old, new), frozenset(redescribed))
+
+
+#: The line of a parameter file that the stock robot_state_publisher has its description in.
+_DESCRIPTION = re.compile(rb'^ +"robot_description": "[^\n]*"$', re.MULTILINE)
+
+
+def _only_described(before: bytes | None, after: bytes | None) -> bool:
+    """Return whether two parameter files differ in the robot's description only.
+
+    Robot_state_publisher takes that while it runs. It never forgets a fixed frame; but for one
+    that vanishes, or moves from now on, its edges are others, and it starts anew.
+    """
+    parts = [_DESCRIPTION.split(text or b"") for text in (before, after)]
+    return before != after and len(parts[0]) > 1 and parts[0] == parts[1]
 
 
 def _bytes(folder: Path, name: str | None) -> bytes | None:

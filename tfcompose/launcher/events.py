@@ -88,13 +88,15 @@ class NewPlan:
     """From now on another plan holds.
 
     ``changed`` are the processes that must be started anew for it, ``held`` the fixed edges that
-    listeners still hold, ``file`` is where the plan is.
+    listeners still hold, ``file`` is where the plan is. ``described`` only have another
+    description, which the guard can give them while they run.
     """
 
     plan: Plan
     changed: frozenset[str]
     held: tuple[str, ...] = ()
     file: str = ""
+    described: frozenset[str] = frozenset()
 
 
 Event = (

@@ -42,9 +42,11 @@ from tfcompose.launcher.readiness import (
 from tfcompose.launcher.state import StopReason, Transition, by_owner
 from tfcompose.launcher.stopping import (
     backoff_s,
+    description_answered,
     edge_taken,
     firmer_at,
     follow_plan,
+    order_descriptions,
     process_exited,
     process_requested,
     refusal,
@@ -57,6 +59,7 @@ from tfcompose.model.messages import (
     Clear,
     ComponentState,
     CurrentFindings,
+    DescriptionState,
     FindingShown,
     GateState,
     Live,
@@ -128,6 +131,8 @@ def _react(step: Transition, event: Event) -> None:
         case ComponentState(name, number):
             if name in step.state.tracked and step.state.tracked[name].order == number:
                 component_answered(step, event)
+        case DescriptionState(process) if process in step.state.tracked:
+            description_answered(step, event)
         case Taken(found):
             edge_taken(step, found)
         case _:
@@ -186,6 +191,7 @@ def _started(step: Transition, name: str, pid: int) -> None:
             if not other.ready and other.state in ("running", "expected"):
                 order_gate(step, other)
     order_components(step)
+    order_descriptions(step)
 
 
 def _introduce(step: Transition, owner: Tracked) -> None:

@@ -69,7 +69,8 @@ class Tracked:
     "stop" and it stays so, "again" and it is started, "drop" and it is forgotten. ``observed`` is
     what its gate found last, ``late`` whether that was reported. ``detail`` says why it is in its
     state. ``failed`` is what was reported when the run went on without it: the finding and the end
-    of its log.
+    of its log. ``description`` is the parameter file with a description that its node has not
+    taken.
     """
 
     process: PlanProcess
@@ -89,6 +90,7 @@ class Tracked:
     late: bool = False
     detail: str = ""
     failed: tuple[str, ...] = ()
+    description: str = ""
 
     @property
     def alive(self) -> bool:
@@ -236,6 +238,7 @@ class Transition:
         """Have the process started."""
         order = 1 + max(tracked.order for tracked in self.state.tracked.values())
         before = self.state.tracked[name]
+        self.track(name, replace(before, description=""))  # it reads its file
         again = before.order > 0
         component = before.process.component
         began = self.now if component else before.began

@@ -7,6 +7,7 @@ not help. One that ends is started again after a while, is requested by name, or
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import PurePath
 from signal import SIGKILL, SIGTERM, Signals
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,15 @@ from tfcompose.launcher.failures import (
     signal_name,
 )
 from tfcompose.launcher.state import UNREAD, StopReason, Tracked, by_owner
-from tfcompose.model.messages import Absent, ComponentOrder, DownRequest, Replanned, Reread
+from tfcompose.model.messages import (
+    Absent,
+    ComponentOrder,
+    DescriptionOrder,
+    DescriptionState,
+    DownRequest,
+    Replanned,
+    Reread,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -256,6 +265,8 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
     state, plan = step.state, event.plan
     before = state.tracked
     guards = [process.name for process in plan.processes if process.kind == "guard"]
+    if not guards or guards[0] != state.guard or not before[guards[0]].alive:
+        event = replace(event, changed=event.changed | event.described, described=frozenset())
     live = frozenset(edge.child for edge in plan.edges if edge.child in state.live)
     step.update(
         plan=plan,
@@ -279,11 +290,32 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
     guard = step.state.guard
     if guard is not None and guard not in event.changed and step.state.tracked[guard].alive:
         step.actions.append(Order(Reread(event.file)))
+    order_descriptions(step)
     names = tuple(step.state.tracked)
     started = {process.name for process in (*state.plan.managed, *plan.managed)}
     changed = tuple(name for name in names if name in event.changed & started and name in before)
     added = tuple(name for name in names if name not in before)
-    step.notify(Replanned(changed, added, tuple(gone), event.held))
+    described = tuple(name for name in names if name in event.described & started)
+    step.notify(Replanned(changed, added, tuple(gone), event.held, described))
+
+
+def order_descriptions(step: Transition) -> None:
+    """Have the guard give new descriptions to those that run and have not taken them."""
+    for name, tracked in step.state.tracked.items():
+        if tracked.description:
+            node = tracked.process.nodes[0]
+            step.actions.append(Order(DescriptionOrder(name, node, tracked.description)))
+
+
+def description_answered(step: Transition, event: DescriptionState) -> None:
+    """Start a process anew that did not take its description."""
+    tracked = step.state.tracked[event.process]
+    if not tracked.description:
+        return
+    step.track(event.process, replace(tracked, description=""))
+    if event.why and tracked.alive:
+        step.track(event.process, replace(tracked, description="", leaving="again", wanted=True))
+        step.notify(Replanned(changed=(event.process,)))
 
 
 def _taken_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked:
@@ -292,6 +324,9 @@ def _taken_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracke
     rests: StateName = "expected" if process.kind == "external" else "stopped"
     if tracked is None:
         return Tracked(process, rests)
+    if name in event.described and tracked.alive and process.params_file:
+        file = str(PurePath(event.file).parent / process.params_file)
+        return replace(tracked, process=process, description=file)
     if name not in event.changed:
         return replace(tracked, process=process)
     if tracked.alive and rests == "stopped":

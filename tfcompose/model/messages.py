@@ -160,6 +160,13 @@ class ComponentState(_Event, frozen=True):
     why: str = ""
 
 
+class DescriptionState(_Event, frozen=True):
+    """A node took the robot's description; ``why`` says why it did not."""
+
+    process: str
+    why: str = ""
+
+
 class Alive(_Event, frozen=True):
     """The guard looks; it says so once a second."""
 
@@ -179,6 +186,7 @@ GuardEvent = (
     | GateState
     | Remember
     | ComponentState
+    | DescriptionState
 )
 
 GUARD_EVENTS = msgspec.json.Decoder(GuardEvent)
@@ -230,13 +238,24 @@ class ComponentOrder(_Order, frozen=True):
     file: str = ""
 
 
+class DescriptionOrder(_Order, frozen=True):
+    """Give a process's node the robot's description that its parameter file has now.
+
+    A ``DescriptionState`` answers it.
+    """
+
+    process: str
+    node: str
+    file: str
+
+
 class Reread(_Order, frozen=True):
     """Read the plan anew: its edges' lines have changed, or poses that ``static`` sends."""
 
     file: str
 
 
-GuardOrder = Absent | Present | Gate | ComponentOrder | Reread
+GuardOrder = Absent | Present | Gate | ComponentOrder | DescriptionOrder | Reread
 
 GUARD_ORDERS = msgspec.json.Decoder(GuardOrder)
 
@@ -326,13 +345,15 @@ class AllReady(_Event, frozen=True):
 class Replanned(_Event, frozen=True):
     """A changed plan is followed from now on.
 
-    The names of processes, and the frames that listeners will still hold.
+    The names of processes, and the frames that listeners will still hold. ``described`` are given
+    a new description while they run.
     """
 
     changed: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
+    described: tuple[str, ...] = ()
 
 
 class Missing(ProcessMessage, frozen=True):
@@ -474,6 +495,8 @@ class PlanChange(ProcessMessage, frozen=True):
     """What another plan changes.
 
     The processes that are different, new, and no more, and the fixed edges that vanish.
+    ``described`` are given a new description while they run. ``differs`` says that the plan is
+    another one at all, if only in its places in the robot file.
 
     tf2 never forgets a fixed edge, so listeners hold those that vanish until they start anew.
     """
@@ -483,6 +506,8 @@ class PlanChange(ProcessMessage, frozen=True):
     removed: tuple[str, ...]
     held: tuple[str, ...]
     ok: Literal[True] = True
+    described: tuple[str, ...] = ()
+    differs: bool = False
 
 
 class ProcessStatus(ProcessMessage, frozen=True):

@@ -169,6 +169,16 @@ class SentPoses:
         self._received: set[tuple[bytes, str]] = set()
         self._waiting: list[SentPose] = []
 
+    def follow(self, plan: Plan) -> None:
+        """Compare with another plan's poses; those that are new, with what comes from now on."""
+        before = self._expected
+        self._expected = {**fixed_of(plan), **expected_of(plan)}
+        self._received = {
+            (gid, child)
+            for gid, child in self._received
+            if before.get(child) == self._expected.get(child)
+        }
+
     def take(self, message: Message) -> None:
         """Note the poses that a message brings along."""
         if message.gid is None or not self._expected:

@@ -353,6 +353,11 @@ class PlanProcess:
         return (*self.argv, *self.env.values(), self.cwd or "")
 
     @property
+    def is_state_publisher(self) -> bool:
+        """Whether it is ROS's own robot_state_publisher, which the plan starts."""
+        return self.argv[:1] == (_STATE_PUBLISHER,)
+
+    @property
     def topics(self) -> tuple[str, str]:
         """The topics (moving, fixed) on which it publishes TF."""
         return self.remap.get("/tf", "/tf"), self.remap.get("/tf_static", "/tf_static")
@@ -479,6 +484,7 @@ DESCRIPTION = "robot.urdf"
 #: The file beside it that holds what a stock robot_state_publisher is given.
 STOCK_DESCRIPTION = "robot.state_publisher.urdf"
 _NOWHERE = SourceLine("", 0)
+_STATE_PUBLISHER = "${executable:robot_state_publisher/robot_state_publisher}"
 #: What no name of a node may hold.
 _NO_NAME = re.compile(r"\W")
 
@@ -589,14 +595,17 @@ class Plan:
     def started_with(self, process: PlanProcess) -> tuple[Any, ...]:
         """Return all of the plan that decides how the process runs.
 
-        An edge's place in the robot file does not, nor does for the guard the pose of an edge that
-        ``static`` publishes.
+        An edge's place in the robot file does not, nor the pose of an edge of the stock
+        robot_state_publisher, which takes another description while it runs, nor for the guard
+        that of one which ``static`` publishes.
         """
         guards = process.kind == "guard"
         edges = self.edges if guards else self.edges_of(process.name)
         fence = (self.robot, self.guard.fence) if self.guard.mode == "strict" else None
         unplaced = {
-            process.name for process in self.processes if guards and process.kind == "static"
+            other.name
+            for other in self.processes
+            if other.is_state_publisher or (guards and other.kind == "static")
         }
         anywhere = [
             *(replace(edge, source=_NOWHERE) for edge in edges if edge.owner not in unplaced),

@@ -7,90 +7,17 @@ answers a load when the component's constructor has returned. What it says of a 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from composition_interfaces.srv import ListNodes, LoadNode, UnloadNode
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 
-from tfcompose.model.plan.components import LIST, LOAD, UNLOAD, ros_value
-from tfcompose.tf.ros.graph import is_offered
+from tfcompose.model.plan.components import LIST, LOAD, UNLOAD
+from tfcompose.tf.ros.service import Service, parameter
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
     from tfcompose.model.plan.components import LoadRequest
-
-#: The field and the type of a parameter's value, by the type of it, or of what is in the list.
-_SINGLE = {
-    bool: ("bool_value", ParameterType.PARAMETER_BOOL),
-    int: ("integer_value", ParameterType.PARAMETER_INTEGER),
-    float: ("double_value", ParameterType.PARAMETER_DOUBLE),
-    str: ("string_value", ParameterType.PARAMETER_STRING),
-}
-_LISTS = {
-    bool: ("bool_array_value", ParameterType.PARAMETER_BOOL_ARRAY),
-    int: ("integer_array_value", ParameterType.PARAMETER_INTEGER_ARRAY),
-    float: ("double_array_value", ParameterType.PARAMETER_DOUBLE_ARRAY),
-    str: ("string_array_value", ParameterType.PARAMETER_STRING_ARRAY),
-}
-
-
-def parameter(name: str, value: Any) -> Any:
-    """Return a parameter as a message; whole numbers in a list with others are such numbers, too.
-
-    Raises:
-        ValueError: if ROS has no parameter of that kind.
-    """
-    value = ros_value(value)
-    kinds = {type(item) for item in value} if isinstance(value, list) else {type(value)}
-    kind = float if kinds == {int, float} else next(iter(kinds)) if len(kinds) == 1 else None
-    field, number = (_LISTS if isinstance(value, list) else _SINGLE).get(kind, ("", 0))  # type: ignore[arg-type]
-    if not field:
-        raise ValueError(f"{name} is {value!r}, and ROS has no parameter of that kind")
-    value = [float(item) for item in value] if kind is float and isinstance(value, list) else value
-    return Parameter(name=name, value=ParameterValue(type=number, **{field: value}))
-
-
-class Service:
-    """One service of a container.
-
-    Its requests are sent and its answers taken by hand: nothing spins here.
-    """
-
-    def __init__(self, node: Node, kind: Any, name: str) -> None:
-        self._node = node
-        self._client: Any = node.create_client(kind, name)
-        self._name = name
-        self._sequence: int | None = None
-
-    def close(self) -> None:
-        """Take the client away."""
-        self._node.destroy_client(self._client)
-
-    @property
-    def is_there(self) -> bool:
-        """Whether a container that runs offers it."""
-        return bool(self._client.service_is_ready()) and is_offered(self._node, self._name)
-
-    def ask(self, **fields: Any) -> None:
-        """Send a request; an answer to the one before is not taken any more."""
-        request = self._client.srv_type.Request(**fields)
-        with self._client.handle:
-            self._sequence = self._client.handle.send_request(request)
-
-    def answer(self) -> Any:
-        """Return the answer to the last request if it has come, else None."""
-        while self._sequence is not None:
-            with self._client.handle:
-                header, response = self._client.handle.take_response(
-                    self._client.srv_type.Response
-                )
-            if header is None:
-                return None
-            if header.request_id.sequence_number == self._sequence:
-                self._sequence = None
-                return response
-        return None
 
 
 class Container:

@@ -1,0 +1,68 @@
+"""The robot's description, given to nodes that run: stock robot_state_publishers.
+
+Robot_state_publisher takes ``robot_description`` while it runs, and sends /tf_static and the
+description anew. One that refuses it, or does not answer, the launcher starts anew.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.model.messages import DescriptionState
+from tfcompose.tf.ros.service import ParameterWriter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+    from tfcompose.model.messages import DescriptionOrder, GuardEvent
+
+#: How long a node may take, in seconds.
+ANSWER_S = 5.0
+_NAME = "robot_description"
+#: The description in a parameter file that tfcompose wrote.
+_LINE = re.compile(rf'^ +"{_NAME}": ("[^\n]*")$', re.MULTILINE)
+
+
+class Descriptions:
+    """The descriptions that nodes have not taken yet, by process."""
+
+    def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
+        self._node = node
+        self._emit = emit
+        self._writers: dict[str, tuple[ParameterWriter, float]] = {}
+
+    def take(self, order: DescriptionOrder) -> None:
+        """Give a node its description; one that waits for another gets this one."""
+        self.forget(order.process)
+        try:
+            found = _LINE.search(Path(order.file).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            self._emit(DescriptionState(order.process, f"{order.file} cannot be read: {error}"))
+            return
+        if found is None:
+            self._emit(DescriptionState(order.process, f"{order.file} has no description"))
+            return
+        writer = ParameterWriter(self._node, order.node, _NAME, json.loads(found[1]))
+        self._writers[order.process] = writer, time.monotonic()
+
+    def forget(self, process: str) -> None:
+        """Give the process's node no description any more: it ended, or is stopped."""
+        writer, _ = self._writers.pop(process, (None, 0.0))
+        if writer:
+            writer.close()
+
+    def check(self) -> None:
+        """Send what can be sent, and report what was taken or refused."""
+        for process, (writer, since) in list(self._writers.items()):
+            why = writer.refusal()
+            if why is None and time.monotonic() - since > ANSWER_S:
+                why = f"it does not answer within {ANSWER_S:g} s"
+            if why is not None:
+                self.forget(process)
+                self._emit(DescriptionState(process, why))

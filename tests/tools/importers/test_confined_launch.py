@@ -12,7 +12,7 @@ import yaml
 
 from tests.support.bringups import import_of, needs_launch, places, printed_errors
 from tfcompose.cli import main
-from tfcompose.tools.importers import launch
+from tfcompose.tools.importers import launch, launch_answer
 
 HIDDEN = "root:x:0:0"
 NODE = """
@@ -318,7 +318,7 @@ HOSTILE: dict[str, Any] = {
 def test_a_process_that_was_taken_over_shows_no_other_file(
     line: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(launch, "PROCESS", "tests.support.hostile_child")
+    monkeypatch.setattr(launch_answer, "PROCESS", "tests.support.hostile_child")
     monkeypatch.setattr(launch, "has_launch", lambda: True)
     robot = f"<robot name='r'><link name='{HIDDEN}'/></robot>\n"
     Path("../secret.urdf").write_text(robot, "utf-8")

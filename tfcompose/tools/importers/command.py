@@ -294,7 +294,8 @@ def _ending_of(text: str) -> str:
 def _add_launch(draft: ImportDraft, arguments: Namespace, file: str, shown: str = "") -> None:
     from tfcompose.cli.compiling import library, print_output, report_missing_confinement
     from tfcompose.cli.reading import read_text
-    from tfcompose.tools.importers.launch import Launch, add_launch
+    from tfcompose.tools.importers.launch import add_launch
+    from tfcompose.tools.importers.launch_answer import Launch
     from tfcompose.tools.importers.urdf import Workshop, add_descriptions
 
     _refuse_more(arguments)

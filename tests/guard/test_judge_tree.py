@@ -10,7 +10,7 @@ from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, Histor
 from tfcompose.guard.judge import Judge
 from tfcompose.guard.ledger import MOST_UNDECLARED, MOST_VERDICT_EDGES
 from tfcompose.model.messages import FindingShown, Taken
-from tfcompose.model.plan import EdgePattern, GuardPolicy, Plan, RosSettings
+from tfcompose.model.plan import EdgePattern, GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.tf.live.publishers import Publisher
 
 
@@ -166,6 +166,16 @@ def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> Non
         ("TF801", ""),
         ("TF801", ""),
     ]
+
+
+def test_a_guard_that_goes_on_knows_the_processes_that_another_plan_adds() -> None:
+    running = History().clear()
+    mapper = PlanProcess("mapper", "run", nodes=("/mapper",))
+    plan = running.judge.plan
+    running.judge.follow(replace(plan, processes=(*plan.processes, mapper)))
+    running.repeat(running.joins("/mapper", process="mapper"), "odom base", 3)
+    found = [event for event in running.events if isinstance(event, FindingShown)]
+    assert [(event.found.code, event.process) for event in found] == [("TF801", "mapper")]
 
 
 @pytest.mark.parametrize(

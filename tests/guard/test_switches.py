@@ -74,6 +74,9 @@ class Reader:
     is_there: bool = True
     requested: int = 0
 
+    def close(self) -> None:
+        pass
+
     def ask(self, _: float) -> None:
         self.requested += 1
 
@@ -156,3 +159,13 @@ def test_a_node_that_comes_back_after_the_guard_has_is_queried_anew(
     watch.reader.is_there = True
     watch.run_for(10)
     assert len(watch.all(FindingShown)) == 2
+
+
+def test_the_switches_of_another_plan_are_read_and_the_same_ones_not_again(watch: Watch) -> None:
+    watch.run_for(10)
+    front = PlanProcess("front", "external", switches={"/front": {"publish_tf": False}})
+    rear = PlanProcess("rear", "external", switches={"/rear": {"publish_tf": False}})
+    for processes, found in (((front, rear), 2), ((front,), 2), ((rear,), 3)):
+        watch.switches.follow(Plan("rover", "", None, RosSettings(), (), processes))
+        watch.run_for(10)
+        assert len(watch.all(FindingShown)) == found

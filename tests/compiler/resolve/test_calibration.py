@@ -535,6 +535,12 @@ def test_a_quaternion_that_fits_with_its_w_first_is_given_in_the_right_order() -
             "x forward",
         ),
         (
+            "lens_optical_frame",
+            "rpy: [-90 deg, 0, -60 deg]",
+            "roll: 0, pitch: 0, yaw: !degrees 30",
+            "as place",
+        ),
+        (
             "lens_frame",
             "rpy: [0, 0, 30 deg]",
             "roll: !degrees -90, pitch: 0, yaw: !degrees -60",

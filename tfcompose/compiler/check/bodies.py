@@ -119,6 +119,8 @@ def _principal(
     return (low * scale, (3 * mean - high - low) * scale, high * scale)
 
 
+#: A mesh that is no longer marks a frame, and is not its body.
+_MARK_M = 1e-3
 #: Of what its shapes give, and of what boxes around its meshes would.
 _TIMES, _TIMES_OF_BOX = 10, 100
 
@@ -148,7 +150,9 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
 def _of_boxes(mass: float, link: Link) -> tuple[float, ...]:
     """Return the traces of inertias of the boxes around the link's shapes, each with the mass."""
     sizes = map(size_of, (*link.visuals, *link.collisions))
-    return tuple(mass / 6 * math.hypot(*size) ** 2 for size in sizes if size)
+    return tuple(
+        mass / 6 * math.hypot(*size) ** 2 for size in sizes if size and max(size) > _MARK_M
+    )
 
 
 #: Osmium has 22,600 kg/m³.

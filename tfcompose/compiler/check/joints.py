@@ -199,6 +199,10 @@ def joint_without_owner(robot: Robot) -> Iterator[Finding]:
             yield finding("TF715", message, edge.owner_at or joint.at, help=advice)
 
 
+#: Soft limits half a turn outside of both limits are switched off.
+_FAR_OUTSIDE_RAD = math.pi
+
+
 @rule("TF716", of_urdf=True)
 def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
     for edge in robot.edges:
@@ -209,6 +213,8 @@ def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
         low, high = safety.soft_lower_limit, safety.soft_upper_limit
         hard = (limit.lower, limit.upper) if limit else (None, None)
         inside = (hard[0] is None or hard[0] <= low) and (hard[1] is None or high <= hard[1])
+        if low + _FAR_OUTSIDE_RAD < (hard[0] or 0) and (hard[1] or 0) < high - _FAR_OUTSIDE_RAD:
+            continue  # on purpose: they hold nothing back
         if joint.type != "continuous" and not (inside and low < high):
             message = f"{joint.name}: soft limits {low:g} to {high:g} are not within its limits"
             advice = "set soft_lower_limit and soft_upper_limit to values between lower and upper"

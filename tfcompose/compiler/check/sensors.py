@@ -107,10 +107,14 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
                 advice = f"the file's quaternion probably has w first: write {swapped}"
             elif swapped := _nominal_with_w_first(measured):
                 advice = f"the pose beside it probably has w first: write quat_xyzw: {swapped}"
-            elif _is_of_body(measured):
+            elif is_optical(measured.child) and _is_turned(measured, _OPTICAL):
                 advice = (
                     f"the pose beside it probably has x forward: that of {measured.child}, an"
                     " optical frame, has z forward"
+                )
+            elif is_optical(measured.child) and _is_turned(measured, _OPTICAL.inverse()):
+                advice = (
+                    f"the pose beside it is probably that of {measured.child}: name it as place"
                 )
             notes = [Note("measured here", measured.at)]
             yield finding("TF616", message, measured.named_at, help=advice, notes=notes)
@@ -134,12 +138,13 @@ def _nominal_with_w_first(measured: Calibration) -> str:
     return f"[{x:g}, {y:g}, {z:g}, {w:g}]" if turned <= measured.limit_rad else ""
 
 
-def _is_of_body(measured: Calibration) -> bool:
-    """Return whether the nominal pose of an optical frame is that of the body around it."""
-    if measured.nominal is None or not is_optical(measured.child):
-        return False
-    optical = measured.nominal @ Pose((0.0, 0.0, 0.0), OPTICAL_XYZW)
-    return angle_between(measured.pose.quat_xyzw, optical.quat_xyzw) <= measured.limit_rad
+_OPTICAL = Pose((0.0, 0.0, 0.0), OPTICAL_XYZW)
+
+
+def _is_turned(measured: Calibration, rotation: Pose) -> bool:
+    """Return whether the nominal pose fits once it is turned further."""
+    turned = (measured.nominal or measured.pose) @ rotation
+    return angle_between(measured.pose.quat_xyzw, turned.quat_xyzw) <= measured.limit_rad
 
 
 #: From here on angles are shown rounded to degrees.

@@ -15,6 +15,7 @@ from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.compiling import library
 from tfcompose.cli.documentation import FOLDER, for_terminal, page, topic, topics
 from tfcompose.cli.parser import all_commands, parser_of
+from tfcompose.cli.terminal import plain
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.tool import shipped
 
@@ -91,6 +92,15 @@ def test_pages_fit_a_terminal(columns: int) -> None:
         assert max(map(len, text.splitlines())) <= max(columns, 80)  # argparse's usage
         assert "|---" not in text
         assert "](#" not in text
+        assert "\n\n\n" not in text
+        bold = for_terminal(page(word, COMMANDS) or "", columns, coloured=True)
+        assert [plain(line).rstrip() for line in bold.splitlines()] == text.splitlines()
+
+
+def test_words_of_the_robot_file_are_bold_in_a_terminal() -> None:
+    assert "\033[1mrestart: on-failure\033[0m" in for_terminal(
+        PAGES["processes"], 120, coloured=True
+    )
 
 
 def test_its_robot_has_no_findings(rover: Path) -> None:
@@ -153,6 +163,43 @@ def test_its_preset_of_ones_own_has_no_findings(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(robot + dvl, encoding="utf-8")
     done = run("lint", "--fail-on", "warning", cwd=tmp_path)
     assert (done.returncode, "[TF" in done.stdout) == (0, False), done.stdout
+
+
+#: The topics about the robot file, as the page ``language`` lists them.
+LISTED = re.findall(r"^\| `tfcompose help (\w+)`", PAGES["language"], re.MULTILINE)
+OF_THE_LANGUAGE = ("language", *LISTED)
+
+
+def test_the_language_has_eight_topics() -> None:
+    assert len(LISTED) == 8
+    assert set(LISTED) <= TOPICS.keys()
+
+
+@pytest.mark.parametrize("name", OF_THE_LANGUAGE)
+def test_its_examples_have_no_findings_and_print_what_stands_there(
+    name: str, tmp_path: Path
+) -> None:
+    texts = blocks("yaml", PAGES[name])
+    assert PAGES[name].partition("\n\n")[2].startswith("```yaml\n# ") or name == "language"
+    files = {text.partition("\n")[0].removeprefix("# "): text for text in texts}
+    assert len(files) == len(texts)
+    for file, text in files.items():
+        assert file.endswith(".yaml"), "its first line names it"
+        assert max(map(len, text.splitlines())) < 80
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    robots = [file for file, text in files.items() if "\nrobot: " in text]
+    assert "robot.yaml" in robots
+    done = run("lint", *robots, "--fail-on", "warning", cwd=tmp_path)
+    assert (done.returncode, "[TF" in done.stdout) == (0, False), done.stdout
+    for block in blocks("console", PAGES[name]):
+        command, _, printed = block.removeprefix("$ tfcompose ").partition("\n")
+        assert run(*command.split(), cwd=tmp_path).stdout == printed
+
+
+def test_a_topic_with_the_name_of_a_key_ends_with_the_key() -> None:
+    text = page("parts", COMMANDS) or ""
+    assert text.startswith(PAGES["parts"])
+    assert "\n## Part\n" in text
 
 
 @pytest.mark.parametrize("command", COMMANDS)

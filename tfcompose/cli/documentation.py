@@ -24,10 +24,16 @@ FOLDER = Path(__file__).parents[1] / "data" / "topics"
 #: The topics of the core, in the order of reading, with what their pages are about.
 TOPICS = {
     "language": "the robot file, key by key",
+    "arguments": "arguments, expressions, conditions, repetition",
     "poses": "positions, rotations, units, optical frames",
+    "ownership": "who publishes each edge, and nodes that publish by default",
     "presets": "known sensors and nodes, and your own",
     "calibration": "measured poses from files",
     "processes": "what is started, when it is ready, what follows its end",
+    "simulation": "simulated owners and joint states, robots without hardware",
+    "bodies": "links, joints, inertia, ros2_control",
+    "parts": "other robots as subtrees, namespaces, several robots",
+    "merging": "includes, profiles, overlays, and where a value comes from",
     "guard": "what is watched while the robot runs, and what a finding says",
     "strict": "holding back what a process does not own",
     "background": "robots without a terminal: ps, logs, restart, down",
@@ -52,33 +58,44 @@ def topics() -> dict[str, str]:
 def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
     """Return the page of a topic, a command's options with its page, or what a key means.
 
-    None if there is none.
+    A topic with the name of a key ends with the key. None if there is none.
     """
     if name in commands:
         options, about = _options(name, commands[name]), _about(name, commands[name])
         return f"{options}\n{about}" if about else options
-    if name in topics():
-        return topic(name)
     from tfcompose.spec.language.reference import key_page
 
-    return key_page(name)
+    about = [topic(name)] if name in topics() else []
+    return "\n".join([*about, *filter(None, [key_page(name)])]) or None
 
 
-def for_terminal(markdown: str, columns: int) -> str:
-    """Return the page with tables and paragraphs that fit the columns, as plain text."""
+def for_terminal(markdown: str, columns: int, *, coloured: bool = False) -> str:
+    """Return the page with tables and paragraphs that fit the columns, as text.
+
+    ``coloured`` sets code in bold, and headings, as control sequences.
+    """
     from io import StringIO
 
     from rich.console import Console
     from rich.markdown import Markdown
+    from rich.theme import Theme
 
     options, begin, page = (
         markdown.partition("\n# ") if markdown.startswith("usage: ") else ("", "", markdown)
     )
     stream = StringIO()
     text = _LINK.sub(r"\1", f"# {page}" if begin else page)
-    Console(file=stream, width=columns).print(Markdown(text, hyperlinks=False))
+    console = Console(
+        file=stream,
+        width=columns,
+        force_terminal=coloured,
+        no_color=True,
+        theme=Theme({"markdown.code": "bold"}),
+    )
+    console.print(Markdown(text, code_theme="bw", hyperlinks=False))
     lines = [line.rstrip() for line in stream.getvalue().splitlines()]
-    return f"{options}{begin[:1]}" + "\n".join(lines) + "\n"
+    fitted = re.sub(r"\n{3,}", "\n\n", "\n".join(lines))
+    return f"{options}{begin[:1]}{fitted}\n"
 
 
 def topic(name: str) -> str:

@@ -25,12 +25,13 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the page or write the file; exit code 2 where there is no such topic."""
+    import os
     import pydoc
     import sys
     from pathlib import Path
 
     from tfcompose.cli.documentation import for_terminal, html, page, topics
-    from tfcompose.cli.terminal import table_width
+    from tfcompose.cli.terminal import coloured, table_width
     from tfcompose.cli.tool_commands import instead_of, report_problems
     from tfcompose.foundation.findings import did_you_mean
 
@@ -60,5 +61,8 @@ def run(arguments: Namespace) -> int:
         missing = absent(arguments.word.partition(".")[0], "command", "topic", "key", "language")
         fail(missing or f"no topic, command or key {arguments.word}; {advice}", UNREADABLE)
     columns = table_width(sys.stdout)
-    pydoc.pager(text if columns is None else for_terminal(text, columns))
+    os.environ.setdefault("LESS", "FRX")  # let less show bold, and end after a single screen
+    if columns is not None:
+        text = for_terminal(text, columns, coloured=coloured(sys.stdout))
+    pydoc.pager(text)
     return 0

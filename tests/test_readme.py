@@ -108,12 +108,6 @@ def test_its_robot_has_no_findings(rover: Path) -> None:
     assert (done.returncode, "[TF" in done.stdout) == (0, False)
 
 
-def test_its_two_robots_have_no_findings(rover: Path) -> None:
-    (rover / "two.yaml").write_text(blocks("yaml")[1], encoding="utf-8")
-    done = run("lint", "two.yaml", "--fail-on", "warning", cwd=rover)
-    assert (done.returncode, "[TF" in done.stdout) == (0, False), done.stdout
-
-
 def test_its_robot_gives_the_edges_and_owners_that_up_prints(rover: Path) -> None:
     done = run("tree", "rover.yaml", "-p", "demo", cwd=rover)
     owners = Counter(words[2] for words in map(str.split, _edges(done.stdout)))

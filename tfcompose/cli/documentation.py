@@ -65,8 +65,8 @@ def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
         return f"{options}\n{about}" if about else options
     from tfcompose.spec.language.reference import key_page
 
-    about = [topic(name)] if name in topics() else []
-    return "\n".join([*about, *filter(None, [key_page(name)])]) or None
+    parts = [topic(name)] if name in topics() else []
+    return "\n".join([*parts, *filter(None, [key_page(name)])]) or None
 
 
 def for_terminal(markdown: str, columns: int, *, coloured: bool = False) -> str:

@@ -1,9 +1,10 @@
-"""Publishers that load Python while the guard looks, and join ROS only when they are started."""
+"""Publishers that join ROS while the guard looks, and publish only when they are started."""
 
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
@@ -12,6 +13,7 @@ import pytest
 from tests.support.launcher import LISTEN, SLEEPER, Launcher, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.foundation.signals import Stop
+from tfcompose.launcher.publishers.static import static
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.model.messages import (
     Clear,
@@ -22,7 +24,7 @@ from tfcompose.model.messages import (
 )
 from tfcompose.model.plan import PlanProcess
 from tfcompose.model.variables import GO, HOLD_FD
-from tfcompose.tf.process import wait_for_go
+from tfcompose.tf.process import read_own, wait_for_go
 
 #: Says what it has loaded before it is let go, as an own process would.
 HELD = f"""
@@ -58,6 +60,51 @@ def test_a_held_process_goes_on_at_the_order_and_ends_when_nobody_is_left_to_giv
     assert stop.requested is ends
     assert HOLD_FD not in os.environ
     wait_for_go(stop)  # nobody holds it any more
+
+
+def test_one_that_begins_anew_while_it_is_held_is_held_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    theirs, ours = os.pipe()
+    monkeypatch.setenv(HOLD_FD, str(theirs))
+    stop = Stop()
+    stop.request()
+    assert not wait_for_go(stop)
+    os.write(ours, GO)
+    os.close(ours)
+    assert wait_for_go(Stop())
+    assert HOLD_FD not in os.environ
+
+
+@contextmanager
+def _fake_node(calls: list[str]) -> Iterator[object]:
+    calls.append("joined")
+    yield object()
+
+
+def test_a_held_publisher_joins_ros_and_sends_nothing_before_it_is_released(
+    monkeypatch: pytest.MonkeyPatch, write: Callable[..., Path]
+) -> None:
+    node = pytest.importorskip("tfcompose.tf.ros.node")
+    calls: list[str] = []
+
+    class Publisher:
+        def __init__(self, *_: object, **__: object) -> None:
+            calls.append("publisher")
+
+        def publish(self, _: bytes) -> None:
+            calls.append("publish")
+
+    def not_released(_: Stop) -> bool:
+        calls.append("held")
+        return False
+
+    monkeypatch.setattr(node, "open_node", lambda *_, **__: _fake_node(calls))
+    monkeypatch.setattr(node, "TFPublisher", Publisher)
+    monkeypatch.setattr("tfcompose.launcher.publishers.static.wait_for_go", not_released)
+    file = str(write([], PlanProcess("static", "static")))
+    static(read_own([file, "static"], "static"), Stop())
+    assert calls == ["joined", "publisher", "held"]
 
 
 def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_started(
@@ -141,3 +188,21 @@ def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(
         one.process for one in notices if isinstance(one, ProcessState) and one.state == "exited"
     } == {"guard"}
     assert not psutil.Process().children(recursive=True)
+
+
+def test_one_that_is_dismissed_has_time_to_leave_ros(tmp_path: Path) -> None:
+    leaves = f"""
+{LISTEN}
+import os, time
+open("loaded", "w").close()
+os.read(int(os.environ["{HOLD_FD}"]), 9)
+time.sleep(0.1)
+open("left", "w").close()
+"""
+    observation = "import os, time\nwhile not os.path.exists('loaded'): time.sleep(0.01)\n"
+    plan = plan_of(
+        program("guard", f"{observation}raise SystemExit(4)", kind="guard", cwd="."),
+        program("static", leaves, kind="static", cwd="."),
+    )
+    assert supervise(plan, tmp_path / "plan.json", report=lambda _: None) == 1
+    assert (tmp_path / "left").exists()

@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import subprocess
+import time
 from dataclasses import replace
 from selectors import EVENT_READ
 from typing import TYPE_CHECKING, Any
@@ -61,6 +62,9 @@ LONGEST_MATCHED = 4000
 MATCHED_WITHIN_S = 0.1
 #: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
 EVENT_LIMIT = 1024 * 1024
+#: Processes that are held have this long to leave ROS before they are killed, in seconds.
+LEAVE_S = 0.5
+_LEAVE_CHECK_S = 0.005
 
 
 class Children:
@@ -125,10 +129,7 @@ class Children:
         return Started(process.name, child.popen.pid)
 
     def prepare(self, process: PlanProcess, command: ChildCommand) -> None:
-        """Have one of tfcompose's own load what it needs.
-
-        It joins ROS when it is started, without that delay.
-        """
+        """Have one of tfcompose's own join ROS; it publishes when it is started."""
         theirs, ours = os.pipe()
         try:
             self._spawn(
@@ -144,12 +145,23 @@ class Children:
             os.close(theirs)
 
     def dismiss(self) -> None:
-        """End those that are held: they will not be started, or in another way."""
-        for name in list(self._held):
-            os.close(self._held.pop(name))
-            child = self._children.pop(name)
+        """End those that are held: they will not be started, or in another way.
+
+        Each leaves ROS at the end of its pipe. One that is killed stays in the others' lists of
+        nodes until DDS's lease is over.
+        """
+        dismissed = [self._children.pop(name) for name in self._held]
+        while self._held:
+            os.close(self._held.popitem()[1])
+        deadline = time.monotonic() + LEAVE_S
+        while time.monotonic() < deadline and not all(
+            has_ended(child.popen.pid) for child in dismissed
+        ):
+            time.sleep(_LEAVE_CHECK_S)
+        for child in dismissed:
             self._end(child)
-        self._update_reaper()
+        if dismissed:
+            self._update_reaper()
 
     def kill(self, name: str, number: int) -> None:
         """Send the signal to the child's group, if it runs."""

@@ -79,7 +79,7 @@ FILES_CHECK_S = 0.5
 #: What ends a plan.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
-#: Processes that can be held before they join ROS.
+#: Processes that can be held before they publish.
 _PREPARED = ("static", "joints", "simulate")
 
 
@@ -220,7 +220,7 @@ class _Supervisor:
         return self._exit_code
 
     def _prepare(self) -> None:
-        """Preload Python in as many publishers as there are cores while the guard looks."""
+        """Have as many publishers as there are cores join ROS while the guard looks."""
         if self._state.clear is not None or self._state.stop:
             return
         own = [

@@ -99,9 +99,9 @@ def start(argv: Sequence[str], kind: str, role: Callable[[Own, Stop], None]) -> 
 
     ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. ``role`` is what the
     process does. It imports ROS, which takes a third of a second, when it is called: signals are
-    handled by then, and whoever is interrupted ends without a traceback. Before it joins ROS it
-    waits for ``wait_for_go``. Of a robot on several computers, one that began without a network
-    leaves ROS when there is one, and begins anew in the same process.
+    handled by then, and whoever is interrupted ends without a traceback. It waits for
+    ``wait_for_go`` before its first message. Of a robot on several computers, one that began
+    without a network leaves ROS when there is one, and begins anew in the same process.
 
     Returns:
         0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
@@ -162,22 +162,22 @@ def _unfit(message: str, file: str) -> RejectedError:
 
 
 def wait_for_go(stop: Stop) -> bool:
-    """Wait, where the launcher holds this process, until it is let go on.
+    """Wait before the first message until the launcher, if it holds this process, releases it.
 
-    Return whether it is, or is to end.
-
-    ``up`` checks before the start whether an edge is published already; its publishers load Python
-    and rclpy then, and join ROS only when the launcher says so.
+    Return False if the process is to end instead. ``up`` checks before the start whether an edge
+    is published already. Its publishers join ROS meanwhile, so that listeners know them when the
+    launcher releases them. A process that ends and begins anew is still held.
     """
-    if HOLD_FD in os.environ:
-        fd = int(os.environ.pop(HOLD_FD))
-        try:
-            while not stop.requested and not select([fd], [], [], _CHECK_EVERY_S)[0]:
-                pass
-            if not stop.requested and os.read(fd, len(GO)) != GO:
+    if HOLD_FD not in os.environ:
+        return not stop.requested
+    fd = int(os.environ[HOLD_FD])
+    while not stop.requested:
+        if select([fd], [], [], _CHECK_EVERY_S)[0]:
+            if os.read(fd, len(GO)) != GO:
                 stop.request()
-        finally:
+            del os.environ[HOLD_FD]
             os.close(fd)
+            break
     return not stop.requested
 
 

@@ -45,8 +45,6 @@ def joints(own: Own, stop: Stop) -> None:
     # ROS, once signals are handled.
     from tfcompose.tf.ros.sensor_data import JointStateSubscription  # noqa: PLC0415
 
-    if not wait_for_go(stop):
-        return
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         options = PublishOptions(
             parameter(node, "publish_frequency", 0.0),
@@ -55,8 +53,11 @@ def joints(own: Own, stop: Stop) -> None:
         clock = StampClock(node, say, sim=own.plan.ros.clock == "sim")
         mover = JointMover(own.edges, say, clock.now_ns, options)
         publisher = TFPublisher(node, static=False)
-        description = DescriptionPublisher(own, node) if own.plan.describes(own.process) else None
         states = JointStateSubscription(node)
+        if not wait_for_go(stop):
+            return
+        states.take()  # what came while it was held is old
+        description = DescriptionPublisher(own, node) if own.plan.describes(own.process) else None
         at_most = (
             f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""
         )

@@ -41,13 +41,13 @@ def simulate(own: Own, stop: Stop) -> None:
         return
     from tfcompose.tf.ros.node import open_node  # noqa: PLC0415 (ROS, once signals are handled)
 
-    if not wait_for_go(stop):
-        return
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         if simulation.kind == "joints":
             publish, what = _joint_states(own, node, simulation)
         else:
             publish, what = _body(own, node, simulation)
+        if not wait_for_go(stop):
+            return
         say(f"{what}, simulated at {simulation.rate:g} Hz")
         ready()
         if own.plan.ros.clock == "sim":

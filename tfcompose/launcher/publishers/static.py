@@ -29,16 +29,17 @@ def static(own: Own, stop: Stop) -> None:
     # ROS, once signals are handled.
     from tfcompose.tf.ros.node import TFPublisher, open_node, wait  # noqa: PLC0415
 
-    if not wait_for_go(stop):
-        return
-    # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may not
-    # have begun.
-    stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
-    edges = [
-        SentTransform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges
-    ]
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         publisher = TFPublisher(node, static=True)
+        if not wait_for_go(stop):
+            return
+        # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may
+        # not have begun.
+        stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
+        edges = [
+            SentTransform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw)
+            for e in own.edges
+        ]
         if edges:
             publisher.publish(encode(edges))
         say(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.support.cli import tfcompose
-from tfcompose.cli.linting import merged
+from tfcompose.cli.linting import merge_findings
 from tfcompose.foundation.findings import Span, finding
 from tfcompose.spec.language.arguments import MOST, combinations
 
@@ -51,7 +51,7 @@ def test_a_finding_is_named_by_the_fewest_arguments_that_say_where_it_is() -> No
         )
         for one in every
     ]
-    notes = {one.message: [note.message for note in one.notes] for one in merged(judged)}
+    notes = {one.message: [note.message for note in one.notes] for one in merge_findings(judged)}
     assert notes["x"] == []
     assert notes["a"] == ["with a:=1"]
     assert notes["b"] == ["with a:=1 b:=1"]

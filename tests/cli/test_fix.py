@@ -23,7 +23,7 @@ from tfcompose.foundation.findings import (
     Finding,
     RejectedError,
     Span,
-    edited,
+    apply_edits,
     finding,
     slip_of,
 )
@@ -292,9 +292,9 @@ def test_an_edit_that_takes_nothing_away_is_not_kept(tmp_path: Path) -> None:
 
 def test_edits_that_meet_are_none() -> None:
     one, other = Edit(Span("r", 1, 1, 1, 4), "x"), Edit(Span("r", 1, 3, 1, 6), "y")
-    assert edited("abcdefg", [one]) == "xdefg"
-    assert edited("abcdefg", [one, other]) is None
-    assert edited("abcdefg", [Edit(Span("r", 3, 1, 3, 1), "y")]) is None
+    assert apply_edits("abcdefg", [one]) == "xdefg"
+    assert apply_edits("abcdefg", [one, other]) is None
+    assert apply_edits("abcdefg", [Edit(Span("r", 3, 1, 3, 1), "y")]) is None
 
 
 def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.cli.console import Console, StatusLine
 from tfcompose.cli.live_run import can_show_live
-from tfcompose.cli.terminal import coloured_only, plain
+from tfcompose.cli.terminal import keep_colours, plain
 from tfcompose.foundation.findings import finding
 from tfcompose.foundation.geometry import Pose
 from tfcompose.model.messages import (
@@ -180,7 +180,7 @@ def test_what_a_process_writes_moves_no_cursor_and_colours_nothing_else() -> Non
 @given(st.text(st.sampled_from("\033[]0;31mAJ?\a\r\n\b\tx\x9b "), max_size=30))
 def test_no_control_sequence_but_colours_is_left(text: str) -> None:
     assert "\033" not in plain(text)
-    kept = coloured_only(text)
+    kept = keep_colours(text)
     for piece in kept.split("\033")[1:]:
         assert piece.startswith("["), kept
         assert piece[1:].lstrip("0123456789;:").startswith("m"), kept

@@ -13,13 +13,13 @@ from tfcompose.cli import preset_page
 from tfcompose.cli.compiling import library
 from tfcompose.cli.documentation import code_table, topic
 from tfcompose.cli.process_table import row
-from tfcompose.cli.tables import Table, shortened
+from tfcompose.cli.tables import Table, shorten
 from tfcompose.cli.terminal import plain
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.render.text import RED
 from tfcompose.compiler.render.tree import pose_text, tree
 from tfcompose.foundation.catalogue import CATALOGUE
-from tfcompose.foundation.tree import drawn
+from tfcompose.foundation.tree import draw_tree
 from tfcompose.model.messages import ProcessState, ProcessStatus, StateName, notice_line
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -73,10 +73,10 @@ def test_frames_that_differ_still_differ_when_they_are_shortened() -> None:
     lines = TABLE.lines(ROWS, 60)
     assert len(set(lines)) == len(ROWS)
     assert (
-        shortened("camera_link → camera_color_optical_frame", 28) == "→ camera_color_optical_frame"
+        shorten("camera_link → camera_color_optical_frame", 28) == "→ camera_color_optical_frame"
     )
-    assert shortened("camera_link → camera_color_optical_frame", 20) == "→ camer…ptical_frame"
-    assert shortened("base_link → front_left_wheel_link", 29) == "b…ink → front_left_wheel_link"
+    assert shorten("camera_link → camera_color_optical_frame", 20) == "→ camer…ptical_frame"
+    assert shorten("base_link → front_left_wheel_link", 29) == "b…ink → front_left_wheel_link"
 
 
 @pytest.mark.parametrize("columns", [60, 80, 100])
@@ -100,7 +100,7 @@ def test_a_narrow_tree_wraps_and_leaves_out_nothing_but_kinds_that_owners_imply(
     for edge in (
         one
         for root in robot.roots()
-        for _, one in drawn(robot.children(), root, lambda edge: edge.child)
+        for _, one in draw_tree(robot.children(), root, lambda edge: edge.child)
     ):
         wanted = [edge.child, edge.owner, *pose_text(edge).split()]
         assert all(word in words for word in wanted), f"{wanted} stand there in this order"

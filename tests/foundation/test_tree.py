@@ -10,7 +10,7 @@ from tfcompose.foundation.tree import (
     DEEPEST_DRAWN,
     below,
     children_of,
-    drawn,
+    draw_tree,
     loop_closed_by,
     loops,
     trees,
@@ -82,7 +82,7 @@ def test_the_way_up_ends_at_the_root_and_before_a_frame_that_was_passed() -> Non
 
 def test_a_drawing_has_the_lines_of_a_tree() -> None:
     children = {"map": ["odom", "dock"], "odom": ["base"], "base": ["laser", "arm"]}
-    assert [lines + frame for lines, frame in drawn(children, "map", str)] == [
+    assert [lines + frame for lines, frame in draw_tree(children, "map", str)] == [
         "├── odom",
         "│   └── base",
         "│       ├── laser",
@@ -93,7 +93,7 @@ def test_a_drawing_has_the_lines_of_a_tree() -> None:
 
 def test_a_deep_tree_is_drawn_no_wider_than_its_deepest_indented_level() -> None:
     chain = {str(depth): [str(depth + 1)] for depth in range(5000)}
-    lines = [lines for lines, _ in drawn(chain, "0", str)]
+    lines = [lines for lines, _ in draw_tree(chain, "0", str)]
     assert len(lines) == 5000
     assert max(map(len, lines)) <= 4 * DEEPEST_DRAWN + 10
     assert [line.strip() for line in lines[DEEPEST_DRAWN - 1 : DEEPEST_DRAWN + 2]] == [

@@ -64,7 +64,7 @@ from tfcompose.guard.losses import datagrams_lost
 from tfcompose.guard.verdict.doctor import diagnose
 from tfcompose.guard.verdict.drivers import SentPoses, not_taken
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
-from tfcompose.launcher.kernel_settings import refused_settings
+from tfcompose.launcher.kernel_settings import check_settings
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.files import Target
 from tfcompose.model.messages import Alive, Clear, FindingShown, GateState, Live, ProcessRequest
@@ -103,7 +103,7 @@ from tfcompose.tf.live.state import (
 from tfcompose.tf.process import read_own
 from tfcompose.tf.ros import environment
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
-from tfcompose.tools.deploy.connection import LostError, Settings, connected
+from tfcompose.tools.deploy.connection import LostError, Settings, connect_host
 from tfcompose.tools.deploy.rollout import Rollout, target_of
 from tfcompose.tools.fleet import command as fleet
 from tfcompose.tools.fleet.check import check_fleet
@@ -537,10 +537,10 @@ def launcher() -> Iterator[Finding]:
             )[1]
             yield from (_without(one, folder) for one in found)
     held = PlanProcess("lidar", "run", schedule=Schedule((4095,)))
-    yield from refused_settings(held) or [AN_EXAMPLE]
+    yield from check_settings(held) or [AN_EXAMPLE]
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
         real_time = replace(held, schedule=Schedule(policy="fifo", priority=80))
-        yield from refused_settings(real_time) or [AN_EXAMPLE]
+        yield from check_settings(real_time) or [AN_EXAMPLE]
 
 
 def _without(found: Finding, folder: str) -> Finding:
@@ -921,7 +921,7 @@ def deployed() -> Iterator[Finding]:
         except RejectedError as error:
             yield from error.findings
     refused = asyncio.run(
-        connected("rear", PlanHost("root@127.0.0.1", 1), Settings("x.rear", "x"), None)
+        connect_host("rear", PlanHost("root@127.0.0.1", 1), Settings("x.rear", "x"), None)
     )
     yield refused if isinstance(refused, Finding) else AN_EXAMPLE
     lacks: tuple[dict[str, dict[str, Any]], ...] = (

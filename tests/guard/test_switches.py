@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.findings import expect
 from tfcompose.guard import gates
-from tfcompose.guard.channel import SwitchMemory, recalled
+from tfcompose.guard.channel import SwitchMemory, recall_memory
 from tfcompose.guard.gates import Switches
 from tfcompose.guard.verdict.drivers import not_taken
 from tfcompose.model.messages import FindingShown, GuardEvent, Remember
@@ -130,7 +130,7 @@ def left(watch: Watch, tmp_path: Path) -> Callable[[], dict[str, Any]]:
         for one in watch.all(Remember):
             known |= one.changed
         (tmp_path / "memory").write_text(json.dumps(known))
-        return recalled({MEMORY_FD: str(os.open(tmp_path / "memory", os.O_RDONLY))})
+        return recall_memory({MEMORY_FD: str(os.open(tmp_path / "memory", os.O_RDONLY))})
 
     return read
 

@@ -19,7 +19,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.launcher.child import spawn
-from tfcompose.launcher.kernel_settings import SETTINGS, refused_settings
+from tfcompose.launcher.kernel_settings import SETTINGS, check_settings
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.model.plan import Plan, PlanProcess, RosSettings, Schedule
 from tfcompose.tf.ros.environment import child_environment
@@ -86,13 +86,13 @@ CASES = {
 ASKS_AS_NOBODY = """
 import os
 from tfcompose.foundation.catalogue import CATALOGUE
-from tfcompose.launcher.kernel_settings import refused_settings
+from tfcompose.launcher.kernel_settings import check_settings
 from tfcompose.model.plan import PlanProcess, Schedule
 CATALOGUE.load()  # the installation may be of another user
 if not os.getuid():
     os.setuid(65534)
 before = {asks}
-found = refused_settings(PlanProcess("p", "run", {key}={value!r}))
+found = check_settings(PlanProcess("p", "run", {key}={value!r}))
 print([one.code for one in found], {asks} == before)
 """
 PROCESS = PlanProcess("p", "run", argv=(sys.executable, "-c", "import os; print(os.nice(0))"))
@@ -175,7 +175,7 @@ def test_what_the_kernel_refuses_is_a_finding_and_nothing_is_started(tmp_path: P
     _, found = commands(tmp_path, replace(PROCESS, schedule=Schedule((4095,))))
     expect(found[0], "TF911", "p", "CPU 4095")
     with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
-        (refused,) = refused_settings(
+        (refused,) = check_settings(
             replace(PROCESS, schedule=Schedule((min(before),), "fifo", 80))
         )
     expect(refused, "TF911", "p", "fifo", "80")

@@ -17,7 +17,7 @@ from tfcompose.launcher.output import (
     Follower,
     Logs,
     last_modified,
-    logged,
+    logged_processes,
     read_logs,
     runs_of,
 )
@@ -34,7 +34,7 @@ def test_lines_of_several_processes_come_in_the_order_of_their_output(tmp_path: 
         while int(time.time() * 1000) == int(time.time() * 1000):
             pass  # until the next millisecond
     logs.close()
-    assert [(name, text) for _, name, text in read_logs(tmp_path, logged(tmp_path))] == [
+    assert [(name, text) for _, name, text in read_logs(tmp_path, logged_processes(tmp_path))] == [
         ("a", "one"),
         ("b", "two "),
         ("a", ""),
@@ -48,8 +48,8 @@ def test_processes_of_parts_have_logs_too(tmp_path: Path) -> None:
         for name in ("static", "arm/static", "arm/tool/static"):
             assert logs.write(name, f"line {number} of {name}") is None
     logs.close()
-    assert logged(tmp_path / "logs") == ["arm/static", "arm/tool/static", "static"]
-    for name in logged(tmp_path / "logs"):
+    assert logged_processes(tmp_path / "logs") == ["arm/static", "arm/tool/static", "static"]
+    for name in logged_processes(tmp_path / "logs"):
         assert [text for _, _, text in read_logs(tmp_path / "logs", [name])][
             -1
         ] == f"line 9 of {name}"
@@ -183,7 +183,7 @@ def test_the_lines_of_each_run_are_known_from_its_first_to_its_last(tmp_path: Pa
     ):
         lines = read_logs(tmp_path, ["a", "b"], begin, end)
         assert [(name, text) for _, name, text in lines] == [("a", run), ("b", run)]
-    assert logged(tmp_path) == ["a", "b"]
+    assert logged_processes(tmp_path) == ["a", "b"]
 
 
 def test_the_begin_of_old_runs_is_forgotten(tmp_path: Path) -> None:

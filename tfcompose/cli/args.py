@@ -11,7 +11,7 @@ from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, printable, reject
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.spec.language import Given, composed, validate, with_includes
+from tfcompose.spec.language import Given, compose, validate, with_includes
 from tfcompose.spec.language.args import as_given
 from tfcompose.spec.load import load
 
@@ -32,7 +32,7 @@ def show_args(arguments: Namespace) -> int:
         fail(f"{file} is a built plan, and arguments are those of a robot file", UNREADABLE)
     try:
         source = with_includes(load(read_text(file), file), read_text)
-        source = composed(source, arguments.profiles, overlays_of(arguments), read=read_text)
+        source = compose(source, arguments.profiles, overlays_of(arguments), read=read_text)
         args = validate(source, given=Given({}, os.environ)).spec.args
     except RejectedError as error:
         reject(error.findings)

@@ -69,7 +69,7 @@ class BuildProcess:
         os.kill(self._pid, signal.SIGINT)
         self._exit_code()
 
-    def built(self) -> tuple[Path, list[Finding]]:
+    def wait_until_built(self) -> tuple[Path, list[Finding]]:
         """Wait for the build to end; return its plan file and the warnings it printed.
 
         Raises:

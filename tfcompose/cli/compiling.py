@@ -155,7 +155,7 @@ def disk_of(file: str, arguments: Namespace) -> Disk:
     return disk(trusts_files=arguments.trust, sources=[file])
 
 
-def given_by(arguments: Namespace) -> Given:
+def inputs_of(arguments: Namespace) -> Given:
     """Return what the command line and the environment give the robot's arguments."""
     args = {
         name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()
@@ -163,7 +163,7 @@ def given_by(arguments: Namespace) -> Given:
     return Given(args, os.environ)
 
 
-def compiled_robot(file: str, arguments: Namespace) -> Robot:
+def compile_or_exit(file: str, arguments: Namespace) -> Robot:
     """Return the robot, which has no errors; warnings are printed.
 
     Raises:
@@ -188,7 +188,7 @@ def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Com
             overlays=overlays,
             read=read_text,
             disk=disk_of(file, arguments),
-            given=given_by(arguments),
+            given=inputs_of(arguments),
         )
     except RejectedError as error:
         reject(error.findings)

@@ -46,7 +46,7 @@ def complete(commands: Mapping[str, CommandModule]) -> None:
     """
     line, point = os.environ["COMP_LINE"], int(os.environ["COMP_POINT"])
     _quote, _prefix, _suffix, typed, _break = split_line(line, point)
-    argv = list(map(_expanded, typed[1:]))
+    argv = list(map(_expand_tilde, typed[1:]))
     if argv and argv[0] not in commands:
         commands = {}
     parser = ArgumentParser(prog="tfcompose")
@@ -68,7 +68,7 @@ def complete(commands: Mapping[str, CommandModule]) -> None:
     )
 
 
-def _expanded(argument: str) -> str:
+def _expand_tilde(argument: str) -> str:
     return os.path.expanduser(argument)  # noqa: PTH111 (an unknown user's stays as it is)
 
 
@@ -167,7 +167,7 @@ def _hosts(argv: Sequence[str]) -> list[str]:
     return _section("hosts", argv)
 
 
-def _given(argv: Sequence[str]) -> list[str]:
+def _settings_in(argv: Sequence[str]) -> list[str]:
     return [f"{name}:=" for name in _section("args", argv)]
 
 
@@ -205,7 +205,7 @@ def _processes(_: Sequence[str]) -> list[str]:
 _SOURCES: dict[tuple[str, str], Source] = {
     ("", "profiles"): _profiles,
     ("", "robot"): _robots,
-    ("", "given"): _given,
+    ("", "given"): _settings_in,
     ("up", "host"): _hosts,
     ("", "a"): _frames,
     ("", "b"): _frames,

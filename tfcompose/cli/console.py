@@ -10,9 +10,9 @@ from functools import singledispatchmethod
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.cli.reading import line_of
-from tfcompose.cli.terminal import CLEAR_LINE, coloured_only, plain
+from tfcompose.cli.terminal import CLEAR_LINE, keep_colours, plain
 from tfcompose.compiler.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
-from tfcompose.foundation.text import counted, listed
+from tfcompose.foundation.text import listed, plural
 from tfcompose.model.messages import (
     AllReady,
     AllStarted,
@@ -139,7 +139,7 @@ class Console:
         Raises:
             OSError: if nobody reads any more.
         """
-        text = self._status.drawn() if self._status else ""
+        text = self._status.draw() if self._status else ""
         if text:
             self._output.write(text, log=True)
 
@@ -180,7 +180,7 @@ class Console:
     @_write.register
     def _(self, notice: OwnerLive) -> None:
         edges = (
-            counted(len(notice.edges), "edge")
+            plural(len(notice.edges), "edge")
             if len(notice.edges) > NAMED_AT_MOST
             else ", ".join(notice.edges)
         )
@@ -223,11 +223,11 @@ class Console:
         changes = "; ".join(f"{label}: {', '.join(names)}" for label, names in parts if names)
         self._say(f"another plan: {changes or 'nothing to restart'}")
         if notice.held:
-            self._say(self._paint(vanished(notice.held), YELLOW))
+            self._say(self._paint(describe_vanished(notice.held), YELLOW))
 
     @_write.register
     def _(self, notice: TreeComplete) -> None:
-        edges = counted(notice.edges, "edge")
+        edges = plural(notice.edges, "edge")
         self._say(
             self._paint(f"tree complete: {edges} live after {notice.seconds:.2f} s", GREEN, BOLD)
         )
@@ -291,7 +291,7 @@ class Console:
     ) -> None:
         fault = self._kept(name, text) if keep else None
         clear = self._status.cleared() if self._status else ""
-        shown = coloured_only(text) if self._colour else plain(text)
+        shown = keep_colours(text) if self._colour else plain(text)
         self._output.write(
             f"{clear}{self._paint(prefix_of(name, self._width), colour)} {shown}\n", log=log
         )
@@ -306,7 +306,7 @@ class Console:
         return f"{''.join(codes)}{text}{PLAIN}" if self._colour else text
 
 
-def vanished(edges: tuple[str, ...]) -> str:
+def describe_vanished(edges: tuple[str, ...]) -> str:
     """Return what is to be said of fixed edges that vanished."""
     named = listed(edges, NAMED_AT_MOST)
     return (
@@ -373,7 +373,7 @@ class StatusLine:
         self._shown = ""
         return CLEAR_LINE if self._drawn else ""
 
-    def drawn(self) -> str:
+    def draw(self) -> str:
         """Return what draws the line anew.
 
         Nothing where that would change nothing, or was done a moment ago.

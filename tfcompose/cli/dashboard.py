@@ -22,10 +22,10 @@ from rich.text import Text
 from tfcompose.cli.console import Console, Nowhere
 from tfcompose.cli.process_table import HEAD, TABLE, row, uptime
 from tfcompose.cli.reading import line_of
-from tfcompose.cli.tables import Table, shortened
-from tfcompose.cli.terminal import coloured, plain
+from tfcompose.cli.tables import Table, shorten
+from tfcompose.cli.terminal import is_coloured, plain
 from tfcompose.compiler.render.text import GREEN, RED, YELLOW, render_text
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.model.messages import Ended, FindingShown, RecoveredShown, Stopping
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class Dashboard:
     def __post_init__(self) -> None:
         self._console = Console(self.plan, Nowhere(), colour=False, keep=self._keep)
         self._renderer = Renderer(
-            force_terminal=True, no_color=not coloured(sys.stdout), highlight=False
+            force_terminal=True, no_color=not is_coloured(sys.stdout), highlight=False
         )
         self._began = self.clock()
         self.forget()
@@ -308,7 +308,7 @@ class Dashboard:
                 head.append(
                     f" · {live}/{edges} edges live", style="" if live == edges else "yellow"
                 )
-        wrong = [counted(number, severity) for severity, number in self._counts.items() if number]
+        wrong = [plural(number, severity) for severity, number in self._counts.items() if number]
         head.append(
             f" · {', '.join(wrong) or 'no findings'}", style="red" if self._counts["error"] else ""
         )
@@ -360,7 +360,7 @@ class Dashboard:
             title = f"{hidden} more ↑↓ · {title}" if hidden else title
             found.append(
                 Text(
-                    shortened(f"── {title} ".ljust(columns, "─"), columns, at_end=True),
+                    shorten(f"── {title} ".ljust(columns, "─"), columns, at_end=True),
                     style="dim",
                 )
             )
@@ -392,7 +392,7 @@ class Dashboard:
         """Return the first line of each report; where there is none, what the launcher said."""
         if self._reports:
             return [self._timed(report.at, report.lines[0]) for report in self._reports]
-        return [self._timed(at, _styled(line)) for at, line in self._events]
+        return [self._timed(at, _style_line(line)) for at, line in self._events]
 
     def _log_page(self, columns: int, rows: int) -> list[Text]:
         scroll = self._scroll("log")
@@ -468,7 +468,7 @@ def _style_of(line: str) -> str:
     return next((style for pattern, style in _STYLES if pattern.search(line)), "")
 
 
-def _styled(line: str) -> Text:
+def _style_line(line: str) -> Text:
     return Text(line, style=_style_of(line))
 
 

@@ -9,11 +9,11 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.plans import PLAN, built_plan, is_plan, plan_to_start
+from tfcompose.cli.plans import PLAN, is_plan, plan_to_start, read_built_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import printable
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import describe_share
 from tfcompose.model.plan.topics import partition_of, private_topics
@@ -35,21 +35,21 @@ def dry_run(arguments: Namespace) -> int:
     """
     if is_plan(arguments.file):
         file = Path(arguments.file)
-        plan = built_plan(file)
+        plan = read_built_plan(file)
         files = _parameter_files(plan, file.parent)
     else:
-        files = _compiled_files(arguments)
+        files = _compile_files(arguments)
         plan = read_plan(files[PLAN], PLAN)
     print("\n".join(map(printable, _lines(plan_to_start(plan, arguments), files))))
     return 0
 
 
-def _compiled_files(arguments: Namespace) -> dict[str, str]:
-    from tfcompose.cli.compiling import compiled_robot
+def _compile_files(arguments: Namespace) -> dict[str, str]:
+    from tfcompose.cli.compiling import compile_or_exit
     from tfcompose.cli.writing import destination
     from tfcompose.compiler.emit import emit
 
-    robot = compiled_robot(arguments.file, arguments)
+    robot = compile_or_exit(arguments.file, arguments)
     _, target = destination(arguments, robot)
     return {file.path: file.text for file in emit(robot, target) if file.text}
 
@@ -73,14 +73,14 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     ros = plan.ros
     domain = "the environment's" if ros.domain_id is None else ros.domain_id
     processes = f"{len(plan.processes)} process{'es' * (len(plan.processes) != 1)}"
-    yield f"robot {plan.robot}: {processes}, {counted(len(plan.edges), 'edge')}, domain: {domain}"
+    yield f"robot {plan.robot}: {processes}, {plural(len(plan.edges), 'edge')}, domain: {domain}"
     yield from describe_share(plan)
     for name, argument in plan.args.items():
         is_bool = isinstance(argument, bool)
-        value = str(argument).lower() if is_bool else _quoted(str(argument))
+        value = str(argument).lower() if is_bool else _quote(str(argument))
         yield f"  arg      {name}:={value}"
     for name, value in plan.environment.items():
-        yield f"  env      {name}={_quoted(value)}, when it was built"
+        yield f"  env      {name}={_quote(value)}, when it was built"
     for process in plan.processes:
         yield ""
         yield from _process(plan, process, files)
@@ -96,7 +96,7 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
     if nodes:
         yield f"  nodes    {', '.join(nodes)}"
     for name, value in _environment(plan, process).items():
-        yield f"  env      {name}={_quoted(value)}"
+        yield f"  env      {name}={_quote(value)}"
     yield from _settings(SURROUNDING_KEYS, process)
     for old, new in process.remap.items():
         yield f"  remap    {old} → {new}"
@@ -116,7 +116,7 @@ def _what(process: PlanProcess) -> Iterator[str]:
     if component:
         yield f"  loads    {component.package}/{component.plugin}, in {component.container}"
     elif process.kind != "external":
-        yield f"  command  {' '.join(map(_quoted, (*process.prefix, *process.argv)))}"
+        yield f"  command  {' '.join(map(_quote, (*process.prefix, *process.argv)))}"
 
 
 def _component(process: PlanProcess) -> Iterator[str]:
@@ -172,7 +172,7 @@ def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
     return {name: value.replace(folder, "${tfcompose}/ros") for name, value in sorted(env.items())}
 
 
-def _quoted(argument: str) -> str:
+def _quote(argument: str) -> str:
     plain = argument.replace("${", "").replace("}", "").replace("_", "").replace("-", "")
     return (
         argument

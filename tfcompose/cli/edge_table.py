@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.cli.tables import Table
 from tfcompose.cli.terminal import printable
 from tfcompose.compiler.render.text import YELLOW
-from tfcompose.foundation.text import counted, listed
+from tfcompose.foundation.text import listed, plural
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,12 +55,12 @@ def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) ->
     seconds = max(0, now_ns - observer.begun_ns) / 1e9 if observer.begun_ns else 0.0
     names = {(state.stream.parent, state.stream.child) for state in edges}
     parts = [
-        counted(len(names), "edge"),
-        f"{counted(observer.messages, 'message')} in {seconds:.1f} s",
+        plural(len(names), "edge"),
+        f"{plural(observer.messages, 'message')} in {seconds:.1f} s",
     ]
     senders = {state.publisher for state in edges if state.publisher}
     if senders:
-        parts.insert(1, counted(len(senders), "publisher"))
+        parts.insert(1, plural(len(senders), "publisher"))
     bad = sum(observer.malformed.values())
     parts += [f"{bad} not readable"] if bad else []
     parts += ["delays are from stamp to recording"] if observer.end_ns else []
@@ -74,7 +74,7 @@ def not_kept(observer: TreeObserver) -> str:
         node for gid in observer.beyond for node in observer.publishers.nodes(gid, static=False)
     }
     by = f" from {printable(listed(sorted(nodes)))}" if nodes else ""
-    return f"{counted(sum(observer.beyond.values()), 'transform')} of further edges{by} not kept"
+    return f"{plural(sum(observer.beyond.values()), 'transform')} of further edges{by} not kept"
 
 
 def _row(state: EdgeState, contested: set[str]) -> tuple[str, ...]:
@@ -126,7 +126,7 @@ def chain_line(chain: FrameChain | str, a: str, b: str) -> str:
     ends = f"{printable(a)} → {printable(b)}"
     if isinstance(chain, str):
         return f"{ends}: {printable(chain)}"
-    parts = [counted(len(chain.newest), "edge")]
+    parts = [plural(len(chain.newest), "edge")]
     if delay := chain.delay:
         times = f"{duration(delay.mean_s)} in the mean, {duration(delay.most_s)} at most"
         parts.append(f"net delay {times}, by {printable(delay.edge.name)}")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import replace_file
-from tfcompose.foundation.findings import edited
+from tfcompose.foundation.findings import apply_edits
 from tfcompose.foundation.reading import is_file
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Fixer:
             kept = self._sound(file, [], todo)
             if not kept:
                 return self.lint(file, self.read)
-            self.texts |= self._edited(kept) or {}
+            self.texts |= self._apply_edits(kept) or {}
             self.fixed += kept
             found = self._findings([file])
 
@@ -116,25 +116,26 @@ class Fixer:
         files = dict.fromkeys(
             [file, *(edit.span.file for finding in fixed for edit in finding.edits)]
         )
-        before, texts = _counted(self._findings(files)), self._edited(fixed)
+        before, texts = _count_findings(self._findings(files)), self._apply_edits(fixed)
         if texts is None:
             return False
         self.texts, old = self.texts | texts, self.texts
-        after = _counted(self._findings(files))
+        after = _count_findings(self._findings(files))
         self.texts = old
         come = after - before
         if any(finding.code == _NO_YAML for finding in fixed):
             # What is found in a file that can be read now was there before.
             come = Counter({key: count for key, count in come.items() if key[0] == _NO_YAML})
-        return not come and not _counted(fixed) - (before - after)
+        return not come and not _count_findings(fixed) - (before - after)
 
-    def _edited(self, fixed: list[Finding]) -> dict[str, str] | None:
+    def _apply_edits(self, fixed: list[Finding]) -> dict[str, str] | None:
         """Return the new texts by file, or None where edits meet."""
         by_file: dict[str, dict[Edit, None]] = {}
         for edit in (edit for finding in fixed for edit in finding.edits):
             by_file.setdefault(edit.span.file, {})[edit] = None
         texts = {
-            _path(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()
+            _path(file): apply_edits(self.read(file), list(edits))
+            for file, edits in by_file.items()
         }
         complete = {file: text for file, text in texts.items() if text is not None}
         return complete if len(complete) == len(texts) == len(by_file) else None
@@ -144,7 +145,7 @@ def _path(file: str) -> str:
     return str(Path(file).resolve())
 
 
-def _counted(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
+def _count_findings(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
     return Counter((finding.code, finding.message) for finding in found)
 
 

@@ -54,7 +54,7 @@ class Linter:
         It is judged alone and with each of its profiles, or with those that are requested, and
         alone in each combination of its arguments' values.
         """
-        from tfcompose.cli.compiling import given_by, overlays_of
+        from tfcompose.cli.compiling import inputs_of, overlays_of
         from tfcompose.foundation.findings import RejectedError
         from tfcompose.spec.language import with_includes
         from tfcompose.spec.load import load
@@ -65,7 +65,7 @@ class Linter:
             overlays = overlays_of(self.arguments, files.read)
         except RejectedError as error:
             return list(error.findings)
-        given = replace(given_by(self.arguments), environment=files.environment_of(source))
+        given = replace(inputs_of(self.arguments), environment=files.environment_of(source))
         if not self.has_one_file:  # an argument is one of any of the files
             names = given.args.keys() & source.mapping("args").keys()
             given = replace(given, args={name: given.args[name] for name in names})
@@ -98,7 +98,7 @@ class Linter:
 
             files = disk(trusts_files=self.arguments.trust, sources=[file])
             return _LintFiles(read, self.presets, lambda _: files, lambda _: os.environ)
-        from tfcompose.cli.untrusted import UntrustedFiles, declared_environment
+        from tfcompose.cli.untrusted import UntrustedFiles, declared_variables
 
         untrusted = UntrustedFiles(file, read)
         for overlay in self.arguments.overlays:
@@ -107,7 +107,7 @@ class Linter:
             untrusted.read,
             untrusted.library(),
             untrusted.disk_for,
-            lambda source: declared_environment(source, self.environment),
+            lambda source: declared_variables(source, self.environment),
         )
 
 
@@ -127,11 +127,11 @@ class _Variants:
             alone = self._compile(self.given, profiles)
             return list(alone.found), [alone]
         from tfcompose.foundation.findings import RejectedError, Span
-        from tfcompose.spec.language import GivenArg, composed
+        from tfcompose.spec.language import GivenArg, compose
         from tfcompose.spec.language.arguments import alternatives_of, combinations
 
         try:
-            laid_over = composed(self.source, profiles, self.overlays, self.given, self.files.read)
+            laid_over = compose(self.source, profiles, self.overlays, self.given, self.files.read)
             alternatives, first = alternatives_of(laid_over, self.given, self.source)
         except RejectedError as error:
             return list(error.findings), []
@@ -149,7 +149,7 @@ class _Variants:
             for name, value in values.items():
                 args[name] = GivenArg(value, Span(f"{name}:={value}"))
             judged.append((values, self._compile(replace(self.given, args=args), profiles)))
-        findings = merged([(values, compiled.found) for values, compiled in judged])
+        findings = merge_findings([(values, compiled.found) for values, compiled in judged])
         return findings, [compiled for _, compiled in judged]
 
     def with_each_profile(
@@ -193,7 +193,7 @@ class _Variants:
         )
 
 
-def merged(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Finding]:
+def merge_findings(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Finding]:
     """Return each finding once, with a note if only some combinations have it."""
     where: dict[_Identity, list[int]] = {}
     firsts: dict[_Identity, Finding] = {}
@@ -206,12 +206,12 @@ def merged(judged: Sequence[tuple[Combination, Sequence[Finding]]]) -> list[Find
     every = [combination for combination, _ in judged]
     for key, indices in where.items():
         if len(indices) < len(judged):
-            note = Note(_named(every, indices))
+            note = Note(_name_combinations(every, indices))
             firsts[key] = replace(firsts[key], notes=(*firsts[key].notes, note))
     return list(firsts.values())
 
 
-def _named(every: Sequence[Combination], where: Sequence[int]) -> str:
+def _name_combinations(every: Sequence[Combination], where: Sequence[int]) -> str:
     """Return in which combinations something is, by the fewest arguments that say so."""
     inside = set(where)
     first = every[where[0]]

@@ -19,8 +19,8 @@ import msgspec
 
 from tfcompose.cli.console import Console
 from tfcompose.cli.runs import plan_of_run
-from tfcompose.cli.terminal import FAILED, can_redraw, coloured, warn
-from tfcompose.foundation.text import counted
+from tfcompose.cli.terminal import FAILED, can_redraw, is_coloured, warn
+from tfcompose.foundation.text import plural
 from tfcompose.launcher.control import connect
 from tfcompose.launcher.output import Follower, NonBlockingOutput, runs_of
 from tfcompose.launcher.supervisor import ENDING, Signals
@@ -198,11 +198,11 @@ class _LiveView:
         """Print on the terminal's own screen what went wrong, and how it ended."""
         if self._fault:
             warn(f"the live view failed: {self._fault}")
-        console = Console(plan, output, colour=coloured(sys.stdout))
+        console = Console(plan, output, colour=is_coloured(sys.stdout))
         with contextlib.suppress(OSError):
             if self._left_out:
                 output.write(
-                    f"{counted(self._left_out, 'earlier finding')}: tfcompose logs tfcompose\n"
+                    f"{plural(self._left_out, 'earlier finding')}: tfcompose logs tfcompose\n"
                 )
             for notice in self._last:
                 console(notice)

@@ -45,7 +45,7 @@ def in_folder(file: str) -> str:
     return str(plan) if is_file(plan) else file
 
 
-def built_plan(file: Path) -> Plan:
+def read_built_plan(file: Path) -> Plan:
     """Return the plan in the file.
 
     Raises:
@@ -94,11 +94,11 @@ def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span
     file = in_folder(file)
     if is_plan(file):
         refuse_variant(arguments)
-        return built_plan(Path(file)), {}
-    from tfcompose.cli.compiling import compiled_robot
+        return read_built_plan(Path(file)), {}
+    from tfcompose.cli.compiling import compile_or_exit
     from tfcompose.compiler.emit.plan import plan_of
 
-    robot = compiled_robot(file, arguments).with_final_names()
+    robot = compile_or_exit(file, arguments).with_final_names()
     return plan_of(robot), {edge.child: edge.at for edge in robot.edges}
 
 

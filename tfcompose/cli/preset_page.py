@@ -10,9 +10,9 @@ import re
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.compiler.render.tree import wrapped
+from tfcompose.compiler.render.tree import wrap_rows
 from tfcompose.compiler.resolve.poses import rotation_of
-from tfcompose.compiler.resolve.presets import filled, node_preset, node_preset_names
+from tfcompose.compiler.resolve.presets import fill_name, node_preset, node_preset_names
 from tfcompose.foundation.geometry import IDENTITY_XYZW
 from tfcompose.foundation.numbers import clean_quat, clean_rpy, number
 from tfcompose.foundation.yaml_text import flow, parameter
@@ -55,8 +55,8 @@ def facts(name: str, library: Library) -> dict[str, Any]:
         "about": preset.about,
         "file": library.file(name),
         "extends": preset.extends,
-        "mount": _named(preset.mount, preset),
-        "root": _named(preset.root or preset.mount, preset),
+        "mount": _fill_name(preset.mount, preset),
+        "root": _fill_name(preset.root or preset.mount, preset),
         "options": {key: _option(option) for key, option in preset.options.items()},
         "frames": [_frame(key, frame, preset) for key, frame in preset.frames.items()],
         "body": _body(preset),
@@ -67,11 +67,11 @@ def facts(name: str, library: Library) -> dict[str, Any]:
         "driver": _driver(preset.driver, preset) if preset.driver else None,
         "topics": [
             {"topic": topic}
-            | _shown(fields, preset, ("type", "frame", "hard_coded", "rate", "when"))
+            | _describe_keys(fields, preset, ("type", "frame", "hard_coded", "rate", "when"))
             for topic, fields in preset.topics.items()
         ],
         "source": [
-            _shown(fact, preset, ("repository", "path", "commit", "about"))
+            _describe_keys(fact, preset, ("repository", "path", "commit", "about"))
             for fact in preset.source
         ],
     }
@@ -97,10 +97,10 @@ def text(preset: dict[str, Any], columns: int | None = None) -> str:
     sources = [_source(fact) for fact in preset["source"]] + _optics_sources(preset["optics"])
     if sources:
         parts.append("source\n" + "\n".join(sources))
-    return _fitted("\n\n".join(parts) + "\n", columns)
+    return _fit_page("\n\n".join(parts) + "\n", columns)
 
 
-def _fitted(page: str, columns: int | None) -> str:
+def _fit_page(page: str, columns: int | None) -> str:
     """Return the page with lines of at most so many columns.
 
     What has no room goes on below, by cells.
@@ -111,7 +111,7 @@ def _fitted(page: str, columns: int | None) -> str:
     for line in page.splitlines():
         name, *cells = re.split(r" {2,}", line.strip())
         parts = (
-            wrapped([("  ", name, cells)], columns)[0]
+            wrap_rows([("  ", name, cells)], columns)[0]
             if len(line) > columns and len(cells) > 1
             else [line]
         )
@@ -124,13 +124,13 @@ def _fitted(page: str, columns: int | None) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _named(pattern: str, preset: PresetSpec) -> str:
-    return filled(pattern, NAME, preset.words)
+def _fill_name(pattern: str, preset: PresetSpec) -> str:
+    return fill_name(pattern, NAME, preset.words)
 
 
 def _plain(value: Any, preset: PresetSpec) -> Any:
     if isinstance(value, str):
-        return _named(value, preset)
+        return _fill_name(value, preset)
     if isinstance(value, Chosen):
         fields = {"option": value.option} if value.option else {"when": value.when}
         return (
@@ -139,11 +139,11 @@ def _plain(value: Any, preset: PresetSpec) -> Any:
             else fields | {"value": value.value, "otherwise": value.otherwise}
         )
     if isinstance(value, dict):
-        return {_named(key, preset): _plain(item, preset) for key, item in value.items()}
+        return {_fill_name(key, preset): _plain(item, preset) for key, item in value.items()}
     return [_plain(item, preset) for item in value] if isinstance(value, (list, tuple)) else value
 
 
-def _shown(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, Any]:
+def _describe_keys(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, Any]:
     """Return what is said under the keys, without what is empty."""
     fields = {key: _plain(getattr(model, key), preset) for key in keys}
     return {key: value for key, value in fields.items() if value not in (None, "", {}, [], False)}
@@ -161,22 +161,22 @@ def _option(option: PresetOption) -> dict[str, Any]:
 
 
 def _frame(name: str, frame: PresetFrame, preset: PresetSpec) -> dict[str, Any]:
-    quat = rotation_of(frame, _named(name, preset)) or (
+    quat = rotation_of(frame, _fill_name(name, preset)) or (
         IDENTITY_XYZW if frame.xyz is not None else None
     )
     fields: dict[str, Any] = {
-        "name": _named(name, preset),
-        "parent": _named(frame.parent, preset),
+        "name": _fill_name(name, preset),
+        "parent": _fill_name(frame.parent, preset),
         "xyz": list(frame.xyz) if frame.xyz is not None else None,
         "quat_xyzw": list(clean_quat(quat)) if quat else None,
         "nominal": frame.nominal,
         "driver": frame.driver,
     }
     if frame.by_driver:
-        fields["by_driver"] = {"parent": _named(frame.by_driver.parent, preset)}
+        fields["by_driver"] = {"parent": _fill_name(frame.by_driver.parent, preset)}
         if frame.by_driver.xyz:
             fields["by_driver"]["xyz"] = list(frame.by_driver.xyz)
-    return fields | _shown(frame, preset, ("when", "about"))
+    return fields | _describe_keys(frame, preset, ("when", "about"))
 
 
 def _body(preset: PresetSpec) -> dict[str, Any] | None:
@@ -184,7 +184,7 @@ def _body(preset: PresetSpec) -> dict[str, Any] | None:
     if body is None:
         return None
     fields = {
-        "frame": _named(body.frame, preset),
+        "frame": _fill_name(body.frame, preset),
         "shape": _shape(body.shape),
         "xyz": list(body.shape.xyz),
     }
@@ -208,15 +208,15 @@ def _optics(optics: PresetOptics, preset: PresetSpec) -> dict[str, Any]:
         {"of": list(source.of), "where": source.where, "quality": source.quality}
         for source in optics.source or ()
     ]
-    return _shown(optics, preset, keys) | ({"source": sources} if sources else {})
+    return _describe_keys(optics, preset, keys) | ({"source": sources} if sources else {})
 
 
 def _process(process: PresetProcess, preset: PresetSpec) -> dict[str, Any]:
-    fields = _shown(
+    fields = _describe_keys(
         process, preset, ("package", "executable", "launch", "lifecycle", "params", "args")
     )
     fields["node"] = "/" + "/".join(
-        _named(part, preset) for part in (process.namespace, process.node) if part
+        _fill_name(part, preset) for part in (process.namespace, process.node) if part
     )
     if isinstance(process, FurtherProcess) and process.when:
         fields["when"] = process.when
@@ -225,7 +225,7 @@ def _process(process: PresetProcess, preset: PresetSpec) -> dict[str, Any]:
 
 def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
     published = any(frame.driver for frame in preset.frames.values())
-    fields = _process(driver, preset) | _shown(
+    fields = _process(driver, preset) | _describe_keys(
         driver, preset, ("versions", "naming", "on", "about")
     )
     fields["also"] = {
@@ -234,7 +234,8 @@ def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
     fields["tf"] = driver.tf if published else "tfcompose"
     fields["off"] = _plain(driver.off, preset) if published else None
     fields["claims"] = [
-        _shown(claim, preset, ("parent", "child", "off", "about")) for claim in driver.claims
+        _describe_keys(claim, preset, ("parent", "child", "off", "about"))
+        for claim in driver.claims
     ]
     return fields
 
@@ -281,7 +282,7 @@ def _tree(preset: dict[str, Any], columns: int | None) -> str:
     if columns is None or max(map(len, table.splitlines())) <= columns:
         return table
     tight = [(lines, name, [fact for fact in facts if fact]) for lines, name, facts in rows]
-    return "\n".join(f"  {line}" for some in wrapped(tight, columns - 2) for line in some)
+    return "\n".join(f"  {line}" for some in wrap_rows(tight, columns - 2) for line in some)
 
 
 def _facts_of(frame: dict[str, Any]) -> tuple[str, str, str, str]:
@@ -305,7 +306,7 @@ def _body_text(body: dict[str, Any]) -> str:
     return f"{_pairs(body['shape'])} at {flow(body['xyz'])} in {body['frame']}{mass}"
 
 
-def _started(process: dict[str, Any]) -> str:
+def _describe_start(process: dict[str, Any]) -> str:
     state = ", and makes it active" if "lifecycle" in process else ""
     when = f" ({_pairs(process['when'])})" if "when" in process else ""
     program = process.get("executable") or process.get("launch")
@@ -314,7 +315,7 @@ def _started(process: dict[str, Any]) -> str:
 
 def _driver_text(preset: dict[str, Any]) -> str:
     driver = preset["driver"]
-    rows = [("starts", _started(started)) for started in (driver, *driver["also"].values())]
+    rows = [("starts", _describe_start(started)) for started in (driver, *driver["also"].values())]
     rows += [
         (label, driver[key])
         for label, key in (("versions", "versions"), ("note", "about"))
@@ -499,7 +500,7 @@ def node_text(preset: dict[str, Any], columns: int | None = None) -> str:
         parts.append(f"note\n  {preset['hint']}")
     sources = [" ".join(str(part) for part in fact.values()) for fact in preset["source"]]
     parts.append("source\n" + "\n".join(f"  {source}" for source in sources))
-    return _fitted("\n\n".join(parts) + "\n", columns)
+    return _fit_page("\n\n".join(parts) + "\n", columns)
 
 
 def _claim_text(claim: dict[str, Any]) -> str:

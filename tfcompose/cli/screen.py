@@ -11,7 +11,7 @@ import sys
 import termios
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.tables import shortened
+from tfcompose.cli.tables import shorten
 from tfcompose.cli.terminal import CLEAR, CLEAR_LINE, plain, size_of
 
 if TYPE_CHECKING:
@@ -84,14 +84,14 @@ class LiveLines:
             self._stream.write(CLEAR)
             self._rows.forget()
         self._columns = columns
-        fitted = [_fitted(line, columns - 1) for line in shown]
+        fitted = [_fit_line(line, columns - 1) for line in shown]
         self._stream.write(self._rows.change([*fitted, ""]))
         self._stream.flush()
 
 
-def _fitted(line: str, width: int) -> str:
+def _fit_line(line: str, width: int) -> str:
     text = plain(line)
-    return line if len(text) <= width else shortened(text, width, at_end=True)
+    return line if len(text) <= width else shorten(text, width, at_end=True)
 
 
 class Screen:

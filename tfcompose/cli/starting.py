@@ -18,9 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.console import Console, Nowhere, StandardOutput, StatusLine, vanished
+from tfcompose.cli.console import Console, Nowhere, StandardOutput, StatusLine, describe_vanished
 from tfcompose.cli.live_run import can_show_live, follow
-from tfcompose.cli.plans import built_plan, copy_plan, is_plan, plan_to_start
+from tfcompose.cli.plans import copy_plan, is_plan, plan_to_start, read_built_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import (
     hidden_run,
@@ -36,8 +36,8 @@ from tfcompose.cli.terminal import (
     INTERRUPTED,
     UNREADABLE,
     can_redraw,
-    coloured,
     fail,
+    is_coloured,
     print_findings,
     reject,
     size_of,
@@ -80,7 +80,7 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
 
     ``built_with`` are the warnings of its build, which were printed.
     """
-    plan = plan_to_start(built_plan(file), arguments)
+    plan = plan_to_start(read_built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
         fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
     _refuse_trouble(plan, file, arguments)
@@ -144,7 +144,7 @@ def _run(
     """Run the plan on this terminal until it ends, and return the exit code."""
     logs = Logs(place.logs)
     status = StatusLine(plan, lambda: size_of(output.fd)[0]) if can_redraw(sys.stdout) else None
-    console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
+    console = Console(plan, output, colour=is_coloured(sys.stdout), keep=logs.write, status=status)
     session.refresh = console.refresh if status else None
     try:
         return supervise(
@@ -186,7 +186,7 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     else:
         warn(f"{who}; the plan is the same; tfcompose down stops it")
     if answer.held and changes:
-        print(vanished(answer.held))
+        print(describe_vanished(answer.held))
     if arguments.wait:
         return wait_until_ready(place, arguments.timeout)
     return 0 if changes or answer.differs or arguments.detach or arguments.update else FAILED
@@ -221,14 +221,14 @@ def _profiles_that_start(arguments: Namespace) -> list[str]:
 
 
 def _starts_with(profile: str, arguments: Namespace) -> bool:
-    from tfcompose.cli.compiling import given_by, library, overlays_of
+    from tfcompose.cli.compiling import inputs_of, library, overlays_of
     from tfcompose.compiler.compile import compile_robot
     from tfcompose.compiler.emit.plan import plan_of
 
     profiles, overlays, given = (
         [*arguments.profiles, profile],
         overlays_of(arguments),
-        given_by(arguments),
+        inputs_of(arguments),
     )
     file, presets = arguments.file, library()
     compiled = compile_robot(
@@ -315,7 +315,7 @@ def _launch(plan: Plan, place: RuntimeDir, session: RunSession, duration_s: floa
 
 
 def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> int:
-    console = Console(plan, StandardOutput(), colour=coloured(sys.stdout))
+    console = Console(plan, StandardOutput(), colour=is_coloured(sys.stdout))
     goal = AllReady if arguments.wait else AllStarted
     with contextlib.suppress(OSError):
         try:

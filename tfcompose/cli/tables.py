@@ -72,7 +72,7 @@ class Table:
     ) -> str:
         cells, last = [], max(widths)
         for column, width in widths.items():
-            text = shortened(row[column], width, at_end=column == last)
+            text = shorten(row[column], width, at_end=column == last)
             code = colour(column, row[column]) if colour else ""
             blank = " " * (width - len(text))
             shown = f"{code}{text}{PLAIN}" if code else text
@@ -85,7 +85,7 @@ def _excess(widths: dict[int, int], width: int) -> int:
     return sum(widths.values()) + 2 * (len(widths) - 1) - width
 
 
-def shortened(text: str, width: int, *, at_end: bool = False) -> str:
+def shorten(text: str, width: int, *, at_end: bool = False) -> str:
     """Return the text in so many characters.
 
     With an ellipsis at its end, or after its first third.
@@ -99,9 +99,9 @@ def shortened(text: str, width: int, *, at_end: bool = False) -> str:
     if arrow and not at_end:
         room = width - len(arrow) - len(child)
         return (
-            f"{shortened(parent, room)}{arrow}{child}"
+            f"{shorten(parent, room)}{arrow}{child}"
             if room > 0
-            else f"→ {shortened(child, width - 2)}"
+            else f"→ {shorten(child, width - 2)}"
         )
     head = width - 1 if at_end else (width - 1) // 3
     return f"{text[:head]}…{text[len(text) - (width - 1 - head) :]}"

@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
 
 from tfcompose.compiler.render.text import PLAIN, render_text
-from tfcompose.foundation.text import masked
+from tfcompose.foundation.text import mask_invisible
 
 if TYPE_CHECKING:
     import socket
@@ -70,7 +70,7 @@ def print_findings(found: Sequence[Finding], stream: TextIO, *, most: int | None
         counts[place] += 1
         if most is None or counts[place] <= most:
             shown.append(finding)
-    stream.write(render_text(shown, line_of, colour=coloured(stream)))
+    stream.write(render_text(shown, line_of, colour=is_coloured(stream)))
     for (file, code), count in counts.items():
         if most is not None and count > most:
             where, how = (f"{file}: ", "; tfcompose lint --all lists them") if file else ("", "")
@@ -92,7 +92,7 @@ def exit_code_of(found: Sequence[Finding]) -> int:
     return UNREADABLE if any(finding.code in _LACKING for finding in found) else FAILED
 
 
-def coloured(stream: TextIO) -> bool:
+def is_coloured(stream: TextIO) -> bool:
     """Return whether to colour: on a terminal, or with FORCE_COLOR.
 
     Never with NO_COLOR (no-color.org).
@@ -129,7 +129,7 @@ def size_of(fd: int) -> tuple[int, int]:
 
 def printable(text: str) -> str:
     """Return the text without what would move a terminal's cursor."""
-    return masked(text, "?")
+    return mask_invisible(text, "?")
 
 
 def plain(text: str) -> str:
@@ -140,7 +140,7 @@ def plain(text: str) -> str:
     return "".join(map(_marked, _SEQUENCE.split(text)[::2]))
 
 
-def coloured_only(text: str) -> str:
+def keep_colours(text: str) -> str:
     """Return the text with its colours, which end with it, and without other control sequences."""
     pieces = _SEQUENCE.split(text)
     if len(pieces) == 1:
@@ -152,7 +152,7 @@ def coloured_only(text: str) -> str:
 
 
 def _marked(text: str) -> str:
-    return masked(text, "\N{REPLACEMENT CHARACTER}", kept="\t")
+    return mask_invisible(text, "\N{REPLACEMENT CHARACTER}", kept="\t")
 
 
 def has_reader(stream: TextIO) -> bool:

@@ -42,7 +42,7 @@ class ToolCommand:
         return int(self._module().run(arguments))
 
     def _module(self) -> Any:
-        return _loaded(self.tool, self.command.module)
+        return _load_module(self.tool, self.command.module)
 
 
 class ToolOption:
@@ -54,18 +54,18 @@ class ToolOption:
 
     def arguments(self, parser: ArgumentParser) -> None:
         """Add them."""
-        _loaded(self.tool, self.option.module).arguments(parser)
+        _load_module(self.tool, self.option.module).arguments(parser)
 
     def run(self, command: str, arguments: Namespace) -> int | None:
         """Run the command their way, and return the exit code.
 
         None where it is to run as usual.
         """
-        code: int | None = _loaded(self.tool, self.option.module).run(command, arguments)
+        code: int | None = _load_module(self.tool, self.option.module).run(command, arguments)
         return code
 
 
-def _loaded(tool: Tool, module: str) -> Any:
+def _load_module(tool: Tool, module: str) -> Any:
     """Return a module of a tool.
 
     Raises:

@@ -72,7 +72,7 @@ def without_environment(*, applies: bool) -> Iterator[Mapping[str, str]]:
         os.environ.update(before)
 
 
-def declared_environment(source: Source, environment: Mapping[str, str]) -> dict[str, str]:
+def declared_variables(source: Source, environment: Mapping[str, str]) -> dict[str, str]:
     """Return the variables that a file's args read, where their value is no secret.
 
     It is one of the declared choices, a switch or a number: a stranger may declare that an

@@ -20,7 +20,7 @@ from tfcompose.cli.terminal import UNREADABLE, fail, reject, warn
 from tfcompose.compiler.emit import described, emit
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.foundation.reading import exists, is_file, is_folder
-from tfcompose.model.files import Target, unaddressed
+from tfcompose.model.files import Target, assets_without_address
 from tfcompose.model.plan import DESCRIPTION, STOCK_DESCRIPTION
 
 if TYPE_CHECKING:
@@ -201,7 +201,10 @@ def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
         fail("--read-back needs the package yourdfpy: pip install 'tfcompose[view]'", UNREADABLE)
     robot, compiled = compiled_without_errors(arguments.file, arguments)
     folder, target = destination(arguments, robot)
-    lost = [_without_address(asset, target.form) for asset in unaddressed(robot, target.form)]
+    lost = [
+        _without_address(asset, target.form)
+        for asset in assets_without_address(robot, target.form)
+    ]
     if lost:
         reject(lost)
     shared = None if arguments.output else _other_source(folder, arguments.file)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.check import RULES, check, rules_of_tools, silenced, with_replaced
+from tfcompose.compiler.check import RULES, check, rules_of_tools, silence, with_replaced
 from tfcompose.compiler.resolve import Disk, Library, resolve
 from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Allow, Finding, RejectedError, without_duplicates
 from tfcompose.spec.language import (
     Given,
-    composed,
+    compose,
     levels_of,
     profiles_in,
     validate,
@@ -88,7 +88,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     """Return what ``compile_robot`` does, from text that is loaded, with its includes."""
     try:
         validated = validate(
-            composed(source, profiles, overlays, given, read), profiles_in(source), given
+            compose(source, profiles, overlays, given, read), profiles_in(source), given
         )
     except RejectedError as error:
         return Compiled(None, error.findings)
@@ -100,14 +100,14 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     }
     codes = {code_of(name) for name, (level, _) in rules.items() if level == "off"}
     off = {code for code in codes if code and can_be_allowed(code)}
-    found = without_duplicates([*validated.found, *unresolved, *_checked(robot, off)])
+    found = without_duplicates([*validated.found, *unresolved, *_check_robot(robot, off)])
     sources = (source, *parts.sources)
-    kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
+    kept, used = silence(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
     ordered = tuple(sorted(kept, key=lambda entry: entry.sort_key))
     return Compiled(robot, ordered, source.allows, frozenset(used), sources)
 
 
-def _checked(robot: Robot, off: Collection[str]) -> list[Finding]:
+def _check_robot(robot: Robot, off: Collection[str]) -> list[Finding]:
     """Return the findings of the rules, including those of the tools it uses.
 
     Rules whose codes are ``off`` are not asked.

@@ -39,7 +39,7 @@ def values_of(edge: Edge, sources: Sequence[Source]) -> list[str]:
     for source, path, value in _given_values(edge, sources):
         over = ", over ".join(str(old) for old in source.replaced.get(path, ()))
         place = f"{source.at(path)}, over {over}" if over else str(source.at(path))
-        lines.append(f"{path[-1]}: {_shown(value)}  {place}")
+        lines.append(f"{path[-1]}: {_show_value(value)}  {place}")
     return lines
 
 
@@ -74,9 +74,9 @@ def _entries(edge: Edge, source: Source) -> Iterator[Path]:
             yield (section, entry) if edge.given else (section, entry, "frames", edge.child)
 
 
-def _shown(value: Any) -> str:
+def _show_value(value: Any) -> str:
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{key}: {_shown(item)}' for key, item in value.items())}}}"
+        return f"{{{', '.join(f'{key}: {_show_value(item)}' for key, item in value.items())}}}"
     if isinstance(value, list):
-        return f"[{', '.join(map(_shown, value))}]"
+        return f"[{', '.join(map(_show_value, value))}]"
     return str(value).lower() if isinstance(value, bool) else str(value)

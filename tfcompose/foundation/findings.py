@@ -151,7 +151,7 @@ def line_starts(text: str) -> list[int]:
     return [0, *(found.end() for found in _BREAK.finditer(text))]
 
 
-def edited(text: str, edits: Sequence[Edit]) -> str | None:
+def apply_edits(text: str, edits: Sequence[Edit]) -> str | None:
     """Return the text with the edits in it, or None where two of them meet or one lies outside."""
     starts = line_starts(text)
     newline = "\r\n" if "\r\n" in text else "\n"

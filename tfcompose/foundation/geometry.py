@@ -50,7 +50,7 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the quaternion of rotation ``b`` followed by ``a`` (Hamilton product a·b)."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
-    return normalised(
+    return normalise(
         (
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
@@ -77,7 +77,7 @@ def norm(values: tuple[float, ...]) -> float:
     return math.hypot(*values)
 
 
-def normalised(quat_xyzw: Quaternion) -> Quaternion:
+def normalise(quat_xyzw: Quaternion) -> Quaternion:
     """Return the quaternion at unit length.
 
     One that is there already to the last bit is returned as it is.
@@ -97,7 +97,7 @@ def quat_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
     cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return normalised(
+    return normalise(
         (
             sr * cp * cy - cr * sp * sy,
             cr * sp * cy + sr * cp * sy,
@@ -134,7 +134,7 @@ def quat_from_axis_angle(axis: Vector, angle: float) -> Quaternion:
     """
     length = norm(axis)
     s = math.sin(angle / 2) / length
-    return normalised((axis[0] * s, axis[1] * s, axis[2] * s, math.cos(angle / 2)))
+    return normalise((axis[0] * s, axis[1] * s, axis[2] * s, math.cos(angle / 2)))
 
 
 def matrix_from_quat(quat_xyzw: Quaternion) -> Matrix:
@@ -162,7 +162,7 @@ def quat_from_matrix(rows: Matrix) -> Quaternion:
         (r02 + r20, r21 + r12, four[2], r10 - r01),
         (r21 - r12, r02 - r20, r10 - r01, four[3]),
     )
-    return normalised(candidates[best])
+    return normalise(candidates[best])
 
 
 def angle_between(a: Quaternion, b: Quaternion) -> float:
@@ -198,5 +198,5 @@ class Offset(NamedTuple):
 
 def offset_of(expected: Pose, observed: Pose) -> Offset:
     """Return how far ``observed`` is from ``expected``; quaternions need not be of length 1."""
-    angle = angle_between(normalised(expected.quat_xyzw), normalised(observed.quat_xyzw))
+    angle = angle_between(normalise(expected.quat_xyzw), normalise(observed.quat_xyzw))
     return Offset(math.dist(expected.xyz, observed.xyz), angle)

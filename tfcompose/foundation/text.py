@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 LISTED = 6
 
 
-def counted(number: int, noun: str) -> str:
+def plural(number: int, noun: str) -> str:
     """Return the number with the word, in the plural where it belongs: "1 edge", "2 edges"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def with_more(first: str, more: int, noun: str = "edge") -> str:
     """Return the first name, and how many there are besides: "a and 2 more edges"."""
-    return f"{first} and {counted(more, f'more {noun}')}" if more else first
+    return f"{first} and {plural(more, f'more {noun}')}" if more else first
 
 
 def listed(names: Iterable[object], most: int = LISTED) -> str:
@@ -50,7 +50,7 @@ def _visible_character(character: str) -> str:
     return character if character.isprintable() else ascii(character)[1:-1]
 
 
-def masked(text: str, mark: str, kept: str = "") -> str:
+def mask_invisible(text: str, mark: str, kept: str = "") -> str:
     """Return the text with a mark for each invisible character, except those of ``kept``."""
     if text.isprintable():
         return text

@@ -245,7 +245,7 @@ def installed() -> Toolset:
 
 
 def _clashes(tool: Tool, owners: Mapping[tuple[str, str], str]) -> Iterator[Problem]:
-    reserved = {name: owner for name, (owner, _) in _reserved().items()}
+    reserved = {name: owner for name, (owner, _) in _reserved_names().items()}
     for kind, name in tool.names():
         owner = reserved.get((kind, name)) or owners.get((kind, name))
         if owner:
@@ -278,7 +278,7 @@ def absent(name: str, *kinds: str) -> str:
 
     Empty if none has.
     """
-    entries = (_reserved().get((kind, name)) for kind in kinds)
+    entries = (_reserved_names().get((kind, name)) for kind in kinds)
     tool, extra = next(filter(None, entries), ("", ""))
     if not extra or any(other.name == tool for other in shipped().tools):
         return ""
@@ -286,7 +286,7 @@ def absent(name: str, *kinds: str) -> str:
 
 
 @cache
-def _reserved() -> dict[tuple[str, str], tuple[str, str]]:
+def _reserved_names() -> dict[tuple[str, str], tuple[str, str]]:
     """Return who owns each name of the core and of the tools that ship, with what installs that.
 
     The file is written by ``python -m tests.support.names --write``: it also answers where a tool

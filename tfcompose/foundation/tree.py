@@ -138,7 +138,7 @@ def _shortest_loop(parents: Mapping[str, Sequence[str]], start: str) -> tuple[st
     return ()
 
 
-def drawn(
+def draw_tree(
     children: Mapping[str, Sequence[_Item]], root: str, name_of: Callable[[_Item], str]
 ) -> Iterator[tuple[str, _Item]]:
     """Yield what is below the root in the order of a drawing, each with the lines that lead to it.

@@ -282,7 +282,7 @@ _EXAMPLES = {
 }
 
 
-def refused(code: str, message: str, help: str = "", **more: Any) -> PydanticCustomError:  # noqa: A002
+def invalid(code: str, message: str, help: str = "", **more: Any) -> PydanticCustomError:  # noqa: A002
     """Return the error that a validator raises: the finding's code, its message and its help.
 
     ``more`` is ``on_key`` (the key is wrong, not its value), ``other`` (the key beside it that it
@@ -367,18 +367,18 @@ class Measure:
         if self.least is not None and number < self.least:
             what = "is not greater than 0" if number <= 0 else f"is less than {self.least:g}"
             advice = f"for example {example(self.dimensions[0])}"
-            raise refused("TF106", f"{shown(value)} {what}", advice)
+            raise invalid("TF106", f"{shown(value)} {what}", advice)
         return number
 
     def _in_si(self, value: Any) -> float:
         kind = type(value)
         if kind is not float and kind is not int:
-            value = self._converted(value)
+            value = self._convert(value)
         if not -LARGEST <= value <= LARGEST:
-            raise refused("TF106", f"{shown(float(value))} is beyond what can be computed with")
+            raise invalid("TF106", f"{shown(float(value))} is beyond what can be computed with")
         return value if kind is float else value if isinstance(value, WithUnit) else float(value)
 
-    def _converted(self, value: Any) -> float:
+    def _convert(self, value: Any) -> float:
         wanted = self.dimensions[-1]
         if isinstance(value, str):
             try:
@@ -386,18 +386,18 @@ class Measure:
             except UnitError as error:
                 instead = respelt(value, error.unit, wanted) if error.unit else None
                 message = f"{error}; expected {with_article(wanted)}"
-                raise refused(
+                raise invalid(
                     "TF104" if error.unit else "TF103", message, error.advice, instead=instead
                 ) from None
         if isinstance(value, Quantity):
             if value.dimension not in {NUMBER, *self.dimensions}:
                 message = f"expected {with_article(wanted)}, not {with_article(value.dimension)}"
-                raise refused("TF104", message, f"for example {example(wanted)}")
+                raise invalid("TF104", message, f"for example {example(wanted)}")
             return value.value if value.dimension == NUMBER else WithUnit(value.value)
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return value
         message = f"{shown(value)} is not {with_article(self.dimension)}"
-        raise refused("TF103", message, f"for example {example(self.dimension)}")
+        raise invalid("TF103", message, f"for example {example(self.dimension)}")
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)

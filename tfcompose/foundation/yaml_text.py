@@ -11,7 +11,7 @@ from textwrap import dedent, indent
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.numbers import number
-from tfcompose.foundation.text import masked
+from tfcompose.foundation.text import mask_invisible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -129,10 +129,10 @@ def text(value: str) -> str:
         return str(value)
     if _PLAIN.fullmatch(value) and value.lower() not in _RESERVED:
         return value
-    return '"' + "".join(_ESCAPES.get(char) or _printed(char) for char in value) + '"'
+    return '"' + "".join(_ESCAPES.get(char) or _print_char(char) for char in value) + '"'
 
 
-def _printed(char: str) -> str:
+def _print_char(char: str) -> str:
     return char if char.isprintable() else f"\\U{ord(char):08x}"
 
 
@@ -150,7 +150,7 @@ def _literal(value: str) -> list[str] | None:
     return lines
 
 
-def dedented(block: str) -> Literal:
+def dedent_block(block: str) -> Literal:
     """Return an element's source text without its indentation."""
     first, _, rest = block.strip().partition("\n")
     below = dedent(rest.expandtabs(2)) if rest else ""
@@ -162,12 +162,12 @@ def comment(texts: Iterable[str], depth: int = 0) -> list[str]:
     before = "  " * depth + "# "
     lines = []
     for text in texts:
-        printed = masked(" ".join(text.split()), "?")
-        lines += [before + line for line in _folded(printed, WIDTH - len(before))]
+        printed = mask_invisible(" ".join(text.split()), "?")
+        lines += [before + line for line in _fold(printed, WIDTH - len(before))]
     return lines
 
 
-def _folded(line: str, width: int) -> list[str]:
+def _fold(line: str, width: int) -> list[str]:
     lines = [""]
     for token in line.split(" "):
         if lines[-1] and len(lines[-1]) + 1 + len(token) > width:

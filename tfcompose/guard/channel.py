@@ -227,7 +227,7 @@ class FindingsReport:
             self._emit(CurrentFindings(worst))
 
 
-def recalled(env: Mapping[str, str]) -> dict[str, Any]:
+def recall_memory(env: Mapping[str, str]) -> dict[str, Any]:
     """Return what the guard before this one left, by topics; nothing where there was none."""
     if MEMORY_FD not in env:
         return {}

@@ -169,12 +169,12 @@ class Components:
                 if answer.success
                 else f"{container.name} did not load {job.request.what}: {reason}"
             )
-            self._loaded_or_not(job, order, why)
+            self._finish_load(job, order, why)
             return True
         if (there := container.list.answer()) is not None:
             if job.request.node in there.full_node_names:
                 before = job.step == "look" and not order.again
-                self._loaded_or_not(job, order, _already(job.request, there) if before else "")
+                self._finish_load(job, order, _already(job.request, there) if before else "")
                 return True
             job.absent += 1
             if (
@@ -228,7 +228,7 @@ class Components:
             return True
         return False
 
-    def _loaded_or_not(self, job: _Job, order: ComponentOrder, why: str) -> None:
+    def _finish_load(self, job: _Job, order: ComponentOrder, why: str) -> None:
         if not why:
             self._loaded[order.process] = order, job.request
             self._absent[order.process] = 0

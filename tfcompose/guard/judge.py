@@ -145,7 +145,7 @@ class Judge:
         for report in self._publishers.leaving_the_fence(publishers, self._senders, now):
             # What it has sent is reported first: it can be stopped for this before that is due.
             events += self.ledger.report(now, at_once=report.gid)
-            events += self._publishers.unfenced(report, remapped=self.remapped)
+            events += self._publishers.report_unfenced(report, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
             events += self.live.static_writers(
                 {

@@ -181,7 +181,7 @@ class Ledger:
         epoch, certain = self.epoch, sure
         entries, children, admitted = [], [], []
         unplanned = {child for _, child in message.edges} - self.planned.keys()
-        left = MOST_UNDECLARED - self._undeclared(message.gid) if unplanned else 0
+        left = MOST_UNDECLARED - self._count_undeclared(message.gid) if unplanned else 0
         for parent, child in dict.fromkeys(message.edges):
             if child in unplanned and not self._plan.may_be_undeclared(parent, child):
                 left -= 1
@@ -260,7 +260,7 @@ class Ledger:
         is_sure = gid is not None and self._senders.is_sure(gid) and not fault.alternates
         return (fault.code, fault.parent, fault.child, (is_sure and gid) or b"")
 
-    def _undeclared(self, gid: bytes | None) -> int:
+    def _count_undeclared(self, gid: bytes | None) -> int:
         """Return how many undeclared edges of the publisher are faults, or wait for its name."""
         known = sum(e.gid == gid and e.fault.edge is None for e in self.entries.values())
         return known + sum(sent.gid == gid for sent in self._waiting)

@@ -16,7 +16,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.text import listed
-from tfcompose.guard.verdict.rates import left, silent, slow
+from tfcompose.guard.verdict.rates import owner_left, silent, slow
 from tfcompose.model.messages import (
     FindingShown,
     GuardEvent,
@@ -276,20 +276,20 @@ class Liveness:
         """
         self._watched.begins_late(until)
         self._gone = set(memory.gone)
-        for track in self._parted(self._planned(memory.live)):
+        for track in self._part_tracks(self._planned_children(memory.live)):
             track.live, track.last = True, now
             self._waiting[track.edge.owner].difference_update(edge.child for edge in track.edges)
-        for track in self._parted(self._planned(memory.slow)):
+        for track in self._part_tracks(self._planned_children(memory.slow)):
             track.slow = True
         for name in memory.silent:
-            for track in self._parted(self._planned(name.children)):
+            for track in self._part_tracks(self._planned_children(name.children)):
                 track.silent, track.silent_since, track.last = True, name.since, name.since
                 self._note_wrong(
                     WrongEdges(list(track.edges), partial(silent, silence_s=now - name.since))
                 )
         self._complete = not any(self._waiting.values())
 
-    def _planned(self, children: tuple[str, ...]) -> tuple[str, ...]:
+    def _planned_children(self, children: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(child for child in children if child in self._track_of)
 
     def arrived(
@@ -297,7 +297,7 @@ class Liveness:
     ) -> list[GuardEvent]:
         """Note that owners sent these edges, in one message, and return what that means."""
         watched, late, events = self._watched.at(now), self._watched.is_behind(now), []
-        for track in self._of_message.get(children) or self._parted(children):
+        for track in self._of_message.get(children) or self._part_tracks(children):
             if track.edge.owner in self._absent:
                 continue
             track.arrived(watched, now, late=late)
@@ -307,7 +307,7 @@ class Liveness:
                 events += self._began(track)
         return events
 
-    def _parted(self, children: tuple[str, ...]) -> list[Track]:
+    def _part_tracks(self, children: tuple[str, ...]) -> list[Track]:
         """Return the tracks of exactly these edges; tracks that hold others too are parted."""
         wanted = set(children)
         touched = {id(track): track for child in children for track in (self._track_of[child],)}
@@ -400,7 +400,7 @@ class Liveness:
             wrong = _wrong(change, self._in_order(tracks), now)
             if wrong is None:
                 self._note_over(_children(tracks))
-                events.append(_recovered(change, self._in_order(tracks), now))
+                events.append(_recovery_event(change, self._in_order(tracks), now))
             else:
                 self._note_wrong(wrong)
                 events.append(FindingShown(wrong.found))
@@ -451,7 +451,7 @@ class Liveness:
             edge = tracks[0].edge
             if edge.node not in nodes and owner not in self._gone:
                 self._gone.add(owner)
-                wrong = WrongEdges([edge for track in tracks for edge in track.edges], left)
+                wrong = WrongEdges([edge for track in tracks for edge in track.edges], owner_left)
                 self._note_wrong(wrong)
                 events.append(FindingShown(wrong.found))
             elif edge.node in nodes and owner in self._gone:
@@ -475,7 +475,7 @@ def _wrong(change: str, tracks: list[Track], now: float) -> WrongEdges | None:
             return None
 
 
-def _recovered(change: str, tracks: list[Track], now: float) -> RecoveredShown:
+def _recovery_event(change: str, tracks: list[Track], now: float) -> RecoveredShown:
     """Return the event for tracks that came back, or come at their rate again."""
     edges = [edge for track in tracks for edge in track.edges]
     named, are = listed([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"

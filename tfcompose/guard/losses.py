@@ -9,7 +9,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Note, finding
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.model.messages import FindingShown, RecoveredShown
 from tfcompose.tf.ros.sockets import LIMIT, WANTED, LostDatagrams, buffer_limit, widen_buffers
 
@@ -62,7 +62,7 @@ class LossWatch:
 def datagrams_lost(lost: int, limit: int | None) -> Finding:
     """Return the finding for so many lost datagrams, where a socket can hold ``limit`` bytes."""
     message = (
-        f"the guard itself lost {counted(lost, 'datagram')}: more came at once than it could take"
+        f"the guard itself lost {plural(lost, 'datagram')}: more came at once than it could take"
     )
     note = Note("meanwhile no owner is called silent or slow")
     if limit is None or limit < WANTED:

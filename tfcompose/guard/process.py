@@ -20,7 +20,7 @@ import msgspec
 
 from tfcompose.foundation.catalogue import CATALOGUE
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.guard.channel import (
     EventWriter,
     FindingsReport,
@@ -28,7 +28,7 @@ from tfcompose.guard.channel import (
     OrderReader,
     SilentEdges,
     SwitchMemory,
-    recalled,
+    recall_memory,
 )
 from tfcompose.guard.components import ComponentDriver, Components
 from tfcompose.guard.descriptions import Descriptions
@@ -282,7 +282,7 @@ def _with_id(data: TFData) -> TFData:
     )
 
 
-def held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int] | None:
+def count_held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int] | None:
     """Return what was held back, or None where nothing is."""
     relays = [watch.relay for watch in watches if watch.relay]
     return (
@@ -335,7 +335,7 @@ def guard(own: Own, stop: Stop) -> None:
     plans = plans_by_topics(own.plan, own.process)
     events = EventWriter(judges=judges)
     emit = together(events.emit, list(plans.values()))
-    left = recalled(os.environ)
+    left = recall_memory(os.environ)
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         if not ids_say_who(node):
             say(
@@ -354,7 +354,7 @@ def guard(own: Own, stop: Stop) -> None:
         if switches:
             memories.append(SwitchMemory(switches, events.emit, left))
         judging = "" if judges else ", and judging nobody"
-        say(f"watching {counted(len(own.plan.edges), 'edge')}{judging}{' again' if left else ''}")
+        say(f"watching {plural(len(own.plan.edges), 'edge')}{judging}{' again' if left else ''}")
         events.flush()
         ready()
         CATALOGUE.load()
@@ -376,7 +376,7 @@ def guard(own: Own, stop: Stop) -> None:
             FindingsReport([*wrong, *silence], emit).report,
             events.heartbeat,
             events.flush,
-            lambda: diagnostics.publish(judged, wrong, lambda: held_back(watches)),
+            lambda: diagnostics.publish(judged, wrong, lambda: count_held_back(watches)),
         ]
         steps += [switches.check] if switches else []
         if ORDERS_FD not in os.environ:

@@ -114,7 +114,7 @@ class Relay:
         elif admitted is None:
             self._send(data, sent.process)
         elif admitted:
-            self._send(encode(list(_admitted(data, message, admitted))), sent.process)
+            self._send(encode(list(_admit(data, message, admitted))), sent.process)
 
     def memory(self) -> dict[str, Any]:
         """Return what the guard that follows must latch.
@@ -201,7 +201,7 @@ class Relay:
         admitted: Collection[Edge] | None,
         process: str,
     ) -> None:
-        found = {t.child: t for t in _admitted(data, message, admitted)}
+        found = {t.child: t for t in _admit(data, message, admitted)}
         latched = self._fixed.get(gid)
         if latched is None:
             if not found:
@@ -222,7 +222,7 @@ class Relay:
         return latched
 
 
-def _admitted(
+def _admit(
     data: bytes, message: Message, admitted: Collection[Edge] | None
 ) -> Iterator[SentTransform]:
     for transform, edge in zip(decode(data), message.edges, strict=True):

@@ -164,7 +164,7 @@ class PublisherReports:
             if senders.sender(publisher.gid) or now - since[publisher.gid] >= UNFENCED_SILENT_S
         ]
 
-    def unfenced(self, publisher: Publisher, *, remapped: bool) -> list[Unfenced]:
+    def report_unfenced(self, publisher: Publisher, *, remapped: bool) -> list[Unfenced]:
         """Return the finding for one of these; the fence may be of remappings."""
         topic = publisher.topic or GLOBAL[publisher.static]
         if publisher.unmarked:

@@ -206,7 +206,7 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> PlanDiff
             redescribed.add(process.name)
         elif not same or files[0] != files[1] or (described and new.describes(process)):
             changed.add(process.name)
-    return PlanDifference(frozenset(changed), _held(old, new), frozenset(redescribed))
+    return PlanDifference(frozenset(changed), _vanished_edges(old, new), frozenset(redescribed))
 
 
 #: The line of a parameter file that the stock robot_state_publisher has its description in.
@@ -230,7 +230,7 @@ def _bytes(folder: Path, name: str | None) -> bytes | None:
         return None
 
 
-def _held(old: Plan, new: Plan) -> tuple[str, ...]:
+def _vanished_edges(old: Plan, new: Plan) -> tuple[str, ...]:
     """Return the fixed edges that vanish.
 
     Tf2 never forgets one, so listeners keep it until they start anew.

@@ -184,7 +184,7 @@ class Children:
             # The guard's end dismisses those that are held, so that one of these may be gone by
             # now.
             if child.name not in self._held and self._children.get(child.name) is child:
-                self._ended(child)
+                self._take_leavings(child)
         if self._run_id:
             reap_adopted(self._groups() | {self._reaper.pid})
 
@@ -307,7 +307,7 @@ class Children:
         else:
             self._happened(event)
 
-    def _ended(self, child: Child) -> None:
+    def _take_leavings(self, child: Child) -> None:
         """Take what the process leaves behind.
 
         The rest of its group, its last words, and its exit code.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from tfcompose.foundation.findings import finding
 from tfcompose.launcher.events import Order
 from tfcompose.launcher.readiness import order_gate
-from tfcompose.launcher.stopping import left, lose_edges, schedule_restart
+from tfcompose.launcher.stopping import lose_edges, process_left, schedule_restart
 from tfcompose.model.messages import ComponentOrder, ComponentState
 
 if TYPE_CHECKING:
@@ -35,23 +35,23 @@ def component_answered(step: Transition, event: ComponentState) -> None:
             )
             order_gate(step, step.state.tracked[event.process])
         case "not loaded" if tracked.state == "starting":
-            _ended(
+            _end_component(
                 step,
                 replace(tracked, since=step.now),
                 why,
                 f"{tracked.process.name} could not be started: {why}",
             )
         case "unloaded" if tracked.state == "running":
-            _ended(step, tracked, why, f"{tracked.process.name} has ended: {why}")
+            _end_component(step, tracked, why, f"{tracked.process.name} has ended: {why}")
         case "unloaded" if tracked.state == "stopping" and step.state.stop:
             step.enter(event.process, "stopped", why)
         case "unloaded" if tracked.state == "stopping":
-            left(step, tracked, why or "unloaded")
+            process_left(step, tracked, why or "unloaded")
         case _:
             pass
 
 
-def _ended(step: Transition, tracked: Tracked, why: str, message: str) -> None:
+def _end_component(step: Transition, tracked: Tracked, why: str, message: str) -> None:
     """Take a component that was not loaded, or is not there any more.
 
     It is loaded again, or has failed.
@@ -63,7 +63,7 @@ def _ended(step: Transition, tracked: Tracked, why: str, message: str) -> None:
     lose_edges(step, tracked)
     tracked = step.state.tracked[name]
     if tracked.leaving:
-        left(step, tracked, why)
+        process_left(step, tracked, why)
     elif tracked.process.restart == "no":
         step.enter(name, "fatal", why)
         step.fail_process(name, finding("TF808", message, None))

@@ -58,7 +58,7 @@ def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
     )
 
 
-def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
+def remap_tf(plan: Plan, process: PlanProcess) -> PlanProcess:
     """Return the process with its TF on its own topics, whatever names it uses.
 
     ROS takes the first remapping that fits, so these come first.

@@ -47,7 +47,7 @@ def apply_settings(process: PlanProcess) -> None:
         setting.apply(value)
 
 
-def refused_settings(process: PlanProcess) -> list[Finding]:
+def check_settings(process: PlanProcess) -> list[Finding]:
     """Return what the kernel refuses of a process's keys; this process stays as it was."""
     refusals = [setting.refusal(process.name, value) for setting, value in _set(process)]
     return [refusal for refusal in refusals if refusal]

@@ -72,7 +72,7 @@ def leftovers(run: str) -> list[Leftover]:
     found = []
     for pid in procfs.pids():
         with contextlib.suppress(OSError):
-            if pid != os.getpid() and (leftover := _marked(pid, run)):
+            if pid != os.getpid() and (leftover := _leftover_of(pid, run)):
                 found.append(leftover)
     return found
 
@@ -108,7 +108,7 @@ def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
     return found
 
 
-def _marked(pid: int, run: str) -> Leftover | None:
+def _leftover_of(pid: int, run: str) -> Leftover | None:
     env = procfs.environ(pid)
     if RUN_ID not in env or not env[RUN_ID].startswith(run):
         return None

@@ -123,7 +123,7 @@ def _react(step: Transition, event: Event) -> None:
         case Begin():
             _begin(step)
         case Started(name, pid):
-            _started(step, name, pid)
+            _take_start(step, name, pid)
         case StartFailed(name, why):
             _not_started(step, name, why)
         case Exited():
@@ -138,10 +138,10 @@ def _react(step: Transition, event: Event) -> None:
         case _:
             stop_if_requested(step, event)
             if step.state.stop is None:
-                _requested_or_reported(step, event)
+                _take_request_or_report(step, event)
 
 
-def _requested_or_reported(step: Transition, event: Event) -> None:
+def _take_request_or_report(step: Transition, event: Event) -> None:
     match event:
         case ProcessRequest():
             process_requested(step, event)
@@ -178,7 +178,7 @@ def _begin(step: Transition) -> None:
             order_gate(step, step.state.tracked[name])
 
 
-def _started(step: Transition, name: str, pid: int) -> None:
+def _take_start(step: Transition, name: str, pid: int) -> None:
     step.enter(name, "running", pid=pid, began=step.now)
     if name != step.state.guard:
         order_gate(step, step.state.tracked[name])
@@ -302,7 +302,7 @@ def _left_the_fence(step: Transition, found: Finding, process: str, pid: int) ->
         _violation(step, found, process)
     elif not process:
         step.report(
-            _noted(
+            _with_note(
                 found, f"nothing is stopped: a process of the plan started it; kill {pid} ends it"
             )
         )
@@ -312,13 +312,13 @@ def _left_the_fence(step: Transition, found: Finding, process: str, pid: int) ->
 
 def _stop_offender(step: Transition, found: Finding, process: str, because: str) -> None:
     if why := refusal(step.state, process, "stop"):
-        step.report(_noted(found, f"nothing is stopped: {why}"))
+        step.report(_with_note(found, f"nothing is stopped: {why}"))
         return
-    step.report(_noted(found, f"{process} is stopped and not restarted: {because}"))
+    step.report(_with_note(found, f"{process} is stopped and not restarted: {because}"))
     process_requested(step, ProcessRequest("stop", process))
 
 
-def _noted(found: Finding, text: str) -> Finding:
+def _with_note(found: Finding, text: str) -> Finding:
     return replace(found, notes=(*found.notes, Note(text)))
 
 

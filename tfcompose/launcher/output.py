@@ -317,7 +317,7 @@ def _ensure_kept(folder: Path) -> None:
         raise OSError(errno.EPERM, f"{folder} is another user's", str(folder))
 
 
-def logged(folder: Path) -> list[str]:
+def logged_processes(folder: Path) -> list[str]:
     """Return the names of the processes that have a log, the launcher's among them."""
     return sorted(
         file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log")

@@ -25,8 +25,8 @@ from tfcompose.foundation.findings import Finding, Note, did_you_mean, finding
 from tfcompose.foundation.hooks import run_hook
 from tfcompose.foundation.tool import installed
 from tfcompose.launcher.child import ChildCommand
-from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
-from tfcompose.launcher.kernel_settings import refused_settings
+from tfcompose.launcher.fence import by_partition, not_remapped, remap_tf, way_of
+from tfcompose.launcher.kernel_settings import check_settings
 from tfcompose.launcher.program import HERE, without_current_folder
 from tfcompose.model.plan import PROGRAM
 from tfcompose.model.plan.components import load_request
@@ -74,17 +74,17 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
     """
     folder = built_in or plan_file.absolute().parent
-    found = [*_never_started(plan), *_found_by_tools(plan)]
+    found = [*_never_started(plan), *_check_by_tools(plan)]
     commands: dict[str, ChildCommand] = {}
     missing = []
     way = way_of(plan, base)
     if way == "remap":
         found += not_remapped(plan)
-        processes = [remapped(plan, process) for process in processes]
+        processes = [remap_tf(plan, process) for process in processes]
     found += _not_loadable(plan, processes)
     for process in processes:
         if process.component:
-            fill = partial(_filled, process=process, plan_file=plan_file, build_dir=folder)
+            fill = partial(_fill, process=process, plan_file=plan_file, build_dir=folder)
             request = load_request(plan, process, fill, private=way == "remap")
             commands[process.name] = ChildCommand((), {}, folder, load=request)
             continue
@@ -95,13 +95,13 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
             missing.append(command)
         else:
             commands[process.name] = command
-            found += [] if command.missing else refused_settings(process)
+            found += [] if command.missing else check_settings(process)
     if way == "partition":
         commands, wrong = by_partition(plan, commands, plan_file.absolute().parent)
         found += wrong
     elif way == "remap":
         guards = {process.name for process in processes if process.kind == "guard"}
-        commands |= {name: _marked(commands[name]) for name in guards & commands.keys()}
+        commands |= {name: _with_mark(commands[name]) for name in guards & commands.keys()}
     if missing:
         found.append(not_found(missing))
     return commands, list(dict.fromkeys(found))
@@ -118,7 +118,7 @@ def _command_of(
     env = environment(base, ros, own=own) | own_env(process, *files)
     if process.argv[:1] == (PROGRAM,):
         env = without_current_folder(env)
-    argv = filled_in(process, *files)
+    argv = fill_argv(process, *files)
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, *files)
@@ -158,7 +158,7 @@ def _command_of(
     return command
 
 
-def _found_by_tools(plan: Plan) -> Iterator[Finding]:
+def _check_by_tools(plan: Plan) -> Iterator[Finding]:
     """Yield what tools find in the plan that has a section, or runs a command, of theirs."""
     commands = {
         ("command", process.argv[1])
@@ -172,7 +172,7 @@ def _found_by_tools(plan: Plan) -> Iterator[Finding]:
             yield from [found] if isinstance(found, Finding) else found
 
 
-def _marked(guard: ChildCommand) -> ChildCommand:
+def _with_mark(guard: ChildCommand) -> ChildCommand:
     return replace(guard, env=guard.env | {REMAPPED: "1"})
 
 
@@ -224,7 +224,7 @@ def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
     """Return the process's folder as an absolute path without ``..``, if the plan has one."""
     if process.cwd is None:
         return _here()
-    return Path(os.path.normpath(build_dir / _filled(process.cwd, process, plan_file, build_dir)))
+    return Path(os.path.normpath(build_dir / _fill(process.cwd, process, plan_file, build_dir)))
 
 
 def _here() -> Path:
@@ -238,13 +238,13 @@ def _here() -> Path:
         return Path(procfs.working_dir())
 
 
-def filled_in(
+def fill_argv(
     process: PlanProcess, plan_file: Path, build_dir: Path | None = None
 ) -> tuple[str, ...]:
     """Return the process's ``argv`` with the placeholders replaced; both paths are absolute."""
     is_ours = process.argv[:1] == (PROGRAM,)
     start, argv = (HERE, process.argv[1:]) if is_ours else ((), process.argv)
-    return (*start, *(_filled(argument, process, plan_file, build_dir) for argument in argv))
+    return (*start, *(_fill(argument, process, plan_file, build_dir) for argument in argv))
 
 
 def own_env(
@@ -252,13 +252,11 @@ def own_env(
 ) -> dict[str, str]:
     """Return the variables that the plan gives the process, with the placeholders replaced."""
     return {
-        name: _filled(value, process, plan_file, build_dir) for name, value in process.env.items()
+        name: _fill(value, process, plan_file, build_dir) for name, value in process.env.items()
     }
 
 
-def _filled(
-    text: str, process: PlanProcess, plan_file: Path, build_dir: Path | None = None
-) -> str:
+def _fill(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> str:
     values = {
         "plan": str(plan_file),
         "build_dir": str(build_dir or plan_file.parent),

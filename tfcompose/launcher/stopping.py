@@ -12,7 +12,7 @@ from signal import SIGKILL, SIGTERM, Signals
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import did_you_mean
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp
 from tfcompose.launcher.failures import (
     ended_by_itself,
@@ -74,7 +74,7 @@ def _take_end(step: Transition, event: Exited) -> None:
     lose_edges(step, tracked)
     tracked = step.state.tracked[name]
     if tracked.leaving:
-        left(step, tracked, how)
+        process_left(step, tracked, how)
         return
     process, ready = tracked.process, tracked.process.ready
     expected = int(ready.number) if ready and ready.kind == "exit" else 0
@@ -155,7 +155,7 @@ def lose_components(step: Transition, container: str) -> None:
             ):  # what was ordered holds for that container
                 step.actions.append(Order(Absent(tracked.process.name)))
             tracked = step.state.tracked[tracked.process.name]  # noqa: PLW2901 (the same, without its edges)
-            left(
+            process_left(
                 step,
                 replace(
                     tracked, leaving=tracked.leaving or ("again" if tracked.wanted else "stop")
@@ -164,7 +164,7 @@ def lose_components(step: Transition, container: str) -> None:
             )
 
 
-def left(step: Transition, tracked: Tracked, how: str) -> None:
+def process_left(step: Transition, tracked: Tracked, how: str) -> None:
     """Take a process that was meant to end as ended.
 
     It stays so, is started again, or leaves the plan.
@@ -203,7 +203,7 @@ def schedule_restart(
     failures = 1 if step.now - tracked.since >= times.steady_s else tracked.failures + 1
     if failures > most:
         step.enter(name, "fatal", how)
-        step.fail_process(name, failure(f", after {counted(most, 'restart')}"))
+        step.fail_process(name, failure(f", after {plural(most, 'restart')}"))
         return
     delay = backoff_s(times, tracked.process, failures)
     step.enter(
@@ -272,7 +272,7 @@ def follow_plan(step: Transition, event: NewPlan) -> None:
         plan=plan,
         guard=guards[0] if guards else None,
         tracked={
-            process.name: _taken_over(before, process.name, event) for process in plan.processes
+            process.name: _take_over(before, process.name, event) for process in plan.processes
         },
         live=live,
         complete=len(live) == len(plan.edges),
@@ -318,7 +318,7 @@ def description_answered(step: Transition, event: DescriptionState) -> None:
         step.notify(Replanned(changed=(event.process,)))
 
 
-def _taken_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked:
+def _take_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked:
     process = event.plan.process(name)
     tracked = before.get(name)
     rests: StateName = "expected" if process.kind == "external" else "stopped"
@@ -343,7 +343,7 @@ def stop_if_requested(step: Transition, event: Event) -> None:
         case DownRequest():
             step.stop(StopReason("signal", 0, 1, step.now), "tfcompose down")
         case Signalled(number):
-            _signalled(step, signal_name(number))
+            _note_signal(step, signal_name(number))
         case OutputLost():
             step.stop(StopReason("failure", UNREAD), "nobody reads the output any more")
         case TimeUp():
@@ -352,7 +352,7 @@ def stop_if_requested(step: Transition, event: Event) -> None:
             pass
 
 
-def _signalled(step: Transition, name: str) -> None:
+def _note_signal(step: Transition, name: str) -> None:
     stop = step.state.stop
     if stop is None:
         step.stop(StopReason("signal", 0, 1, step.now), name)

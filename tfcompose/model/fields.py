@@ -17,7 +17,7 @@ def documented(default: Any, about: str, *examples: Any) -> Any:
     return field(default=default, metadata={"description": about, **more})
 
 
-def narrowed(kind: type[T], value: T, **changes: Any) -> T:
+def narrow(kind: type[T], value: T, **changes: Any) -> T:
     """Return a ``kind`` with the fields of ``value``, of one of its subclasses, changed."""
     of: Any = kind
     same = {field.name: getattr(value, field.name) for field in fields(of) if field.init}

@@ -43,9 +43,11 @@ class Target:
     def address(self, asset: Asset) -> str:
         """Return the address; one impossible in this form is kept (see ``unaddressed``)."""
         if self.form == "package" and asset.package:
-            return f"package://{asset.package}/{_quoted(asset.inside)}"
+            return f"package://{asset.package}/{_quote_path(asset.inside)}"
         if self.form == "file" and asset.path:
-            return "file://" + _quoted(posixpath.normpath(posixpath.join(self.top, asset.path)))
+            return "file://" + _quote_path(
+                posixpath.normpath(posixpath.join(self.top, asset.path))
+            )
         plain = "://" not in asset.uri and not asset.uri.startswith("/")
         if asset.path and (self.form == "relative" or plain):
             return self.from_folder(asset.path)
@@ -61,7 +63,7 @@ AS_IN_SOURCE = Target()
 _NOT_IN_ADDRESSES = re.compile(r"[\x00-\x20\x7f#%?]")
 
 
-def _quoted(path: str) -> str:
+def _quote_path(path: str) -> str:
     """Return the path as an address has it: a space is %20.
 
     ROS reads addresses with libcurl, which refuses spaces and takes ``#``, ``?`` and ``%`` for
@@ -80,7 +82,7 @@ def assets(robot: Robot) -> Iterator[Asset]:
                 yield shape.material.texture
 
 
-def unaddressed(robot: Robot, form: Form) -> list[Asset]:
+def assets_without_address(robot: Robot, form: Form) -> list[Asset]:
     """Return the files that have no address of this form: in no package, or of unknown place.
 
     Each once.

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from tfcompose.foundation.numbers import number
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.model.plan import (
     Component,
     LogLevel,
@@ -299,7 +299,7 @@ def _read_respawn_delay(record: Mapping[str, Any], _todo: list[str]) -> Seconds 
 def _restart_lines(process: PlanProcess) -> Iterator[tuple[str, str]]:
     delay_s = process.restart_delay
     delay = "" if delay_s is None else f", {delay_s:g} s after its end"
-    limit = counted(process.restart_limit, "time")
+    limit = plural(process.restart_limit, "time")
     yield "restart", f"{process.restart}, {limit} in a row{delay}"
 
 

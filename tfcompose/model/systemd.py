@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 SOURCING = 'until [ "$1" = -- ]; do . "$1"; shift; done; shift; exec "$@"'
 
 
-def sourced(setup: Sequence[str], argv: list[str]) -> list[str]:
+def source_then_run(setup: Sequence[str], argv: list[str]) -> list[str]:
     """Return the command that sources the setup files and becomes ``argv``.
 
     That itself without setup files.
@@ -25,7 +25,7 @@ def without_specifiers(text: str) -> str:
     return text.replace("%", "%%")
 
 
-def quoted(argument: str) -> str:
+def quote(argument: str) -> str:
     """Return the argument as systemd reads it back; a percent sign is doubled."""
     text = without_specifiers(argument)
     if text and all(c.isalnum() or c in "/.:=@+,-_%" for c in text):

@@ -117,7 +117,7 @@ class Recording:
                     self.end_ns = (
                         max(self.end_ns, reader.end_time) if reader.message_count else self.end_ns
                     )
-                    for connection, received_ns, data in self._timed(reader, wanted):
+                    for connection, received_ns, data in self._with_clock(reader, wanted):
                         pair = pair_of[connection.topic]
                         rows = _rows(decoder, bytes(data))
                         yield RecordedMessage(
@@ -126,11 +126,11 @@ class Recording:
             except BagError:
                 raise
             except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
-                raise _damaged(str(file), error) from None
+                raise _damage_error(str(file), error) from None
         if not found:
             raise _no_topic(self.path, pairs, others)
 
-    def _timed(self, reader: Any, wanted: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
+    def _with_clock(self, reader: Any, wanted: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
         """Yield the messages of these connections, and note what comes on /clock between them."""
         clocks = [
             each for each in reader.connections if (each.topic, each.msgtype) == ("/clock", CLOCK)
@@ -372,7 +372,7 @@ def _order_of(part: str) -> tuple[int, str]:
     return (int(part), "") if part.isdigit() else (-1, part)
 
 
-def _damaged(path: str, error: Exception) -> BagError:
+def _damage_error(path: str, error: Exception) -> BagError:
     """Return what to say where the library cannot read a bag."""
     reason = " ".join(str(error).split()) or type(error).__name__
     advice = ""

@@ -10,7 +10,7 @@ import pytest
 
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
-from tfcompose.compiler.rays.bodies import _reached
+from tfcompose.compiler.rays.bodies import _reach_frames
 
 if TYPE_CHECKING:
     from tfcompose.foundation.findings import Finding
@@ -111,9 +111,9 @@ def test_the_poses_of_fixed_frames_are_computed_once_a_robot(
 
     def walked(neighbours: Any, poses: dict[str, Pose]) -> dict[str, Pose]:
         walks.append(len(poses))
-        return _reached(neighbours, poses)
+        return _reach_frames(neighbours, poses)
 
-    monkeypatch.setattr("tfcompose.compiler.rays.bodies._reached", walked)
+    monkeypatch.setattr("tfcompose.compiler.rays.bodies._reach_frames", walked)
     assert found(text, "TF645")
     assert len(walks) == 2  # what is fixed, and what turns on it
 

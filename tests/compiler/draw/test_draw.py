@@ -17,7 +17,7 @@ from PIL import Image
 from tfcompose.compiler.draw import Arrow, Graph, Group
 from tfcompose.compiler.draw.arrange import Direction
 from tfcompose.compiler.draw.dot import dot
-from tfcompose.compiler.draw.graph import Kind, collapsed
+from tfcompose.compiler.draw.graph import Kind, collapse_groups
 from tfcompose.compiler.draw.mermaid import mermaid
 from tfcompose.compiler.draw.picture import Box, Curve, Drawing, TextLine, draw
 from tfcompose.compiler.draw.png import png
@@ -230,7 +230,9 @@ def test_in_columns_no_edge_to_a_child_of_the_trunk_crosses_a_box(
 
 def test_the_title_of_a_collapsed_picture_counts_the_frames_of_the_robot() -> None:
     texts = [
-        shape.text for shape in draw(collapsed(broad(3))).shapes if isinstance(shape, TextLine)
+        shape.text
+        for shape in draw(collapse_groups(broad(3))).shapes
+        if isinstance(shape, TextLine)
     ]
     assert "11 frames · 10 edges · 6 frames inside sensors not shown" in texts
     assert "static (9 edges)" in texts
@@ -253,7 +255,7 @@ def test_a_collapsed_sensor_is_its_mount_and_what_leads_to_other_frames() -> Non
     arrows = tuple(Arrow(a, b, "static", "static", "5 Hz" if b == "cam" else "") for a, b in pairs)
     frames = ("base", "cam", "lens", "optical", "imu", "filter", "laser")
     groups = (Group("camera", ("cam", "lens", "optical", "imu")), Group("laser", ("laser",)))
-    graph = collapsed(Graph("robot", frames, arrows, groups))
+    graph = collapse_groups(Graph("robot", frames, arrows, groups))
     assert graph.frames == ("base", "cam", "lens", "filter", "laser")
     assert [(one.parent, one.child, one.detail) for one in graph.arrows] == [
         ("base", "cam", "5 Hz +2"),

@@ -17,7 +17,7 @@ from tfcompose.compiler.emit import emit
 from tfcompose.compiler.emit.plan import plan_of
 from tfcompose.foundation.findings import Finding, RejectedError
 from tfcompose.launcher.kernel_settings import SETTINGS
-from tfcompose.launcher.preflight import filled_in, folder_of, own_env
+from tfcompose.launcher.preflight import fill_argv, folder_of, own_env
 from tfcompose.model.files import Target
 from tfcompose.model.plan import PlanProcess, Ready, StopRule
 from tfcompose.model.plan.components import ros_value
@@ -385,7 +385,7 @@ def test_a_file_is_named_from_the_plans_folder_and_found_from_wherever_the_plan_
     assert isinstance(built, tuple)
     text, process = built
     assert str(tmp_path) not in text
-    filled = filled_in(process, tmp_path / "build/r/plan.json")
+    filled = fill_argv(process, tmp_path / "build/r/plan.json")
     (tmp_path / "build/r").mkdir(parents=True)
     paths = [
         filled[1].removeprefix("--map="),

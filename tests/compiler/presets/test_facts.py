@@ -13,7 +13,7 @@ import yaml
 
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.resolve.poses import rotation_of
-from tfcompose.compiler.resolve.presets import filled
+from tfcompose.compiler.resolve.presets import fill_name
 from tfcompose.foundation.geometry import IDENTITY_XYZW, OPTICAL_XYZW, angle_between, quat_from_rpy
 from tfcompose.spec.language.preset import PresetFrame
 
@@ -52,8 +52,10 @@ def variants(name: str) -> Iterator[dict[str, list[tuple[str, PresetFrame]]]]:
         found = {}
         for pattern, frame in preset.frames.items():
             parents = [frame.parent, *([frame.by_driver.parent] if frame.by_driver else [])]
-            named = filled(pattern, "{name}", preset.words)
-            found[named] = [(filled(parent, "{name}", preset.words), frame) for parent in parents]
+            named = fill_name(pattern, "{name}", preset.words)
+            found[named] = [
+                (fill_name(parent, "{name}", preset.words), frame) for parent in parents
+            ]
         yield found
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import compile_robot
-from tfcompose.compiler.resolve.presets import filled
+from tfcompose.compiler.resolve.presets import fill_name
 from tfcompose.foundation.geometry import angle_between, rotate
 from tfcompose.model.robot import Robot, is_optical
 
@@ -123,7 +123,7 @@ def test_what_stamps_its_messages_is_a_frame_of_the_robot(name: str) -> None:
     for tf, options, robot in robots(name):
         preset = KNOWN.get(name, {key: options[key] for key in (variants(name) or [{}])[0]})
         for topic, output in preset.topics.items():
-            stamped = filled(output.frame, "s", preset.words)
+            stamped = fill_name(output.frame, "s", preset.words)
             assert output.hard_coded is (stamped not in robot.frames), (tf, topic, stamped)
 
 

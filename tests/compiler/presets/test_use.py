@@ -22,7 +22,7 @@ from tfcompose.cli.parser import main
 from tfcompose.cli.reading import read_text
 from tfcompose.compiler.compile import Compiled, compile_robot
 from tfcompose.compiler.emit import emit
-from tfcompose.compiler.resolve.presets import filled
+from tfcompose.compiler.resolve.presets import fill_name
 from tfcompose.model.robot import Edge, Process, Robot
 from tfcompose.spec.language.preset import Chosen
 
@@ -133,7 +133,7 @@ def test_a_driver_gets_the_final_names_of_its_frames(name: str) -> None:
     assert preset.driver
     frames = unknown(name)
     renamed = {
-        filled(frame, "s", preset.words): "other"
+        fill_name(frame, "s", preset.words): "other"
         for frame in list(preset.driver.naming.values())[:1]
     }
     overrides = frames | {
@@ -149,7 +149,7 @@ def test_a_driver_gets_the_final_names_of_its_frames(name: str) -> None:
         assert not done.errors
         declared = driver_parameters(done.robot)
         for key, frame in preset.driver.naming.items():
-            plain = filled(frame, "s", preset.words)
+            plain = fill_name(frame, "s", preset.words)
             assert declared[key] == prefix + renamed.get(plain, plain)
 
 

@@ -27,7 +27,7 @@ from tfcompose.compiler.rays import (
 )
 from tfcompose.compiler.rays.bundle import bundle_of
 from tfcompose.foundation.findings import Span
-from tfcompose.foundation.geometry import Pose, matrix_from_quat, normalised, quat_from_rpy
+from tfcompose.foundation.geometry import Pose, matrix_from_quat, normalise, quat_from_rpy
 from tfcompose.model.robot import Asset, Optics, Robot, Shape
 from tfcompose.tools.view.shapes import mesh_of
 
@@ -212,7 +212,7 @@ def test_an_arm_that_moves_blocks_nothing_and_a_wheel_does() -> None:
 def test_a_mesh_is_hit_where_the_same_primitive_is(tmp_path: Path) -> None:
     file = tmp_path / "ball.stl"
     MESHES["sphere"].export(file)
-    pose = Pose((1.0, 0.2, 0.1), normalised((0.1, 0.2, 0.3, 0.9)))
+    pose = Pose((1.0, 0.2, 0.1), normalise((0.1, 0.2, 0.3, 0.9)))
     shape = Shape("mesh", (2.0, 2.0, 2.0), pose, mesh=Asset("ball.stl", path=str(file)))
     by_mesh = cast("s", SCAN, directions(CAMERA), [PosedShape("b", shape, pose)])
     by_shape = cast(

@@ -17,7 +17,7 @@ from tfcompose.compiler.emit import emit
 from tfcompose.compiler.resolve import resolve
 from tfcompose.compiler.resolve.resolve import PASSES
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.spec.language import composed, validate, with_includes
+from tfcompose.spec.language import compose, validate, with_includes
 from tfcompose.spec.load import load
 
 ROOT = Path(__file__).parents[3]
@@ -63,7 +63,7 @@ def test_the_stages_after_validation_read_no_raw_yaml(
 ) -> None:
     monkeypatch.chdir(ROOT)
     file = f"robots/{name}.yaml"
-    validated = validate(composed(with_includes(load(read_text(file), file), read_text)))
+    validated = validate(compose(with_includes(load(read_text(file), file), read_text)))
     expected, findings = resolve(validated, library(), read_text)
     blind = replace(validated, source=replace(validated.source, data=Unreadable()))
     blind.spec.carry(blind.source)

@@ -136,7 +136,7 @@ class Own:
         return found
 
 
-def compare_poses(robot: Robot, reader: Reader, files: Mapping[str, str]) -> None:
+def compare(robot: Robot, reader: Reader, files: Mapping[str, str]) -> None:
     own, chance = Own(read_plan(files["plan.json"], "plan.json")), random.Random(1)
     for _ in range(POSITIONS):
         positions = own.positions(chance)
@@ -208,7 +208,7 @@ def test_a_reader_finds_every_frame_and_every_body_of_a_generated_robot(
     files = source_text(robot)
     reader = READERS[name](files["robot.urdf"], robot.base or "")
     assert reader.moving >= {e.joint.name for e in robot.edges if e.joint and not e.joint.mimic}
-    compare_poses(robot, reader, files)
+    compare(robot, reader, files)
     assert compare_bodies(robot, name, reader) >= 3
 
 
@@ -228,7 +228,7 @@ def test_a_reader_finds_every_frame_and_every_body_of_an_example(file: Path, nam
         else:
             reader = READERS[name](files["robot.urdf"], robot.base or "")
             compare_bodies(robot, name, reader)
-        compare_poses(robot, reader, files)
+        compare(robot, reader, files)
 
 
 BOX = {"visual": {"box": [1, 1, 1]}, "inertial": {"mass": 1}}
@@ -264,10 +264,10 @@ def test_what_a_reader_cannot_read_it_cannot_read() -> None:
     with pytest.raises(ValueError, match="free joint can only be used on top level"):
         MuJoCo(urdf, "base_link")
     with pytest.raises(AssertionError, match=r"b|c"):
-        compare_poses(robot, Drake(urdf, "base_link"), files)
+        compare(robot, Drake(urdf, "base_link"), files)
     with pytest.raises(AssertionError, match="d"):
-        compare_poses(robot, yourdfpy_with_joints_in_order(urdf), files)
-    compare_poses(robot, Pinocchio(urdf, "base_link"), files)
+        compare(robot, yourdfpy_with_joints_in_order(urdf), files)
+    compare(robot, Pinocchio(urdf, "base_link"), files)
     with pytest.raises(ValueError, match="mass and inertia of moving bodies"):
         MuJoCo(
             source_text(robot_of((ROBOTS / "my_robot.yaml").read_text("utf-8")))["robot.urdf"],

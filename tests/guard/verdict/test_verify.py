@@ -18,8 +18,8 @@ from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.geometry import Offset, Pose, offset_of, quat_from_rpy
 from tfcompose.guard.verdict.verify import (
     differences,
+    group_differences,
     group_finding,
-    grouped,
     state_of,
     verify,
 )
@@ -372,7 +372,7 @@ def test_of_three_nodes_of_the_owners_name_two_are_named_with_one_edge(
     tree.observer.take_graph([*others, *present])
     state = state_of(tree.observer, TOPICS)
     twice = [each for each in differences(state, plan) if each.code == "TF801"]
-    [group] = grouped(twice)
+    [group] = group_differences(twice)
     found = group_finding(group, state, plan)
     expect(found, "TF801", f"odom → base is published by another {DRIVE} (2 processes)")
     pids = [note.message.partition(f"{where} ")[2] for note in found.notes]

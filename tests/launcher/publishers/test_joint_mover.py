@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tests.support.findings import words_of
-from tfcompose.foundation.geometry import Pose, angle_between, normalised
+from tfcompose.foundation.geometry import Pose, angle_between, normalise
 from tfcompose.launcher.publishers.joint_mover import JointMover, PublishOptions
 from tfcompose.model.plan import JointType, PlanEdge, PlanJoint, SourceLine
 from tfcompose.tf.ros.joint_codec import encode_names, fill
@@ -26,7 +26,7 @@ numbers = st.floats(-10, 10)
 quaternions = (
     st.tuples(numbers, numbers, numbers, numbers)
     .filter(lambda q: math.hypot(*q) > 0.1)
-    .map(normalised)
+    .map(normalise)
 )
 
 

@@ -14,7 +14,7 @@ from tfcompose.spec.language.json_schema import model_of
 from tfcompose.spec.language.reading import UNKNOWN_KEYS, WORDS, read
 from tfcompose.spec.language.reference import key_page, keys, reference
 from tfcompose.spec.language.robot import RobotSpec
-from tfcompose.spec.language.spec import Spec, described, examples_of, fields_of, walk
+from tfcompose.spec.language.spec import Spec, describe_key, examples_of, fields_of, walk
 
 #: The kinds of errors that each kind of schema can raise, as strict or lax as the language uses
 #: it.
@@ -126,7 +126,7 @@ def test_every_key_has_a_meaning_and_every_key_of_a_robot_an_example(language: s
     missing = []
     for pattern, kind in walk(LANGUAGES[language]):
         for name, field in fields_of(kind).items():
-            if not described(field) or described(field).startswith("None"):
+            if not describe_key(field) or describe_key(field).startswith("None"):
                 missing.append((*pattern, name))
             if language == "robot" and not examples_of(field):
                 missing.append((*pattern, name, "example"))

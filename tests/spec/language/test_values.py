@@ -17,7 +17,7 @@ from tfcompose.foundation.units import (
     UnitError,
     quantity,
 )
-from tfcompose.spec.language import Validated, composed, validate
+from tfcompose.spec.language import Validated, compose, validate
 from tfcompose.spec.language.expressions import ExpressionError, evaluate
 from tfcompose.spec.load import load
 
@@ -25,7 +25,7 @@ HEAD = "tfcompose: 1\nrobot: r\n"
 
 
 def validated(text: str) -> Validated:
-    return validate(composed(load(HEAD + text, "r.yaml"), []))
+    return validate(compose(load(HEAD + text, "r.yaml"), []))
 
 
 def value_of(source_text: str, variables: str = "{}") -> Any:
@@ -391,7 +391,7 @@ def test_a_joint_limit_takes_the_units_of_its_motion(
         f"tfcompose: 1\nrobot: r\njoints: {{j: {{type: {kind}, parent: a, child: b, limit:"
         f" {limit}}}}}\n"
     )
-    validated = validate(composed(load(text, "f")))
+    validated = validate(compose(load(text, "f")))
     output = validated.spec.joints["j"].limit
     assert output
     assert not validated.found

@@ -4,7 +4,7 @@ import pytest
 
 from tests.support.texts import reader
 from tfcompose.foundation.findings import Finding, RejectedError, Span
-from tfcompose.spec.language import composed, set_value, with_includes
+from tfcompose.spec.language import compose, set_value, with_includes
 from tfcompose.spec.load import Source, load
 
 
@@ -65,7 +65,7 @@ def test_null_removes_what_was_included() -> None:
         "robot.yaml": "include: [base.yaml]\nlinks: {b: null}\n",
         "base.yaml": "links: {a: {}, b: {}}\n",
     }
-    assert composed(included(files)).data == {"links": {"a": {}}}
+    assert compose(included(files)).data == {"links": {"a": {}}}
 
 
 def test_null_in_a_profile_is_kept_for_the_profile() -> None:
@@ -73,7 +73,7 @@ def test_null_in_a_profile_is_kept_for_the_profile() -> None:
         "robot.yaml": "include: [base.yaml]\nprofiles: {p: {links: {b: null}}}\n",
         "base.yaml": "links: {a: {}, b: {}}\nprofiles: {p: {links: {a: {x: 1}}}}\n",
     }
-    assert composed(included(files), ["p"]).data == {"links": {"a": {"x": 1}}}
+    assert compose(included(files), ["p"]).data == {"links": {"a": {"x": 1}}}
 
 
 def test_files_that_include_each_other_are_refused_with_the_circle() -> None:
@@ -108,17 +108,17 @@ def test_many_files_are_bounded() -> None:
 def test_overlays_come_after_profiles_and_settings_last() -> None:
     source = load("a: {x: 0}\nprofiles: {p: {a: {x: 1, y: 1, z: 1}}}\n", "f")
     overlays = [load("a: {y: 2, z: 2}\n", "o"), set_value("a.z=3")]
-    assert composed(source, ["p"], overlays).data == {"a": {"x": 1, "y": 2, "z": 3}}
+    assert compose(source, ["p"], overlays).data == {"a": {"x": 1, "y": 2, "z": 3}}
 
 
 def test_an_overlay_can_bring_a_profile() -> None:
     source = load("a: 0\n", "f")
-    made = composed(source, ["p"], [load("profiles: {p: {a: 1}}\n", "o")])
+    made = compose(source, ["p"], [load("profiles: {p: {a: 1}}\n", "o")])
     assert (made.data, made.found) == ({"a": 1}, ())
 
 
 def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
-    found = composed(load("a: {x: 1}\n", "f"), [], [load("a: {x: 1}\n", "o")]).found
+    found = compose(load("a: {x: 1}\n", "f"), [], [load("a: {x: 1}\n", "o")]).found
     assert [
         (one.code, str(one.span), [str(note.span) for note in one.notes]) for one in found
     ] == [("TF014", "o:1:8", ["f:1:8"])]
@@ -136,12 +136,12 @@ def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
 def test_an_overlay_that_is_empty_where_something_stands_is_a_finding(
     overlay: str, place: str
 ) -> None:
-    (one,) = composed(load("a: {x: 1, b: {y: 2}}\n", "f"), [], [load(overlay, "o")]).found
+    (one,) = compose(load("a: {x: 1, b: {y: 2}}\n", "f"), [], [load(overlay, "o")]).found
     assert (one.code, str(one.span)) == ("TF014", place)
 
 
 def test_an_overlay_may_say_which_language_it_is_in_and_bring_what_is_new_and_empty() -> None:
-    assert not composed(
+    assert not compose(
         load("tfcompose: 1\na: {}\n", "f"), [], [load("tfcompose: 1\na: {b: {}}\n", "o")]
     ).found
 
@@ -160,7 +160,7 @@ def test_a_setting_cannot_include() -> None:
 
 
 def test_true_is_not_one() -> None:
-    assert not composed(load("a: 1\n", "f"), [], [load("a: true\n", "o")]).found
+    assert not compose(load("a: 1\n", "f"), [], [load("a: true\n", "o")]).found
 
 
 @pytest.mark.parametrize(
@@ -186,5 +186,5 @@ def test_what_is_no_setting_is_refused(setting: str) -> None:
 
 
 def test_a_fault_in_a_setting_is_placed_at_the_setting() -> None:
-    source = composed(load("links: {}\n", "f"), [], [set_value("links.a.x=3")])
+    source = compose(load("links: {}\n", "f"), [], [set_value("links.a.x=3")])
     assert source.at(("links", "a", "x")).file == "--set links.a.x=3"

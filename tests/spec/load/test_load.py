@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.foundation.findings import RejectedError, Span
-from tfcompose.spec.language import composed, validate
+from tfcompose.spec.language import compose, validate
 from tfcompose.spec.load import Source, load
 from tfcompose.spec.load.nodes import MOST_VALUES, Place
 
@@ -341,7 +341,7 @@ def test_text_that_is_nested_too_deep_is_refused_at_the_first_level_too_many(
 
 
 def laid(text: str, *profiles: str) -> Source:
-    return composed(load(text, "f"), profiles)
+    return compose(load(text, "f"), profiles)
 
 
 BASE = """\
@@ -406,7 +406,7 @@ def spans_of(source: Source) -> dict[Any, Span]:
 def test_laying_a_profile_over_leaves_the_source_as_it_was() -> None:
     source = load(BASE, "f")
     before = (str(source.data), spans_of(source))
-    composed(source, ["merge", "remove", "turn"])
+    compose(source, ["merge", "remove", "turn"])
     assert (str(source.data), spans_of(source)) == before
 
 
@@ -440,7 +440,7 @@ def test_a_large_profile_is_laid_over_in_time_that_grows_with_its_size() -> None
         )
         gc.disable()  # it is turned down on the command line too, and grows with everything else that is alive  # noqa: E501 (a text as its reader has it)
         began = time.process_time()
-        composed(source, ["p"])
+        compose(source, ["p"])
         taken = time.process_time() - began
         gc.enable()
         return taken

@@ -10,7 +10,7 @@ from pytransform3d.transform_manager import TransformManager
 from pytransform3d.transformations import transform_from_pq
 from scipy.spatial.transform import Rotation, Slerp
 
-from tfcompose.foundation.geometry import Pose, Quaternion, angle_between, normalised
+from tfcompose.foundation.geometry import Pose, Quaternion, angle_between, normalise
 from tfcompose.tf.ros.tf_codec import Decoder, SentTransform, encode
 from tfcompose.tf.tf2 import Buffer, TransformException
 
@@ -21,7 +21,7 @@ coordinates = st.floats(-100, 100)
 quaternions = (
     st.tuples(*[st.floats(-1, 1)] * 4)
     .filter(lambda q: sum(part * part for part in q) > 0.01)
-    .map(normalised)
+    .map(normalise)
 )
 poses = st.builds(Pose, st.tuples(*[coordinates] * 3), quaternions)
 stamps = st.integers(20 * S, 29 * S)
@@ -145,7 +145,7 @@ def test_random_trees_agree_with_pytransform3d(seed: int) -> None:
     buffer, manager, frames = Buffer(), TransformManager(), ["f0"]
     for index in range(1, 30):
         parent, child = rng.choice(frames), f"f{index}"
-        x, y, z, w = normalised(
+        x, y, z, w = normalise(
             (rng.gauss(0, 1), rng.gauss(0, 1), rng.gauss(0, 1), rng.gauss(0, 1))
         )
         xyz = (rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(-3, 3))

@@ -22,11 +22,11 @@ from rclpy.time import Time
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import PointCloud2, PointField
 
-from tfcompose.foundation.geometry import Pose, normalised
+from tfcompose.foundation.geometry import Pose, normalise
 from tfcompose.tf.tf2 import Buffer, TypeException
 
 S = 1_000_000_000
-QUAT = normalised((0.4, -0.1, 0.5, -0.7))
+QUAT = normalise((0.4, -0.1, 0.5, -0.7))
 XYZ = (-2.0, 0.25, 11.0)
 ROTATION = Rotation.from_quat(QUAT)
 GIVEN = (0.5, -1.25, 2.0)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tfcompose.foundation.geometry import Pose, Quaternion, angle_between, normalised
+from tfcompose.foundation.geometry import Pose, Quaternion, angle_between, normalise
 from tfcompose.tf.tf2 import Buffer, TransformException
 
 tf2 = pytest.importorskip("tf2_py")
@@ -95,7 +95,7 @@ def same(ours: Any, theirs: Any) -> None:
         )
         for m in (ours, theirs)
     ]
-    assert angle_between(rotations[0], normalised(rotations[1])) < 1e-6
+    assert angle_between(rotations[0], normalise(rotations[1])) < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(100))
@@ -118,7 +118,7 @@ def test_random_histories_with_new_parents_loops_gaps_and_refusals(seed: int) ->
             pair.set(
                 rng.choice(["", "/"]) + parent,
                 child,
-                Pose(xyz, normalised((x, y, z, w))),
+                Pose(xyz, normalise((x, y, z, w))),
                 stamp(),
                 static=static,
             )

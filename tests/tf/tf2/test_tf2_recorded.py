@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tfcompose.foundation.geometry import angle_between, normalised
+from tfcompose.foundation.geometry import angle_between, normalise
 from tfcompose.tf.tf2 import Buffer, TransformException
 
 FILE = Path(__file__).with_name("tf2_answers.jsonl")
@@ -75,7 +75,7 @@ def assert_same(ours: Any, theirs: Any) -> None:
         return
     assert ours[0] == theirs[0], "the time of the answer"
     assert ours[1:4] == pytest.approx(theirs[1:4], abs=1e-5)
-    assert angle_between(normalised(ours[4:]), normalised(theirs[4:])) < 1e-4
+    assert angle_between(normalise(ours[4:]), normalise(theirs[4:])) < 1e-4
 
 
 def made(rng: random.Random) -> list[tuple[str, list[Any]]]:
@@ -92,7 +92,7 @@ def made(rng: random.Random) -> list[tuple[str, list[Any]]]:
         what = rng.random()
         if what < 0.5:
             parent, child = (parent, child) if loops else sorted((parent, child))
-            quat = normalised((rng.gauss(0, 1), rng.gauss(0, 1), rng.gauss(0, 1), rng.gauss(0, 1)))
+            quat = normalise((rng.gauss(0, 1), rng.gauss(0, 1), rng.gauss(0, 1), rng.gauss(0, 1)))
             pose = [rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0, *quat]
             static = (frames.index(child) % 3 == 0) is not (rng.random() < 0.02)
             names = [rng.choice(["", "", "", "/"]) + parent, child if rng.random() < 0.98 else ""]

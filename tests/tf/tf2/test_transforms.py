@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tfcompose.foundation.geometry import Pose, normalised, quat_from_rpy
+from tfcompose.foundation.geometry import Pose, normalise, quat_from_rpy
 from tfcompose.tf.tf2 import Buffer, InvalidArgumentException
 from tfcompose.tf.tf2.exceptions import TypeException
 from tfcompose.tf.tf2.messages import (
@@ -26,7 +26,7 @@ from tfcompose.tf.tf2.messages import (
 )
 
 S = 1_000_000_000
-QUAT = normalised((0.1, -0.7, 0.3, 0.6))
+QUAT = normalise((0.1, -0.7, 0.3, 0.6))
 XYZ = (1.0, 2.0, -3.0)
 ROTATION = Rotation.from_quat(QUAT)
 

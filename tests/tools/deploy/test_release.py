@@ -16,7 +16,7 @@ from tfcompose.launcher.program import anywhere
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.robot import Robot
 from tfcompose.tools.deploy.agent import UNIT
-from tfcompose.tools.deploy.release import Release, packed
+from tfcompose.tools.deploy.release import Release, pack_release
 from tfcompose.tools.deploy.unit import Unit
 
 ROBOT = """
@@ -52,7 +52,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def release(text: str = ROBOT, wheels: Path | None = None) -> Release:
-    return packed(robot(text), wheels)
+    return pack_release(robot(text), wheels)
 
 
 def robot(text: str = ROBOT) -> Robot:
@@ -112,7 +112,7 @@ def test_what_is_named_and_is_not_there_is_found(folder: Path) -> None:
     compiled = robot()
     (folder / "robots/maps/office.yaml").unlink()
     with pytest.raises(RejectedError, match=r"office\.yaml") as refused:
-        packed(compiled)
+        pack_release(compiled)
     assert refused.value.findings[0].code == "TF912"
 
 

@@ -22,7 +22,7 @@ from tfcompose.launcher.program import anywhere
 from tfcompose.model.plan import Plan, PlanProcess, StopRule
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import stand_ins, static_names
-from tfcompose.model.systemd import sourced
+from tfcompose.model.systemd import source_then_run
 from tfcompose.tools.exporters.launch import launch
 from tfcompose.tools.exporters.supervisors import Machine, compose, systemd
 
@@ -294,10 +294,12 @@ def test_setup_files_with_spaces_are_sourced_in_order_before_the_command(tmp_pat
     for number, file in enumerate(files):
         file.write_text(f'export SOURCED="${{SOURCED}}{number}"\n')
     done = processes.run(
-        sourced([str(file) for file in files], ["sh", "-c", 'echo "$SOURCED $1"', "sh", "--"])
+        source_then_run(
+            [str(file) for file in files], ["sh", "-c", 'echo "$SOURCED $1"', "sh", "--"]
+        )
     )
     assert (done.stdout, done.stderr) == ("01 --\n", "")
-    assert sourced((), ["a"]) == ["a"]
+    assert source_then_run((), ["a"]) == ["a"]
 
 
 def test_a_host_is_a_profile_and_nobody_waits_for_a_service_of_another() -> None:

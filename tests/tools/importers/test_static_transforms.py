@@ -5,7 +5,7 @@ import math
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tfcompose.foundation.geometry import angle_between, normalised
+from tfcompose.foundation.geometry import angle_between, normalise
 from tfcompose.tools.importers.static_transforms import (
     ArgumentsRefusedError,
     reader_of,
@@ -74,7 +74,7 @@ def test_arguments_say_the_edge_that_the_program_publishes(
     )
     assert ("slashes" in transform.order) is ("/base_link" in words), "a comment says so"
     expected = Rotation.from_euler("xyz", rpy).as_quat()  # lower case: about fixed axes
-    assert angle_between(normalised(transform.pose.quat_xyzw), tuple(expected)) < 1e-9
+    assert angle_between(normalise(transform.pose.quat_xyzw), tuple(expected)) < 1e-9
 
 
 REFUSED = [

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from tfcompose.cli.compiling import library
 from tfcompose.compiler.compile import Compiled, compile_robot
-from tfcompose.foundation.findings import edited
+from tfcompose.foundation.findings import apply_edits
 from tfcompose.foundation.geometry import (
     Pose,
     matrix_from_quat,
-    normalised,
+    normalise,
     offset_of,
     quat_from_rpy,
     rpy_from_quat,
@@ -57,7 +57,7 @@ def moved(text: str, child: str, pose: Pose, profiles: tuple[str, ...] = ()) -> 
     assert done.robot
     change = change_of(done.robot, done.sources[0], {"r.yaml": text}, child, pose)
     assert isinstance(change, MountEdits), change
-    new = edited(text, change.edits)
+    new = apply_edits(text, change.edits)
     assert new is not None
     off = offset_of(pose, pose_in(robot_of(new, profiles=profiles), child))
     assert off.xyz_m < 1e-6, (text, new)
@@ -439,7 +439,7 @@ def test_every_mount_of_the_gallery_moves_or_says_why_not(file: Path) -> None:
     for edge in done.robot.edges:
         pose = Pose(
             tuple(value + chance.uniform(-0.1, 0.1) for value in edge.pose.xyz),  # type: ignore[arg-type]
-            normalised(
+            normalise(
                 quat_from_rpy(
                     *(
                         angle + chance.uniform(-0.3, 0.3)
@@ -460,7 +460,7 @@ def test_every_mount_of_the_gallery_moves_or_says_why_not(file: Path) -> None:
             overlay = found.overlay("", "o.yaml")
             after = compiled(text, overlay, file=f"robots/{file.name}")
         else:
-            new = edited(text, found.edits)
+            new = apply_edits(text, found.edits)
             assert new is not None
             after = compiled(new, file=f"robots/{file.name}")
         assert after.robot

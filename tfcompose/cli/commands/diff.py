@@ -45,10 +45,10 @@ class Change(NamedTuple):
 
 def run(arguments: Namespace) -> int:
     """Print the differences; exit code 0 without any, 1 with some."""
-    from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.cli.compiling import compile_or_exit
 
     found = differences(
-        compiled_robot(arguments.old, arguments), compiled_robot(arguments.new, arguments)
+        compile_or_exit(arguments.old, arguments), compile_or_exit(arguments.new, arguments)
     )
     if arguments.format == "json":
         print(

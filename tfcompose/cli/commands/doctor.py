@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, add_variant, namespace
 from tfcompose.cli.terminal import UNREADABLE, exit_code_of, fail, print_findings, printable
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -79,7 +79,7 @@ def run(arguments: Namespace) -> int:
     with Stop() as stop:
         try:
             found = examine(
-                observe(_expected(plan, arguments.namespace), arguments.duration, stop)
+                observe(_expected_topics(plan, arguments.namespace), arguments.duration, stop)
             )
         except RosError as error:
             return _print([finding("TF901", str(error), None)], arguments.format)
@@ -88,7 +88,7 @@ def run(arguments: Namespace) -> int:
     findings = [*(finding for finding in odd if finding), *found.findings]
     code = _print(findings, arguments.format)
     if arguments.format == "text":
-        observed = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"
+        observed = f"{plural(found.edges, 'edge')} from {plural(found.nodes, 'node')}"
         observed += (
             f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
         )
@@ -115,7 +115,7 @@ def _print(found: list[Finding], form: str) -> int:
 def _summary(found: list[Finding]) -> str:
     errors = sum(finding.severity == "error" for finding in found)
     counts = ((errors, "error"), (len(found) - errors, "warning"))
-    return " and ".join(counted(n, noun) for n, noun in counts if n) or "nothing is wrong"
+    return " and ".join(plural(n, noun) for n, noun in counts if n) or "nothing is wrong"
 
 
 def _plan(arguments: Namespace) -> Plan | None:
@@ -134,7 +134,7 @@ def _plan(arguments: Namespace) -> Plan | None:
     return plan_of_domain()
 
 
-def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
+def _expected_topics(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
     """Return the topics to look at, each pair with the part of the plan that is expected there."""
     from tfcompose.model.plan.topics import parts_of, topics_below
 

@@ -88,7 +88,7 @@ def run(arguments: Namespace) -> int:
     )
 
     def show(pose: Pose, stamp_ns: int | None) -> None:
-        sys.stdout.write(_formatted(arguments, clean(pose), stamp_ns))
+        sys.stdout.write(_format_pose(arguments, clean(pose), stamp_ns))
         sys.stdout.flush()
 
     if arguments.bag:
@@ -135,7 +135,7 @@ def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
     return missed
 
 
-def _formatted(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
+def _format_pose(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
     from tfcompose.compiler.render.pose import pose_json, pose_text
 
     if arguments.format == "json":

@@ -10,7 +10,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_format, add_robot
-from tfcompose.cli.terminal import FAILED, coloured, fail, warn
+from tfcompose.cli.terminal import FAILED, fail, is_coloured, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -40,7 +40,7 @@ def run(arguments: Namespace) -> int:
     console = Console(
         Plan(place.name, "", None, ros=RosSettings(), edges=(), processes=()),
         lines,
-        colour=coloured(sys.stdout),
+        colour=is_coloured(sys.stdout),
     )
     try:
         for notice, at in notices(place, output=sys.stdout):

@@ -94,13 +94,13 @@ def _line(edge: Edge, sources: Sequence[Source]) -> str:
 
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
-    measured = f"          {_measured(edge.calibration)}\n" if edge.calibration else ""
+    measured = f"          {_explain_calibration(edge.calibration)}\n" if edge.calibration else ""
     values = "".join(f"          {line}\n" for line in values_of(edge, sources))
     at = f"          {edge.at}{inside}\n" if inside or not values else ""
     return f"{edge.name}\n          {facts}\n{measured}{at}{values}"
 
 
-def _measured(calibration: Calibration) -> str:
+def _explain_calibration(calibration: Calibration) -> str:
     if calibration.nominal is None:
         return f"{calibration.name}; no nominal pose is given"
     metres, radians = calibration.off(calibration.pose)

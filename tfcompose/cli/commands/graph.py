@@ -21,7 +21,7 @@ from tfcompose.cli.options import (
     settle_duration,
 )
 from tfcompose.cli.terminal import UNREADABLE, fail, printable
-from tfcompose.foundation.geometry import Pose, norm, normalised
+from tfcompose.foundation.geometry import Pose, norm, normalise
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -91,17 +91,17 @@ def run(arguments: Namespace) -> int:
     if arguments.live or arguments.bag:
         graph = _published_graph(arguments)
     else:
-        from tfcompose.cli.compiling import compiled_robot
+        from tfcompose.cli.compiling import compile_or_exit
         from tfcompose.compiler.render.tree import graph_of
 
-        robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments)
+        robot = compile_or_exit(arguments.file or DEFAULT_FILE, arguments)
         graph = graph_of(robot.with_final_names(), poses=arguments.poses)
     from tfcompose.cli.writing import replace_file
 
     if arguments.collapse:
-        from tfcompose.compiler.draw.graph import collapsed
+        from tfcompose.compiler.draw.graph import collapse_groups
 
-        graph = collapsed(graph)
+        graph = collapse_groups(graph)
     try:
         replace_file(path, picture(graph, path.suffix.lower(), arguments.direction))
     except OSError as error:
@@ -211,4 +211,4 @@ def _pose(pose: Pose) -> str:
 
     length = norm(pose.quat_xyzw)
     sound = length > 0 and length < float("inf")
-    return short_pose(Pose(pose.xyz, normalised(pose.quat_xyzw))) if sound else "no rotation"
+    return short_pose(Pose(pose.xyz, normalise(pose.quat_xyzw))) if sound else "no rotation"

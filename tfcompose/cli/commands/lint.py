@@ -178,7 +178,7 @@ def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[
     robots = [file for file in files if file not in urdfs]
 
     def lint(file: str, read: Callable[[str], str]) -> list[Finding]:
-        return _selected(linter.lint_robot(file, read), arguments)
+        return _select_findings(linter.lint_robot(file, read), arguments)
 
     is_changed = False
     if arguments.fix or arguments.diff:
@@ -189,7 +189,7 @@ def _lint(arguments: Namespace, environment: Mapping[str, str], read: Callable[[
         is_changed = bool(arguments.diff and fixer.texts)
     else:
         cases = {file: lint(file, read) for file in robots}
-    cases |= {file: _selected(linter.lint_urdf(file, read), arguments) for file in urdfs}
+    cases |= {file: _select_findings(linter.lint_urdf(file, read), arguments) for file in urdfs}
     found = [finding for case in cases.values() for finding in case]
     _print(cases, arguments, len(robots) + len(urdfs))
     if exit_code_of(found) == UNREADABLE:
@@ -250,7 +250,7 @@ def _files(arguments: Namespace) -> list[str]:
     return [file for file in files if not file.endswith(YAML_ENDINGS) or is_robot(file)]
 
 
-def _selected(found: list[Finding], arguments: Namespace) -> list[Finding]:
+def _select_findings(found: list[Finding], arguments: Namespace) -> list[Finding]:
     """Return the findings that --select and --ignore leave."""
     from tfcompose.foundation.catalogue import CATALOGUE
 

@@ -19,7 +19,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_robot, count
-from tfcompose.cli.terminal import UNREADABLE, coloured, fail, has_reader
+from tfcompose.cli.terminal import UNREADABLE, fail, has_reader, is_coloured
 from tfcompose.compiler.render.text import PLAIN
 
 if TYPE_CHECKING:
@@ -81,10 +81,10 @@ def since(text: str) -> float:
 def run(arguments: Namespace) -> int:
     """Print the logs; exit code 0, 1 where there are none."""
     from tfcompose.foundation.findings import did_you_mean
-    from tfcompose.launcher.output import Follower, logged, read_logs, runs_of
+    from tfcompose.launcher.output import Follower, logged_processes, read_logs, runs_of
 
     place = _place(arguments.robot, shlex.join(["logs", *arguments.name]))
-    known = logged(place.logs)
+    known = logged_processes(place.logs)
     for name in arguments.name:
         if name not in known:
             advice = did_you_mean(name, known, f"there are logs of {', '.join(known)}")
@@ -140,8 +140,8 @@ class _LogPrinter:
         from tfcompose.cli.console import COLOURS, prefix_of
 
         width = max(map(len, names), default=0)
-        colours = COLOURS if coloured(sys.stdout) else ("",)
-        ends = PLAIN if coloured(sys.stdout) else ""
+        colours = COLOURS if is_coloured(sys.stdout) else ("",)
+        ends = PLAIN if is_coloured(sys.stdout) else ""
         self._prefixes = {
             name: f"{colours[index % len(colours)]}{prefix_of(name, width)}{ends}"
             for index, name in enumerate(known)

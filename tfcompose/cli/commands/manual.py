@@ -31,7 +31,7 @@ def run(arguments: Namespace) -> int:
     from pathlib import Path
 
     from tfcompose.cli.documentation import for_terminal, html, page, topics
-    from tfcompose.cli.terminal import coloured, table_width
+    from tfcompose.cli.terminal import is_coloured, table_width
     from tfcompose.cli.tool_commands import instead_of, report_problems
     from tfcompose.foundation.findings import did_you_mean
 
@@ -63,6 +63,6 @@ def run(arguments: Namespace) -> int:
     columns = table_width(sys.stdout)
     os.environ.setdefault("LESS", "FRX")  # let less show bold, and end after a single screen
     if columns is not None:
-        text = for_terminal(text, columns, coloured=coloured(sys.stdout))
+        text = for_terminal(text, columns, coloured=is_coloured(sys.stdout))
     pydoc.pager(text)
     return 0

@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.cli.options import add_bag, add_for, add_format, add_namespace, positive
-from tfcompose.cli.terminal import UNREADABLE, can_redraw, coloured, fail, table_width, warn
+from tfcompose.cli.terminal import UNREADABLE, can_redraw, fail, is_coloured, table_width, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -133,7 +133,7 @@ class _Table(NamedTuple):
             sys.stdout.flush()
             return int(isinstance(chain, str))
         width = table_width(sys.stdout)
-        lines = lines_of(shown, self.observer, now_ns, width, coloured=coloured(sys.stdout))
+        lines = lines_of(shown, self.observer, now_ns, width, coloured=is_coloured(sys.stdout))
         if chain is not None:
             lines[0] = chain_line(chain, *self.frames)
         if not self.observer.received_any:

@@ -30,14 +30,14 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the pose; exit code 1 if a frame is not there, or only a driver knows where it is."""
-    from tfcompose.cli.compiling import compiled_robot, edges_between
+    from tfcompose.cli.compiling import compile_or_exit, edges_between
     from tfcompose.compiler.render.pose import pose_json, pose_text
     from tfcompose.foundation.numbers import clean
 
     if arguments.a.endswith((".yaml", ".yml")):
         fail("pose takes [FILE] A B: a second frame is missing", UNREADABLE)
     rising, falling = edges_between(
-        compiled_robot(arguments.file, arguments), arguments.a, arguments.b
+        compile_or_exit(arguments.file, arguments), arguments.a, arguments.b
     )
     unknown = next((edge for edge in [*rising, *reversed(falling)] if not edge.pose_known), None)
     if unknown:

@@ -14,7 +14,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import print_findings, table_width, warn
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -78,7 +78,7 @@ def _show(facts: dict[str, Any], form: str) -> int:
 
 def _list(only: str | None, known: Library, form: str) -> int:
     from tfcompose.cli import preset_page
-    from tfcompose.cli.tables import shortened
+    from tfcompose.cli.tables import shorten
     from tfcompose.foundation.findings import did_you_mean
 
     presets = {name: known.get(name) for name in known.names}
@@ -115,11 +115,11 @@ def _list(only: str | None, known: Library, form: str) -> int:
     blocks = []
     for vendor, group in groupby(rows, lambda row: row["vendor"]):
         lines = [f"  {row['name']:<{width}}  {row['kind']:<10}  {_about(row)}" for row in group]
-        lines = [shortened(line, columns - 1, at_end=True) for line in lines] if columns else lines
+        lines = [shorten(line, columns - 1, at_end=True) for line in lines] if columns else lines
         blocks.append("\n".join([vendor, *lines]))
     sys.stdout.write(
         "\n\n".join(blocks)
-        + f"\n\n{counted(len(rows), 'preset')}; tfcompose presets NAME shows one\n"
+        + f"\n\n{plural(len(rows), 'preset')}; tfcompose presets NAME shows one\n"
     )
     return 0
 

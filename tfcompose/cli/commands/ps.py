@@ -12,8 +12,8 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.options import add_format, add_robot
-from tfcompose.cli.terminal import FAILED, UNREADABLE, coloured, fail, table_width
-from tfcompose.foundation.text import counted
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, is_coloured, table_width
+from tfcompose.foundation.text import plural
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -64,24 +64,24 @@ def run(arguments: Namespace) -> int:
         state = state_of(status)
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
-        state += f", {_counted(status.findings)}" if status.findings else ""
+        state += f", {_count_by_severity(status.findings)}" if status.findings else ""
         print(f"{name}: {state}, launcher {status.launcher}, since {uptime(status.uptime)}")
         for found in status.findings:
             print(f"  {found.severity}[{found.code}] {found.message}")
         rows = [HEAD, *(row(process, used) for process in status.processes)]
         print(
             *TABLE.lines(
-                rows, table_width(sys.stdout), coloured=coloured(sys.stdout), indent="  "
+                rows, table_width(sys.stdout), coloured=is_coloured(sys.stdout), indent="  "
             ),
             sep="\n",
         )
     return code or _exit_code(arguments.fail_on, robots)
 
 
-def _counted(findings: Sequence[Finding]) -> str:
+def _count_by_severity(findings: Sequence[Finding]) -> str:
     """Return how many errors and warnings there are: "1 error and 2 warnings"."""
     counts = Counter(found.severity for found in findings)
-    return " and ".join(counted(counts[kind], kind) for kind in counts)
+    return " and ".join(plural(counts[kind], kind) for kind in counts)
 
 
 def _exit_code(fail_on: str | None, robots: Mapping[str, RobotStatus]) -> int:

@@ -21,7 +21,7 @@ from tfcompose.cli.options import (
     add_variant,
     settle_duration,
 )
-from tfcompose.cli.terminal import coloured, printable, table_width
+from tfcompose.cli.terminal import is_coloured, printable, table_width
 from tfcompose.compiler.render.text import PLAIN, RED, YELLOW
 
 if TYPE_CHECKING:
@@ -60,13 +60,13 @@ def run(arguments: Namespace) -> int:
     if arguments.live or arguments.bag:
         _print_published(arguments)
         return 0
-    from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.cli.compiling import compile_or_exit
     from tfcompose.compiler.render.tree import tree
 
-    robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments).with_final_names()
+    robot = compile_or_exit(arguments.file or DEFAULT_FILE, arguments).with_final_names()
     columns = table_width(sys.stdout)
     text = (
-        _fitted(tree(robot, columns and columns - 1))
+        _fit_to_terminal(tree(robot, columns and columns - 1))
         if arguments.format == "text"
         else _planned_json(robot)
     )
@@ -74,17 +74,17 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _fitted(text: str) -> str:
+def _fit_to_terminal(text: str) -> str:
     """Return the text with each line cut to the width of the terminal.
 
     Into a file or a pipe it stays as it is.
     """
-    from tfcompose.cli.tables import shortened
+    from tfcompose.cli.tables import shorten
 
     columns = table_width(sys.stdout)
     if columns is None:
         return text
-    return "".join(f"{shortened(line, columns - 1, at_end=True)}\n" for line in text.splitlines())
+    return "".join(f"{shorten(line, columns - 1, at_end=True)}\n" for line in text.splitlines())
 
 
 def _planned_json(robot: Robot) -> str:
@@ -146,19 +146,19 @@ def _print_published(arguments: Namespace) -> None:
         else:
             heading = f"on {pair[0]} and {pair[1]}:\n" if len(observers) > 1 else ""
             more = f"\n{not_kept(observer)}\n" if observer.beyond else ""
-            sys.stdout.write(heading + _drawn(trees, plan=plan) + more)
+            sys.stdout.write(heading + _draw_trees(trees, plan=plan) + more)
 
 
-def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
+def _draw_trees(trees: list[Tree], *, plan: Plan | None) -> str:
     from tfcompose.cli.tables import Table
 
     table = Table(right=frozenset({3, 4}), spare=(1, 4), colour=_colour)
     branches = [branch for tree in trees for branch in tree.branches]
     rows = [_row(branch, plan=plan) for branch in branches]
     columns = table_width(sys.stdout)
-    lines = iter(table.lines(rows, columns, coloured=coloured(sys.stdout)))
+    lines = iter(table.lines(rows, columns, coloured=is_coloured(sys.stdout)))
     if columns is not None and any(len(line) >= columns for line in table.lines(rows, columns)):
-        lines = iter(_wrapped(branches, rows, columns - 1))
+        lines = iter(_wrap_rows(branches, rows, columns - 1))
     parts = []
     for tree in trees:
         loop = (
@@ -171,12 +171,12 @@ def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
     return "\n\n".join([*head, *parts]) + "\n"
 
 
-def _wrapped(
+def _wrap_rows(
     branches: Sequence[Branch], rows: Sequence[tuple[str, ...]], columns: int
 ) -> Iterator[str]:
     """Yield the rows without their columns; what does not fit in a line goes on below."""
-    from tfcompose.cli.tables import shortened
-    from tfcompose.compiler.render.tree import wrapped
+    from tfcompose.cli.tables import shorten
+    from tfcompose.compiler.render.tree import wrap_rows
 
     drawing = [
         (
@@ -186,9 +186,9 @@ def _wrapped(
         )
         for branch, row in zip(branches, rows, strict=True)
     ]
-    for row, lines in zip(rows, wrapped(drawing, columns), strict=True):
-        shown = [shortened(line, columns, at_end=True) for line in lines]
-        if coloured(sys.stdout) and (colour := _colour(REMARK, row[REMARK])):
+    for row, lines in zip(rows, wrap_rows(drawing, columns), strict=True):
+        shown = [shorten(line, columns, at_end=True) for line in lines]
+        if is_coloured(sys.stdout) and (colour := _colour(REMARK, row[REMARK])):
             shown[-1] = shown[-1].replace(row[REMARK], f"{colour}{row[REMARK]}{PLAIN}")
         yield "\n".join(shown)
 

@@ -127,5 +127,5 @@ def run(arguments: Namespace) -> int:
     with BuildProcess(arguments) as build:
         from tfcompose.cli.starting import start  # while it is built
 
-        plan_file, found = build.built()
+        plan_file, found = build.wait_until_built()
     return start(plan_file, arguments, found)

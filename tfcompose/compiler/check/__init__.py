@@ -9,7 +9,7 @@ from tfcompose.compiler.check.check import (
     apply,
     check,
     rules_of_tools,
-    silenced,
+    silence,
     unused_allows,
     with_replaced,
 )
@@ -21,7 +21,7 @@ __all__ = [
     "apply",
     "check",
     "rules_of_tools",
-    "silenced",
+    "silence",
     "unused_allows",
     "with_replaced",
 ]

@@ -166,7 +166,7 @@ def _of_part(found: Finding, robot: Robot) -> Finding:
     return replace(found, notes=(*found.notes, *notes)) if notes else found
 
 
-def silenced(
+def silence(
     found: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
 ) -> tuple[list[Finding], Used]:
     """Return the findings not silenced, and the comments that silenced something.

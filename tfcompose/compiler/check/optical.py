@@ -51,7 +51,7 @@ _STEEP_RAD = math.radians(45)
 
 @rule("TF401", of_urdf=True, follows="pose")
 def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
-    for edge in _turned_otherwise(robot):
+    for edge in _edges_turned_otherwise(robot):
         quat_xyzw = edge.pose.quat_xyzw
         if _is_upside_down(edge, robot):
             continue
@@ -77,7 +77,7 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF416", of_urdf=True, follows="pose")
 def camera_upside_down(robot: Robot) -> Iterator[Finding]:
-    for edge in _turned_otherwise(robot):
+    for edge in _edges_turned_otherwise(robot):
         if _is_upside_down(edge, robot):
             message = f"{edge.child} looks forward in {edge.parent}, but its image is upside down"
             advice = (
@@ -87,7 +87,7 @@ def camera_upside_down(robot: Robot) -> Iterator[Finding]:
             yield finding("TF416", message, edge.at, help=advice)
 
 
-def _turned_otherwise(robot: Robot) -> Iterator[Edge]:
+def _edges_turned_otherwise(robot: Robot) -> Iterator[Edge]:
     """Yield the edges to optical frames whose rotation is neither optical nor intended."""
     above = {edge.child: edge for edge in robot.edges}
     for edge in robot.edges:

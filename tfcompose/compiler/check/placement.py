@@ -363,7 +363,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
                 "TF646", f"the zone {zone.name}: unknown sensor {wrong[0]}", zone.at, help=advice
             )
             continue
-        part, unknown = _covered(robot, zone)
+        part, unknown = _coverage_of(robot, zone)
         if part < zone.least - 1e-9:
             by = f" by {', '.join(zone.by)}" if zone.by else ""
             message = (
@@ -387,7 +387,7 @@ def zone_not_covered(robot: Robot) -> Iterator[Finding]:
 _GRID = (10, 10, 4)
 
 
-def _covered(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
+def _coverage_of(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
     """Return the seen part of the zone's points, and streams without known optics."""
     points = [
         tuple(

@@ -158,8 +158,8 @@ def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
             rotations = (
                 f"rotates by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
             )
-            message = f"{value.entry}: quat_xyzw {_listed(value.numbers)} {rotations}"
-            advice = f"if w is first, write {_listed((second, third, fourth, first))}"
+            message = f"{value.entry}: quat_xyzw {_list_numbers(value.numbers)} {rotations}"
+            advice = f"if w is first, write {_list_numbers((second, third, fourth, first))}"
             if identity:
                 advice += "; if the half turn is meant, rpy: [180 deg, 0, 0]"
             yield finding("TF412", message, value.place(0), help=advice)
@@ -169,7 +169,7 @@ def _degrees(w: float) -> str:
     return f"{math.degrees(2 * math.acos(min(1.0, abs(w)))):.0f}"
 
 
-def _listed(numbers: tuple[float, ...]) -> str:
+def _list_numbers(numbers: tuple[float, ...]) -> str:
     return f"[{', '.join(f'{number:g}' for number in numbers)}]"
 
 

@@ -44,7 +44,7 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
         )
 
 
-def _needed(robot: Robot) -> set[str]:
+def _needed_processes(robot: Robot) -> set[str]:
     """Return the processes that matter to the tree, or are waited for.
 
     They own an edge, drive a sensor, or publish TF by default.
@@ -61,7 +61,7 @@ def _needed(robot: Robot) -> set[str]:
 @rule("TF815", idle=True)
 def process_without_role(robot: Robot) -> Iterator[Finding]:
     owners = {edge.owner for edge in robot.edges} | {sensor.driver for sensor in robot.sensors}
-    needed = _needed(robot)
+    needed = _needed_processes(robot)
     if owners - {process.name for process in robot.processes} - {""}:
         return  # a name is misspelt, which TF302 reports
     moving = any(edge.joint for edge in robot.edges)
@@ -91,7 +91,7 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF818")
 def required_without_role(robot: Robot) -> Iterator[Finding]:
-    needed = _needed(robot)
+    needed = _needed_processes(robot)
     for process in robot.processes:
         if process.required and process.name not in needed and not robot.excuses(process.name):
             message = f"{process.name} is required, but owns no edge, and nothing waits for it"

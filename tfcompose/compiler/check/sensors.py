@@ -388,7 +388,7 @@ def _addresses_used_twice(robot: Robot, found: set[str]) -> Iterator[Finding]:
         if not mine:
             continue
         for other in before:
-            key = _shared(process, other, mine, addresses[other.name])
+            key = _shared_parameter(process, other, mine, addresses[other.name])
             if key:
                 message = f"{process.name} and {other.name} have the same {key} {mine[key]}"
                 notes = [Note(f"{other.name} is defined here", other.at)]
@@ -414,7 +414,7 @@ def _addresses(process: Process) -> dict[str, str]:
     return {key: value for key, value in named if value and _ADDRESSES.fullmatch(key)}
 
 
-def _shared(
+def _shared_parameter(
     process: Process, other: Process, mine: dict[str, str], theirs: dict[str, str]
 ) -> str | None:
     """Return the parameter that names one device for both, if one does."""

@@ -63,7 +63,7 @@ def _are_parallel(a: Vector, b: Vector) -> bool:
     return abs(sum(x * y for x, y in zip(a, b, strict=True))) > _PARALLEL
 
 
-def _listed(axis: Sequence[float]) -> str:
+def _list_axis(axis: Sequence[float]) -> str:
     return f"[{', '.join(f'{part:.3g}' for part in (round(part, 6) + 0.0 for part in axis))}]"
 
 
@@ -75,7 +75,7 @@ def wheel_axis(robot: Robot) -> Iterator[Finding]:
         joint, shape = edge.joint, _cylinder(robot.links.get(edge.child))
         if joint is None or joint.axis_at is None:
             continue  # TF736
-        axis, at = _listed(joint.axis), joint.axis_at
+        axis, at = _list_axis(joint.axis), joint.axis_at
         if edge.child in odd:
             sibling, right = odd[edge.child]
             message = f"{edge.child} turns about {axis}, across the axis of {sibling.child}"
@@ -98,7 +98,9 @@ def _lying(robot: Robot, edge: Edge, shape: Shape, along: Vector) -> Finding:
     joint, link = edge.joint, robot.links[edge.child]
     axis = joint.axis if joint else along
     here, there = joint.axis_at or joint.at if joint else edge.at, link.at
-    message = f"{edge.child} turns about {_listed(axis)}; its cylinder lies along {_listed(along)}"
+    message = (
+        f"{edge.child} turns about {_list_axis(axis)}; its cylinder lies along {_list_axis(along)}"
+    )
     key = _axis(robot, edge, along)
     advice, what = f"write {key}, or turn the cylinder", f"{edge.child} is defined here"
     if shape.pose.quat_xyzw == Pose().quat_xyzw:
@@ -120,7 +122,7 @@ def _quarter(robot: Robot, edge: Edge, axis: Vector) -> str:
 
 
 def _axis(robot: Robot, edge: Edge, axis: Vector) -> str:
-    listed = _listed(axis)
+    listed = _list_axis(axis)
     if edge.joint and robot.is_foreign(edge.joint.at):
         return f'<axis xyz="{listed[1:-1].replace(",", "")}"/>'
     return f"axis: {listed}"
@@ -262,7 +264,9 @@ def sensor_on_wheel(robot: Robot) -> Iterator[Finding]:
         wheel = turned.get(sensor.mount)
         edge = robot.parent_edge(sensor.mount)
         if wheel and edge and wheel.joint and sensor.kind not in _ODOMETRY_KINDS:
-            message = f"{sensor.name} turns with {wheel.child}, about {_listed(wheel.joint.axis)}"
+            message = (
+                f"{sensor.name} turns with {wheel.child}, about {_list_axis(wheel.joint.axis)}"
+            )
             advice = f"mount it on {wheel.parent}, which does not turn"
             notes = [Note(f"{wheel.joint.name} is defined here", wheel.joint.at)]
             yield finding("TF627", message, edge.at, help=advice, notes=notes)

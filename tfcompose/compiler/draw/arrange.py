@@ -78,7 +78,7 @@ def in_columns(forest: Forest, flat: Layout) -> Layout:
     blocks = [_block(forest, flat, child) for child in children]
     result = flat
     for count in range(2, min(MOST_COLUMNS, len(blocks)) + 1):
-        result = _placed(forest, flat, stem, _split(blocks, count))
+        result = _place_blocks(forest, flat, stem, _split(blocks, count))
         if result.height <= result.width:
             break
     return result
@@ -121,11 +121,13 @@ def _split(blocks: Sequence[_Block], count: int) -> list[list[_Block]]:
     low, high = max(block.height for block in blocks), sum(block.height for block in blocks)
     while high - low > 1:
         middle = (low + high) / 2
-        low, high = (low, middle) if len(_filled(blocks, middle)) <= count else (middle, high)
-    return _filled(blocks, high)
+        low, high = (
+            (low, middle) if len(_fill_columns(blocks, middle)) <= count else (middle, high)
+        )
+    return _fill_columns(blocks, high)
 
 
-def _filled(blocks: Sequence[_Block], height: float) -> list[list[_Block]]:
+def _fill_columns(blocks: Sequence[_Block], height: float) -> list[list[_Block]]:
     columns: list[list[_Block]] = [[]]
     filled = 0.0
     for block in blocks:
@@ -137,7 +139,7 @@ def _filled(blocks: Sequence[_Block], height: float) -> list[list[_Block]]:
     return columns
 
 
-def _placed(
+def _place_blocks(
     forest: Forest, flat: Layout, stem: Sequence[str], columns: Sequence[Sequence[_Block]]
 ) -> Layout:
     places: dict[str, FrameBox] = {}

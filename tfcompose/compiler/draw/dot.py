@@ -26,7 +26,7 @@ def dot(graph: Graph, *, is_down: bool = False) -> str:
 def _lines(graph: Graph, direction: str) -> Iterator[str]:
     owners = {name: index for index, name in enumerate(graph.all_owners())}
     above = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
-    yield f"digraph {_quoted(graph.title)} {{"
+    yield f"digraph {_quote(graph.title)} {{"
     yield f"  rankdir={direction}; ranksep=0.4; nodesep=0.12;"
     yield (
         '  node [shape=box, style="rounded,filled", fillcolor=white, fontname=Helvetica,'
@@ -34,23 +34,23 @@ def _lines(graph: Graph, direction: str) -> Iterator[str]:
     )
     yield "  edge [fontname=Helvetica, fontsize=9, arrowsize=0.6];"
     for frame in graph.all_frames():
-        yield f"  {_quoted(frame)}{_node(above.get(frame), frame, owners)};"
+        yield f"  {_quote(frame)}{_node(above.get(frame), frame, owners)};"
     for index, group in enumerate(graph.groups):
-        members = " ".join(f"{_quoted(frame)};" for frame in group.frames)
+        members = " ".join(f"{_quote(frame)};" for frame in group.frames)
         yield (
-            f"  subgraph cluster_{index} {{ label={_quoted(group.label)}; color=gray70;"
+            f"  subgraph cluster_{index} {{ label={_quote(group.label)}; color=gray70;"
             f" fontsize=10; {members} }}"
         )
     for arrow in graph.arrows:
-        yield (f"  {_quoted(arrow.parent)} -> {_quoted(arrow.child)} {_edge(arrow, owners)};")
+        yield (f"  {_quote(arrow.parent)} -> {_quote(arrow.child)} {_edge(arrow, owners)};")
     yield "}"
 
 
 def _node(arrow: Arrow | None, frame: str, owners: dict[str, int]) -> str:
     if arrow is None:
-        return f" [label={_quoted(frame)}]"
+        return f" [label={_quote(frame)}]"
     colour = colour_of(owners[arrow.owner])
-    label = _quoted(frame, arrow.pose) if arrow.pose else _quoted(frame)
+    label = _quote(frame, arrow.pose) if arrow.pose else _quote(frame)
     line, fill = STYLES[f"box{colour}"].stroke[0], STYLES[f"box{colour}"].fill[0]
     return f' [label={label}, color="#{line}", fillcolor="#{fill}"]'
 
@@ -60,11 +60,11 @@ def _edge(arrow: Arrow, owners: dict[str, int]) -> str:
     kind = "alternative" if arrow.alternative else arrow.kind
     wide = "" if kind == "static" else ", penwidth=1.6"
     free = ", constraint=false" if arrow.alternative else ""
-    label = _quoted(arrow.owner, arrow.detail) if arrow.detail else _quoted(arrow.owner)
+    label = _quote(arrow.owner, arrow.detail) if arrow.detail else _quote(arrow.owner)
     return f'[label={label}, color="#{line}", style={_LINES[kind]}{wide}{free}]'
 
 
-def _quoted(*rows: str) -> str:
+def _quote(*rows: str) -> str:
     return '"{}"'.format(
         "\\n".join(visible(row).replace("\\", "\\\\").replace('"', '\\"') for row in rows)
     )

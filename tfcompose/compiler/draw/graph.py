@@ -68,7 +68,7 @@ class Graph:
         return list(dict.fromkeys((*self.owners, *(arrow.owner for arrow in self.arrows))))
 
 
-def collapsed(graph: Graph) -> Graph:
+def collapse_groups(graph: Graph) -> Graph:
     """Return the graph with each group as the frames that others need.
 
     Where it begins, and what leads to others.

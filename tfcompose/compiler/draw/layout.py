@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.draw.style import STYLES, shortened, width_of
+from tfcompose.compiler.draw.style import STYLES, shorten_label, width_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -104,21 +104,21 @@ def layout(graph: Graph, forest: Forest, *, is_down: bool) -> Layout:
     """Return the position of everything, from (0, 0), down or to the right."""
     places = {frame: _box(forest, frame) for frame in forest.order}
     bands, height = _rows(forest, places, is_down=is_down)
-    (_indented if is_down else _columns)(forest, places)
+    (_indent if is_down else _columns)(forest, places)
     areas, width = _areas(graph, forest, places, bands)
     return Layout(places, areas, width, height, is_down)
 
 
 def _box(forest: Forest, frame: str) -> FrameBox:
     arrow = forest.up.get(frame)
-    width = width_of(shortened(frame), NAME_SIZE) + 2 * PAD
+    width = width_of(shorten_label(frame), NAME_SIZE) + 2 * PAD
     if arrow is None:
         return FrameBox(0.0, 0.0, width, BOX_HEIGHT)
     if arrow.detail:
-        width += BETWEEN + width_of(shortened(arrow.detail), MORE_SIZE)
+        width += BETWEEN + width_of(shorten_label(arrow.detail), MORE_SIZE)
     if not arrow.pose:
         return FrameBox(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT)
-    width = max(width, width_of(shortened(arrow.pose), MORE_SIZE) + 2 * PAD)
+    width = max(width, width_of(shorten_label(arrow.pose), MORE_SIZE) + 2 * PAD)
     return FrameBox(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT + POSE_HEIGHT)
 
 
@@ -175,7 +175,7 @@ def _columns(forest: Forest, places: dict[str, FrameBox]) -> None:
             places[child].x = round(place.right) + gap
 
 
-def _indented(forest: Forest, places: dict[str, FrameBox]) -> None:
+def _indent(forest: Forest, places: dict[str, FrameBox]) -> None:
     for frame in forest.order:
         place = places[frame]
         if frame not in forest.up and forest.enters(frame):
@@ -206,7 +206,7 @@ def _areas(
         if frame in bands:
             below = order[index : index + count[frame]]
             label = places[frame].x + width_of(
-                shortened(graph.groups[forest.group[frame]].label), LABEL_SIZE
+                shorten_label(graph.groups[forest.group[frame]].label), LABEL_SIZE
             )
             own = _own(forest, places, frame, below, label)
             right, bottom = own or (max(reach[frame], label) + PAD, bands[frame][1])

@@ -19,8 +19,8 @@ from tfcompose.compiler.draw.layout import (
     PAD,
     POSE_HEIGHT,
 )
-from tfcompose.compiler.draw.style import STYLES, colour_of, shortened, width_of
-from tfcompose.foundation.text import counted
+from tfcompose.compiler.draw.style import STYLES, colour_of, shorten_label, width_of
+from tfcompose.foundation.text import plural
 
 if TYPE_CHECKING:
     from tfcompose.compiler.draw.graph import Arrow, Forest, Graph
@@ -164,7 +164,7 @@ class _Pen:
         return [shape for area in self.layout.areas for shape in self._area(area)]
 
     def _area(self, area: Area) -> tuple[Shape, ...]:
-        label = shortened(self.graph.groups[self.forest.group[area.frame]].label)
+        label = shorten_label(self.graph.groups[self.forest.group[area.frame]].label)
         x, y = area.x + self.left, area.top + self.top
         return (
             Box(
@@ -234,12 +234,12 @@ class _Pen:
                 radius=CORNER,
                 style="root",
             )
-            return [box, _text(shortened(frame), "name", x + PAD, y + BASE)]
+            return [box, _text(shorten_label(frame), "name", x + PAD, y + BASE)]
         owner = self.owners[arrow.owner]
         colour, number = colour_of(owner), str(owner + 1)
         base = y + BASE - (POSE_HEIGHT / 2 - 1.0 if arrow.pose else 0.0)
         left = x + BADGE_WIDTH + PAD
-        name = _text(shortened(frame), "name", left, base)
+        name = _text(shorten_label(frame), "name", left, base)
         shapes: list[Shape] = [
             Box(
                 x,
@@ -269,10 +269,10 @@ class _Pen:
         ]
         if arrow.detail:
             shapes.append(
-                _text(shortened(arrow.detail), "more", left + name.width + BETWEEN, base)
+                _text(shorten_label(arrow.detail), "more", left + name.width + BETWEEN, base)
             )
         if arrow.pose:
-            shapes.append(_text(shortened(arrow.pose), "more", left, base + POSE_HEIGHT))
+            shapes.append(_text(shorten_label(arrow.pose), "more", left, base + POSE_HEIGHT))
         return shapes
 
 
@@ -297,13 +297,11 @@ def _legend(
     edges = Counter(
         arrow.owner for arrow in (*graph.arrows, *graph.hidden) if not arrow.alternative
     )
-    title = shortened(graph.title)
+    title = shorten_label(graph.title)
     frames = len(graph.all_frames())
-    totals = f"{counted(frames + len(graph.hidden), 'frame')} · {counted(edges.total(), 'edge')}"
+    totals = f"{plural(frames + len(graph.hidden), 'frame')} · {plural(edges.total(), 'edge')}"
     totals += (
-        f" · {counted(len(graph.hidden), 'frame')} inside sensors not shown"
-        if graph.hidden
-        else ""
+        f" · {plural(len(graph.hidden), 'frame')} inside sensors not shown" if graph.hidden else ""
     )
     title_width = width_of(title, STYLES["title"].size, bold=True)
     totals_width = width_of(totals, STYLES["label"].size)
@@ -315,7 +313,7 @@ def _legend(
     width = max(width, MIN_WIDTH, title_width + 12.0 + totals_width)
     y = base + LEGEND_LINE
     for row in (_owner_items(owners, edges), _line_items(graph)):
-        more, y, width = _wrapped(row, margin, y, width)
+        more, y, width = _wrap_items(row, margin, y, width)
         shapes += more
     return shapes, width, y + 2.0
 
@@ -331,7 +329,7 @@ class _Item:
 
 def _owner_items(owners: dict[str, int], edges: Counter[str]) -> list[_Item]:
     return [
-        _Item(f"{shortened(name)} ({counted(edges[name], 'edge')})", owner=index)
+        _Item(f"{shorten_label(name)} ({plural(edges[name], 'edge')})", owner=index)
         for name, index in owners.items()
         if edges[name]
     ]
@@ -344,7 +342,7 @@ def _line_items(graph: Graph) -> list[_Item]:
     return [_Item(text, kind=kind) for kind, text in LINES.items() if kind in used]
 
 
-def _wrapped(
+def _wrap_items(
     items: list[_Item], margin: float, y: float, width: float
 ) -> tuple[list[Shape], float, float]:
     """Return the items in lines that fit ``width``, the next line's y, and the width.

@@ -220,7 +220,7 @@ def width_of(text: str, size: float, *, bold: bool = False) -> float:
     return math.ceil(thousandths * size * (_BOLD if bold else 1.0) / 100) / 10
 
 
-def shortened(text: str) -> str:
+def shorten_label(text: str) -> str:
     """Return the text as it is drawn.
 
     Invisible characters as escapes, and of a long one its beginning and end.

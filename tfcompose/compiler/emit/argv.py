@@ -149,7 +149,7 @@ def file_params(process: Process) -> dict[str, dict[str, Any]]:
     later = dict(_launch_time_params(process.params))
     for section in [one for one in nodes if any(matches(one, name) for name in names)]:
         nodes[section] = _without(nodes[section], later)
-    known = {node: _known(params) for node, params in nodes.items()}
+    known = {node: _known_params(params) for node, params in nodes.items()}
     return {node: params for node, params in known.items() if params}
 
 
@@ -168,13 +168,13 @@ def component_params(process: Process, robot: Robot) -> dict[str, Any]:
     """Return the parameters of a component, by their full names, as values that ROS has."""
     clock = {"use_sim_time": True} if robot.ros.clock == "sim" else {}
     params = process.ros_nodes[0].flat_texts
-    return clock | {name: json_value(_typed(value)) for name, value in params.items()}
+    return clock | {name: json_value(_read_as_ros(value)) for name, value in params.items()}
 
 
-def _typed(value: Any) -> Any:
+def _read_as_ros(value: Any) -> Any:
     """Return the value of a parameter; a word of a parameter file is what ROS reads there."""
     if isinstance(value, list):
-        items = [_typed(item) for item in value]
+        items = [_read_as_ros(item) for item in value]
         return (
             [float(item) for item in items]
             if {type(item) for item in items} == {int, float}
@@ -183,12 +183,12 @@ def _typed(value: Any) -> Any:
     return value_of_word(value) if isinstance(value, AsInFile) else value
 
 
-def _known(params: dict[str, Any]) -> dict[str, Any]:
+def _known_params(params: dict[str, Any]) -> dict[str, Any]:
     kept = {}
     for key, value in params.items():
         if not known_at_launch(value):
             kept[key] = value
-        elif isinstance(value, dict) and (rest := _known(value)):
+        elif isinstance(value, dict) and (rest := _known_params(value)):
             kept[key] = rest
     return kept
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.emit.argv import argv_of, component_params, file_params
 from tfcompose.foundation.numbers import clean
-from tfcompose.model.fields import narrowed
+from tfcompose.model.fields import narrow
 from tfcompose.model.files import AS_IN_SOURCE, Target
 from tfcompose.model.plan import DESCRIPTION, Driven, Plan, PlanJoint, SourceLine
 from tfcompose.model.robot import JOINTS, STATIC
@@ -33,7 +33,7 @@ _ORDER = {"static": 0, "joints": 1, "guard": 3}
 def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
     """Return the plan of a right robot; ``target`` says where it will be written."""
     nodes = {process.name: process.node for process in robot.processes}
-    needed = _needed(robot)
+    needed = _needed_processes(robot)
     names = frozenset(process.name for process in needed)
     relative = {
         file: _relative(file, robot.file) for file in {edge.at.file for edge in robot.edges}
@@ -77,7 +77,7 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
     )
 
 
-def _needed(robot: Robot) -> list[Process]:
+def _needed_processes(robot: Robot) -> list[Process]:
     """Return the processes that have something to do.
 
     ``joints`` where joints move, else ``static`` at least.
@@ -122,7 +122,7 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
             moving.name.removeprefix(prefix),
             moving.mimic and moving.mimic.removeprefix(prefix),
         )
-        joint = narrowed(PlanJoint, moving, name=name, mimic=mimic)
+        joint = narrow(PlanJoint, moving, name=name, mimic=mimic)
     return edge.planned(
         node=node, pose=clean(edge.pose), source=SourceLine(file, edge.at.line), joint=joint
     )
@@ -224,15 +224,15 @@ def _sensors(process: Process, robot: Robot) -> Iterator[MountedSensor]:
 def _switch(sensor: MountedSensor) -> dict[str, Any]:
     """Return what keeps the driver from publishing anything, whether or not it is kept from it."""
     inside = sensor.switch if sensor.driver_frames else None
-    return _claimed(sensor) | (inside or {})
+    return _claim_of(sensor) | (inside or {})
 
 
-def _claimed(sensor: MountedSensor) -> dict[str, Any]:
+def _claim_of(sensor: MountedSensor) -> dict[str, Any]:
     return {key: value for off in sensor.claims.values() for key, value in off.items()}
 
 
 def _driven(sensor: MountedSensor, robot: Robot) -> Driven:
-    switch = _claimed(sensor) if sensor.publishes else _switch(sensor)
+    switch = _claim_of(sensor) if sensor.publishes else _switch(sensor)
     inside = (edge for edge in robot.edges if edge.sensor == sensor.name and not edge.given)
     frames: dict[str, PoseKnowledge] = {
         edge.child: _knowledge(edge) for edge in inside if edge.owner == sensor.driver

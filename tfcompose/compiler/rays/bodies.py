@@ -91,8 +91,8 @@ class Surroundings:
 
     def _group(self, frame: str) -> _Group:
         if frame not in self._groups:
-            members = _reached(self._fixed, {frame: Pose()})
-            group = _Group(self.robot, _reached(self._all, members))
+            members = _reach_frames(self._fixed, {frame: Pose()})
+            group = _Group(self.robot, _reach_frames(self._all, members))
             self._groups.update(dict.fromkeys(members, group))
         return self._groups[frame]
 
@@ -127,7 +127,7 @@ class Surroundings:
         group = self._group(frame)
         at = group.poses[frame]
         (from_x, from_y, from_z), to_frame = at.xyz, at.inverse()
-        cone = bundle_of(into).turned(at.quat_xyzw)
+        cone = bundle_of(into).rotate(at.quat_xyzw)
         for body in group.bodies:
             if body.link in own:
                 continue
@@ -137,7 +137,7 @@ class Surroundings:
                 yield PosedShape(body.link, body.shape, to_frame @ body.pose)
 
 
-def _reached(neighbours: Neighbours, poses: dict[str, Pose]) -> dict[str, Pose]:
+def _reach_frames(neighbours: Neighbours, poses: dict[str, Pose]) -> dict[str, Pose]:
     """Return the poses, and those of all frames that a way leads to."""
     poses, waiting = dict(poses), list(poses)
     while waiting:

@@ -34,7 +34,7 @@ class Bundle:
     rays: tuple[tuple[int, Vector], ...] = ()
     parts: tuple[Bundle, ...] = ()
 
-    def turned(self, quat_xyzw: Quaternion) -> Bundle:
+    def rotate(self, quat_xyzw: Quaternion) -> Bundle:
         """Return the cone in the frame in which the rays' frame has this orientation."""
         return replace(self, axis=rotate(quat_xyzw, self.axis), rays=(), parts=())
 

@@ -61,17 +61,17 @@ def _annotation(found: Finding) -> str:
     lines = [found.message, *notes, *([f"help: {found.help}"] if found.help else [])]
     message = "\n".join(map(visible, lines))
     listed = ",".join(
-        f"{name}={_escaped_property(visible(str(value)))}" for name, value in properties.items()
+        f"{name}={_escape_property(visible(str(value)))}" for name, value in properties.items()
     )
-    return f"::{found.severity} {listed}::{_escaped(message)}\n"
+    return f"::{found.severity} {listed}::{_escape(message)}\n"
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
-def _escaped_property(text: str) -> str:
-    return _escaped(text).replace(":", "%3A").replace(",", "%2C")
+def _escape_property(text: str) -> str:
+    return _escape(text).replace(":", "%3A").replace(",", "%2C")
 
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import counted, masked, visible
+from tfcompose.foundation.text import mask_invisible, plural, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -83,7 +83,7 @@ def _excerpt(
         skipped = 0
     width = max(1, min(end, skipped + len(shown)) - start)
     lead = re.sub(r"[^\t]", " ", shown[: start - skipped])
-    shown = masked(shown.rstrip(), "?", kept="\t")
+    shown = mask_invisible(shown.rstrip(), "?", kept="\t")
     return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 
@@ -91,9 +91,9 @@ def summary(found: Sequence[Finding], files: int, *, warnings_fail: bool = False
     """Return the last line: counts of findings and files, and why warnings exit 0."""
     errors = sum(finding.severity == "error" for finding in found)
     warnings = len(found) - errors
-    where = f"in {counted(files, 'file')}"
+    where = f"in {plural(files, 'file')}"
     if not found:
         return f"no findings {where}\n"
-    parts = [counted(n, noun) for n, noun in ((errors, "error"), (warnings, "warning")) if n]
+    parts = [plural(n, noun) for n, noun in ((errors, "error"), (warnings, "warning")) if n]
     exits = "" if errors or warnings_fail else " (exit code 0; --fail-on warning makes it 1)"
     return f"{' and '.join(parts)} {where}{exits}\n"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.compiler.draw import Arrow, Graph, Group
 from tfcompose.foundation.numbers import clean_rpy, clean_xyz, number
-from tfcompose.foundation.tree import drawn
+from tfcompose.foundation.tree import draw_tree
 from tfcompose.model.robot import JOINTS, STATIC
 
 if TYPE_CHECKING:
@@ -39,14 +39,14 @@ def tree(robot: Robot, columns: int | None = None) -> str:
         for root in robot.roots()
         for row in (
             ("", root, None),
-            *((lines, edge.child, edge) for lines, edge in drawn(children, root, _child)),
+            *((lines, edge.child, edge) for lines, edge in draw_tree(children, root, _child)),
         )
     ]
     width = max((len(lines) + len(name) for lines, name, _ in rows), default=0)
     owners = max((len(edge.owner) for _, _, edge in rows if edge), default=0)
     lines = [_row(lines + name, edge, width, owners) for lines, name, edge in rows]
     if columns is not None and _widest(lines) > columns:
-        lines = _fitted(rows, columns)
+        lines = _fit_rows(rows, columns)
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -67,11 +67,11 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
         f"{edge.owner:<{owners}}",
         f"{_rate(edge):<6}",
     )
-    rest = [fact for fact in (pose_text(edge), _switched(edge)) if fact]
+    rest = [fact for fact in (pose_text(edge), _switch_of(edge)) if fact]
     return "  ".join([*columns, *rest]).rstrip()
 
 
-def _fitted(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:
+def _fit_rows(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[str]:
     """Return the rows as lines of at most so many columns, where names are no longer than that."""
     for kinds in ({"static", "joints", "dynamic"}, {"dynamic"}):
         facts = [_facts(edge, kinds) for _, _, edge in rows]
@@ -79,10 +79,10 @@ def _fitted(rows: Sequence[tuple[str, str, Edge | None]], columns: int) -> list[
         found = [GAP.join([lines + name, *some]) for lines, name, some in drawing]
         if _widest(found) <= columns:
             return found
-    return [line for some in wrapped(drawing, columns) for line in some]
+    return [line for some in wrap_rows(drawing, columns) for line in some]
 
 
-def wrapped(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> list[list[str]]:
+def wrap_rows(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> list[list[str]]:
     """Return each row of a drawing as lines of at most this many columns.
 
     A row is the lines that lead to a name, the name, and facts; those for which there is no room
@@ -92,7 +92,7 @@ def wrapped(rows: Sequence[tuple[str, str, Sequence[str]]], columns: int) -> lis
         rows = [(_narrow(lines), name, facts) for lines, name, facts in rows]
     below = [*(lines for lines, _, _ in rows[1:]), ""]
     return [
-        list(_wrapped(lines, name, facts, columns, has_children=len(after) > len(lines)))
+        list(_wrap_row(lines, name, facts, columns, has_children=len(after) > len(lines)))
         for (lines, name, facts), after in zip(rows, below, strict=True)
     ]
 
@@ -105,7 +105,7 @@ def _facts(edge: Edge | None, kinds: Collection[str]) -> list[str]:
     if edge is None:
         return []
     kind = edge.kind if edge.kind in kinds and edge.owner not in {STATIC, JOINTS} else ""
-    facts = (kind, edge.owner, _rate(edge), *pose_text(edge).split(GAP), _switched(edge))
+    facts = (kind, edge.owner, _rate(edge), *pose_text(edge).split(GAP), _switch_of(edge))
     return [fact for fact in facts if fact]
 
 
@@ -114,7 +114,7 @@ def _narrow(lines: str) -> str:
     return lines.replace("│   ", "│ ").replace("    ", "  ").replace("── ", " ")
 
 
-def _wrapped(
+def _wrap_row(
     lines: str, name: str, facts: Iterable[str], columns: int, *, has_children: bool
 ) -> Iterator[str]:
     line = lines + name
@@ -140,11 +140,11 @@ def pose_text(edge: Edge) -> str:
 
 def edge_facts(edge: Edge) -> str:
     """Return kind, owner, rate and pose of an edge, in one line."""
-    facts = (edge.kind, f"by {edge.owner}", _rate(edge), pose_text(edge), _switched(edge))
+    facts = (edge.kind, f"by {edge.owner}", _rate(edge), pose_text(edge), _switch_of(edge))
     return GAP.join(fact for fact in facts if fact)
 
 
-def _switched(edge: Edge) -> str:
+def _switch_of(edge: Edge) -> str:
     return f"or on {', '.join(edge.switched)}" if edge.switched else ""
 
 

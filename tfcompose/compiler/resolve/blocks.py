@@ -11,7 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.urdf.blocks import faults_of, read_block, unexpanded, unknown_joints
+from tfcompose.compiler.urdf.blocks import faults_of, find_unexpanded, read_block, unknown_joints
 from tfcompose.foundation.findings import Finding, RejectedError, Span
 from tfcompose.model.robot.hardware import Block, Hardware, HardwareComponent, Interface
 
@@ -57,7 +57,7 @@ def take_blocks(draft: Draft) -> Iterator[Finding]:
         at: Path = ("xml", name)
         try:
             root = read_block(text, spec.spans.file)
-            findings = [*faults_of(root, *known), *unexpanded(text, spec.spans.file)]
+            findings = [*faults_of(root, *known), *find_unexpanded(text, spec.spans.file)]
             blocks.append(Block(name, spec.at(at), text))
         except RejectedError as error:
             findings = [*error.findings]

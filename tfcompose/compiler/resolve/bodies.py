@@ -11,7 +11,7 @@ from tfcompose.compiler.urdf.inertia import (
     Moments,
     UnmeasurableError,
     inertial,
-    joined,
+    join_moments,
     of_primitive,
     trace,
     traces,
@@ -181,7 +181,7 @@ class Bodies:
                     finding(error.code, f"{shape.mesh.uri}: {error}", at, help=error.advice)
                 )
                 return None
-        return joined(parts)
+        return join_moments(parts)
 
     def _is_missing(self, path: str) -> bool:
         return self.packages.disk is not None and not self.packages.disk.is_file(path)
@@ -204,10 +204,12 @@ def with_colours(links: dict[str, Link]) -> dict[str, Link]:
         for material in materials(links)
         if not (material.rgba or material.texture) and material.name in known
     }
-    return {name: _coloured(link, known, bare) for name, link in links.items()} if bare else links
+    return (
+        {name: _colour_link(link, known, bare) for name, link in links.items()} if bare else links
+    )
 
 
-def _coloured(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
+def _colour_link(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
     def shape(visual: Shape) -> Shape:
         is_bare = (
             visual.material

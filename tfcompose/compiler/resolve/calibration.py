@@ -243,7 +243,7 @@ class _Calibrations:
         file = self.files.get(named, at)
         for index in self.draft.keys:
             self._apply_to(index, file, at)
-        self._unused(file, at)
+        self._report_unused(file, at)
 
     def _apply_to(self, index: int, file: CalibrationFile, at: Span) -> None:
         edge, matches = self.draft.edges[index], self._fitting(index, file)
@@ -275,7 +275,7 @@ class _Calibrations:
             _Match(entry, inverted=False) for entry in elsewhere if entry.child in inside
         ]
 
-    def _unused(self, file: CalibrationFile, at: Span) -> None:
+    def _report_unused(self, file: CalibrationFile, at: Span) -> None:
         for entry in file.entries:
             if (
                 id(entry) in self.used or self.draft.spec.spans.is_variant

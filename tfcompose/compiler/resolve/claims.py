@@ -68,7 +68,7 @@ class _Claims:
             self.known.add(process.name)
         nodes = []
         for node, claimant in zip(process.ros_nodes, claimants, strict=True):
-            nodes.append(claimant.settled() if claimant else node)
+            nodes.append(claimant.settle() if claimant else node)
         return replace(process, ros_nodes=tuple(nodes))
 
     def edge(self, edge: Edge) -> Edge:
@@ -210,7 +210,7 @@ class _Claims:
             return
         edge = self._edge(parent, child)
         if edge is not None and edge.owner == claimant.process.name:
-            self._own(claimant, claim, edge)
+            self._take_own(claimant, claim, edge)
             return
         if claimant.is_published(claim) or claim.by_default:
             self.claims.append(Claim(claimant.node.name, parent, child, off=claim.off))
@@ -218,9 +218,9 @@ class _Claims:
             return
         other = edge or self.robot.parent_edge(child)
         if other is None:
-            self._undeclared(claimant, claim, parent, child)
+            self._report_undeclared(claimant, claim, parent, child)
         else:
-            self._foreign(claimant, claim, f"{parent} → {child}", other)
+            self._switch_off(claimant, claim, f"{parent} → {child}", other)
 
     def _compare_rate(self, claimant: Claimant, edge: Edge) -> None:
         """Find a parameter by which the node sends its edge less often than is declared."""
@@ -237,7 +237,7 @@ class _Claims:
                 finding("TF336", message, self._at(claimant, key), help=advice, notes=notes)
             )
 
-    def _own(self, claimant: Claimant, claim: ClaimSpec, edge: Edge) -> None:
+    def _take_own(self, claimant: Claimant, claim: ClaimSpec, edge: Edge) -> None:
         self.publishers[claimant.process.name, edge.child] = claimant.node.name
         self._compare_rate(claimant, edge)
         for key, value in claim.chosen_by.items():
@@ -254,7 +254,7 @@ class _Claims:
                 finding("TF333", message, place, help="remove it, or name another owner")
             )
 
-    def _foreign(self, claimant: Claimant, claim: ClaimSpec, name: str, other: Edge) -> None:
+    def _switch_off(self, claimant: Claimant, claim: ClaimSpec, name: str, other: Edge) -> None:
         """Write the switch, or say that it cannot be written."""
         against = next(
             (key for key, off in claim.off.items() if claimant.given.get(key, off) != off), None
@@ -303,7 +303,9 @@ class _Claims:
             f" params: {{{switch}}} here, so that lint knows; or name it as the owner{hint}"
         )
 
-    def _undeclared(self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str) -> None:
+    def _report_undeclared(
+        self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str
+    ) -> None:
         static = ", static: true" if claim.static else ""
         advice = (
             f"frames: {{{child}: {{parent: {parent}, owner: {claimant.process.name}{static}}}}}"
@@ -355,7 +357,7 @@ class Claimant:
     computed: dict[str, Any] = field(default_factory=dict)
     contradicting: set[str] = field(default_factory=set)
 
-    def settled(self) -> Node:
+    def settle(self) -> Node:
         """Return the node with the parameters that tfcompose adds, where they reach it."""
         node = replace(self.node, contradicting=frozenset(self.contradicting))
         return replace(node, params=node.params | self.computed) if self.takes_parameters else node

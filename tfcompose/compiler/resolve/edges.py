@@ -276,7 +276,7 @@ def optical_edits(path: Path, keys: EdgeKeys, spans: Spans) -> tuple[Edit, ...]:
         return ()
     if rotations:
         key = rotations[0]
-        edits = _replaced(getattr(keys, key), _OPTICAL[key], (*path, key), spans)
+        edits = _replacement_edits(getattr(keys, key), _OPTICAL[key], (*path, key), spans)
     else:
         edits = [_insertion(path, spans)]
     edited = [spans.at((*path, "parent")), *(edit.span for edit in edits)]
@@ -297,7 +297,7 @@ def _insertion(path: Path, spans: Spans) -> Edit:
     return Edit(Span(parent.file, *at, *at), f"{indent}{_RPY}\n")
 
 
-def _replaced(old: Any, new: Any, path: Path, spans: Spans) -> list[Edit]:
+def _replacement_edits(old: Any, new: Any, path: Path, spans: Spans) -> list[Edit]:
     """Return the edits that put each scalar of ``new`` in the place of that of ``old``.
 
     None where the forms differ.
@@ -306,14 +306,14 @@ def _replaced(old: Any, new: Any, path: Path, spans: Spans) -> list[Edit]:
         return [
             edit
             for key, item in new.items()
-            for edit in _replaced(getattr(old, key, None), item, (*path, key), spans)
+            for edit in _replacement_edits(getattr(old, key, None), item, (*path, key), spans)
         ]
     if isinstance(new, list):
         pairs = zip(old, new, strict=True) if isinstance(old, tuple) else ()
         return [
             edit
             for index, pair in enumerate(pairs)
-            for edit in _replaced(*pair, (*path, index), spans)
+            for edit in _replacement_edits(*pair, (*path, index), spans)
         ]
     is_same = old == (new if isinstance(old, str) else quantity(new).value)
     return [Edit(spans.at(path), new)] if isinstance(old, (str, float)) and not is_same else []

@@ -61,12 +61,12 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     at = part.spec.at((*part.at, key))
     file = packages.path_of(spec.urdf or spec.xacro or "", at)
     files: tuple[str, ...] = (file,)
-    bolted = _bolted(part, read(file)) if spec.macro is not None else {}
+    bolted = _attachment_arguments(part, read(file)) if spec.macro is not None else {}
     if spec.urdf is not None:
         text = read(file)
         root = read_xml(text, file)
     else:
-        expansion = _expanded(part, file, at, packages, bolted)
+        expansion = _expand_part(part, file, at, packages, bolted)
         text, files = expansion.text, tuple(dict.fromkeys((file, *expansion.files)))
         root = read_expansion(expansion, file, read)
     converted = robot_of(root, file, packages.asset, files)
@@ -81,7 +81,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
     robot = with_hardware(robot)
     if bolted:
-        robot = _loose(robot, bolted, part)
+        robot = _without_edge(robot, bolted, part)
     parents = {edge.parent for edge in robot.edges}
     implied = (
         frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
@@ -108,7 +108,7 @@ def _with_base(robot: Robot) -> Robot:
     return replace(robot, base=roots[0] if len(roots) == 1 else None)
 
 
-def _expanded(
+def _expand_part(
     part: PartEntry, file: str, at: Span, packages: Packages, bolted: Mapping[str, str]
 ) -> Expansion:
     disk, spec = packages.disk, part.declared
@@ -146,7 +146,7 @@ _PARENTS, _ORIGIN = ("parent_link", "parent", "parent_frame", "connected_to"), "
 _PARAMETER = re.compile(r"(\*{0,2}[A-Za-z_]\w*)(?:\s*:?=\s*('[^']*'|\S+))?")
 
 
-def _bolted(part: PartEntry, text: str) -> dict[str, str]:
+def _attachment_arguments(part: PartEntry, text: str) -> dict[str, str]:
     """Return the arguments of a macro that takes a parent, and perhaps an origin.
 
     The part's key ``parent`` gives it.
@@ -162,7 +162,7 @@ def _bolted(part: PartEntry, text: str) -> dict[str, str]:
     return bolted | ({_ORIGIN: "<origin/>"} if f"*{_ORIGIN}" in defaults else {})
 
 
-def _loose(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
+def _without_edge(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
     """Return what a macro made without the joint by which it hangs on its parent.
 
     The part's mount edge is that.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.hosts import entry_of
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
-from tfcompose.model.fields import narrowed
+from tfcompose.model.fields import narrow
 from tfcompose.model.plan import RosSettings, known_at_launch
 from tfcompose.spec.language.variables import CALLS
 from tfcompose.spec.load import path_named
@@ -36,7 +36,7 @@ def settings_of(ros: RosSpec) -> RosSettings:
     prefix = ros.frame_prefix
     if not prefix and ros.isolate in {"frames", "both"} and namespace:
         prefix = f"{namespace}/"
-    return narrowed(RosSettings, ros, namespace=namespace, frame_prefix=prefix)
+    return narrow(RosSettings, ros, namespace=namespace, frame_prefix=prefix)
 
 
 def topics_below(namespace: str, isolate: str) -> dict[str, str]:
@@ -57,7 +57,7 @@ def isolate(draft: Draft) -> Iterator[Finding]:
     filler = _ProcessFiller(draft)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
-        processes.append(filler.filled(moved))
+        processes.append(filler.fill(moved))
     yield from filler.found
     draft.robot = replace(robot, processes=tuple(processes))
 
@@ -85,7 +85,7 @@ class _ProcessFiller:
     draft: Draft
     found: list[Finding] = field(default_factory=list)
 
-    def filled(self, process: Process) -> Process:
+    def fill(self, process: Process) -> Process:
         """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
         section = entry_of(process, self.draft.spec)
         done = replace(
@@ -111,7 +111,7 @@ class _ProcessFiller:
     def _fill(self, value: Any, path: Path) -> Any:
         if isinstance(value, str):
             return (
-                CALLS.sub(lambda call: self._meant(call[1], call[2], path), value)
+                CALLS.sub(lambda call: self._replacement_for(call[1], call[2], path), value)
                 if "${" in value
                 else value
             )
@@ -123,7 +123,7 @@ class _ProcessFiller:
             )
         return value
 
-    def _meant(self, what: str, name: str, path: Path) -> str:
+    def _replacement_for(self, what: str, name: str, path: Path) -> str:
         return self._frame(name, path) if what == "frame" else self._file(name, path)
 
     def _frame(self, frame: str, path: Path) -> str:

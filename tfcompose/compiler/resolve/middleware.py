@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.compiler.resolve.hosts import entry_of
-from tfcompose.compiler.resolve.processes import added, says_how
+from tfcompose.compiler.resolve.processes import added_process, says_how
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.model.plan import Ready
 from tfcompose.model.plan.middleware import (
@@ -62,7 +62,7 @@ def own_router(spec: RobotSpec) -> list[Process]:
         restart="on-failure",
         emulate_tty=True,
     )
-    process = added(process, declared, spec)
+    process = added_process(process, declared, spec)
     return [replace(process, ready=process.ready or _READY)]
 
 

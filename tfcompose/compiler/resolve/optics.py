@@ -75,13 +75,13 @@ def optics_of(
             yield finding("TF102", message, spec.at_key(at), help=advice)
             continue
         place = spec.at_key(at) if own else spec.at_key(at[:2])
-        values, sources = _merged(base, own, str(spec.at_key(at)))
+        values, sources = _merge_optics(base, own, str(spec.at_key(at)))
         values.setdefault("active", kind != "camera")
         made.append(Optics(stream, renamed(frame), kind, place, sources=tuple(sources), **values))
     return tuple(made)
 
 
-def _merged(
+def _merge_optics(
     base: OpticsSpec | None, own: OpticsSpec | None, where: str
 ) -> tuple[dict[str, Any], Iterable[OpticsSource]]:
     """Return the values of the keys that anybody gives, and where they are from."""

@@ -65,11 +65,11 @@ class _ParamFiles:
         sections: dict[str, dict[str, Any]] = {}
         places: dict[str, tuple[Span, ...]] = {}
         if process.all_nodes:
-            for _, _, content in self._loaded(process.all_nodes, named):
+            for _, _, content in self._load_files(process.all_nodes, named):
                 _add_sections(sections, content)
             common = self._inline(process.all_nodes, places)
-            sections[_ANY] = _laid_over(sections.get(_ANY, {}), common)
-        files = list(self._loaded(node, named))
+            sections[_ANY] = _merge_params(sections.get(_ANY, {}), common)
+        files = list(self._load_files(node, named))
         without = []
         for path, place, content in files:
             _add_sections(sections, content)
@@ -82,15 +82,15 @@ class _ParamFiles:
         params_here: dict[str, Any] = {}
         for name, params in sections.items():
             if matches(name, node.name):
-                params_here = _laid_over(params_here, params)
-            others[name] = _laid_over(others.get(name, {}), _words(params))
+                params_here = _merge_params(params_here, params)
+            others[name] = _merge_params(others.get(name, {}), _words(params))
         places |= {
             key: (named[value.at.file], value.at)
             for key, value in params_here.items()
             if isinstance(value, Word)
         }
         inline = self._inline(node, places)
-        return replace(node, params=_laid_over(_words(params_here), inline), places=places)
+        return replace(node, params=_merge_params(_words(params_here), inline), places=places)
 
     def _inline(self, node: Node, places: dict[str, tuple[Span, ...]]) -> dict[str, Any]:
         """Return the parameters of the robot file itself; ``places`` takes where they are."""
@@ -103,7 +103,7 @@ class _ParamFiles:
             key: value for key, value in node.params.items() if not (has_files and key == FILE_KEY)
         }
 
-    def _loaded(
+    def _load_files(
         self, node: Node, named: dict[str, Span]
     ) -> Iterator[tuple[str, Span, ParamsFile]]:
         """Yield the files that a node names; ``named`` takes where each is named."""
@@ -162,7 +162,7 @@ _ANY = "/**"
 def _add_sections(sections: dict[str, dict[str, Any]], content: ParamsFile) -> None:
     """Add a file's sections as rcl does: each name keeps the place where it came first."""
     for node in content.nodes:
-        sections[node.name] = _laid_over(sections.get(node.name, {}), node.params)
+        sections[node.name] = _merge_params(sections.get(node.name, {}), node.params)
 
 
 def _nothing(
@@ -196,13 +196,15 @@ def _matches(pattern: list[str], parts: list[str]) -> bool:
     return bool(parts) and pattern[0] in {"*", parts[0]} and _matches(pattern[1:], parts[1:])
 
 
-def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+def _merge_params(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     """Return parameters with others laid over them; mappings merge."""
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)
         merged[key] = (
-            _laid_over(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+            _merge_params(old, value)
+            if isinstance(old, dict) and isinstance(value, dict)
+            else value
         )
     return merged
 

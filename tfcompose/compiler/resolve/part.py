@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.compiler.resolve.renamed import Names, renamed
+from tfcompose.compiler.resolve.renamed import Names, rename_robot
 from tfcompose.compiler.urdf.blocks import with_joints, within
 from tfcompose.foundation.findings import Finding, RejectedError, did_you_mean, finding
-from tfcompose.model.fields import narrowed
+from tfcompose.model.fields import narrow
 from tfcompose.model.plan import RosSettings
 from tfcompose.model.robot import Part
 from tfcompose.spec.language import GivenArg, as_part
@@ -87,7 +87,7 @@ class PartEntry:
         ros = self.spec.ros
         parts = (ros.namespace, self.declared.namespace or "")
         namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
-        return narrowed(
+        return narrow(
             RosSettings, ros, namespace=namespace, frame_prefix=f"{self.outer_prefix}{self.prefix}"
         )
 
@@ -99,7 +99,7 @@ class PartEntry:
             for name, value in self.declared.args.items()
         }
 
-    def laid_over(self, inner: Source) -> Source:
+    def overlay_on(self, inner: Source) -> Source:
         """Return the part's source with what the holder says about all its parts laid over it."""
         settings = {
             "namespace": self.settings.namespace,
@@ -132,11 +132,12 @@ class PartEntry:
         if self.declared.root is not None:
             robot = self._subtree(robot, self.declared.root)
         names = Names(self.name, self.prefix, shared, self.declared.is_alone)
-        again = renamed(robot, names)
+        again = rename_robot(robot, names)
         if self.declared.owner is not None:
             at = self.spec.at((*self.at, "owner"))
             again = replace(
-                again, edges=tuple(_owned(edge, self.declared.owner, at) for edge in again.edges)
+                again,
+                edges=tuple(_with_owner(edge, self.declared.owner, at) for edge in again.edges),
             )
         if self.declared.is_alone:
             again = replace(again, parts=(Part(self.name, self.prefix, robot), *again.parts))
@@ -175,7 +176,7 @@ class PartEntry:
         raise RejectedError([finding("TF313", f"the part {self.name} {what}", at, help=advice)])
 
 
-def _owned(edge: Edge, owner: str, at: Span) -> Edge:
+def _with_owner(edge: Edge, owner: str, at: Span) -> Edge:
     """Return the edge as another owner sends it: fixed on /tf_static, moving on /tf."""
     return replace(
         edge, owner=owner, owner_at=at, kind="static" if edge.kind == "static" else "dynamic"

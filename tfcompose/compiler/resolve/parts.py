@@ -16,7 +16,7 @@ from tfcompose.compiler.resolve.isolation import settings_of
 from tfcompose.compiler.resolve.part import PartEntry
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.model.robot import STATIC
-from tfcompose.spec.language import Given, composed, load_named, validate, with_includes
+from tfcompose.spec.language import Given, compose, load_named, validate, with_includes
 from tfcompose.spec.load import path_named
 
 if TYPE_CHECKING:
@@ -64,20 +64,20 @@ def _robot_of(part: PartEntry, draft: Draft, resolve: Resolve) -> tuple[Robot, f
         raise RejectedError([])  # and so were arguments, which xacro would miss
     try:
         if part.declared.spec is not None:
-            validated = _validated(part, part.declared.spec, draft, draft.read)
+            validated = _validate_part(part, part.declared.spec, draft, draft.read)
             inner, findings = resolve(validated, draft.library, draft.read, draft.disk, draft)
-            part.found += [_noted(finding, part) for finding in (*validated.found, *findings)]
+            part.found += [_with_note(finding, part) for finding in (*validated.found, *findings)]
             return inner.robot, frozenset()
         made = foreign(part, draft.packages, draft.read)
     except RejectedError as error:
-        raise RejectedError([_noted(finding, part) for finding in error.findings]) from None
+        raise RejectedError([_with_note(finding, part) for finding in error.findings]) from None
     for file in made.files:
         draft.collected.notes.setdefault(file, []).append(_note(part))
-    part.found += [_noted(finding, part) for finding in made.found]
+    part.found += [_with_note(finding, part) for finding in made.found]
     return made.robot, made.implied
 
 
-def _validated(part: PartEntry, named: str, draft: Draft, read: Reader) -> Validated:
+def _validate_part(part: PartEntry, named: str, draft: Draft, read: Reader) -> Validated:
     """Return a robot file that is a part, with what its holder says laid over it."""
     at = part.spec.at((*part.at, "spec"))
     file = path_named(named, at)
@@ -87,8 +87,8 @@ def _validated(part: PartEntry, named: str, draft: Draft, read: Reader) -> Valid
     loaded = with_includes(load_named(read(file), file), read)
     draft.collected.notes.setdefault(file, []).append(_note(part))
     inputs = Given(part.given_args(), draft.validated.given.environment)
-    source = composed(loaded, part.declared.profiles, given=inputs)
-    validated = validate(part.laid_over(source), None, inputs)
+    source = compose(loaded, part.declared.profiles, given=inputs)
+    validated = validate(part.overlay_on(source), None, inputs)
     part.found += _useless(part, file, validated)
     draft.collected.allows += validated.source.allows
     draft.collected.sources.append(validated.source)
@@ -165,7 +165,7 @@ def _names_twice(  # noqa: PLR0913, PLR0917 (what is there, where, and who bring
     return finding("TF505", message, place, notes=notes, help=advice)
 
 
-def _noted(found: Finding, part: PartEntry) -> Finding:
+def _with_note(found: Finding, part: PartEntry) -> Finding:
     return replace(found, notes=(*found.notes, _note(part)))
 
 

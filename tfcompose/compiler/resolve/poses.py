@@ -148,7 +148,7 @@ class _Solver:
         self._open.append(index)
         edge, keys = self.edges[index], self.draft.keys.get(index)
         if edge.calibration and keys:
-            edge = self._measured(index, edge.calibration, keys)
+            edge = self._calibrate(index, edge.calibration, keys)
         elif keys and (keys.relative_to or place_of(keys)):
             edge = replace(edge, pose=self._declared_pose(index, keys))
         self._open.pop()
@@ -169,14 +169,14 @@ class _Solver:
         pose = edge.pose
         if keys.relative_to:
             at = self._at(index, "relative_to")
-            pose = self._between(edge.parent, self._known(keys.relative_to, at), at) @ pose
+            pose = self._between(edge.parent, self._known_frame(keys.relative_to, at), at) @ pose
         if place:
             at = self._at(index, "place")
             inside = self._inside(edge) if edge.sensor and not self._is_broken(index) else None
-            pose = pose @ self._below(index, self._known(place, at, inside), at).inverse()
+            pose = pose @ self._below(index, self._known_frame(place, at, inside), at).inverse()
         return pose
 
-    def _measured(self, index: int, measured: Calibration, keys: EdgeKeys) -> Edge:
+    def _calibrate(self, index: int, measured: Calibration, keys: EdgeKeys) -> Edge:
         """Return the edge with its calibrated pose and its nominal one."""
         edge, at = self.edges[index], measured.named_at
         above = below = Pose()
@@ -196,7 +196,7 @@ class _Solver:
         group = group_of(edge)
         return [other.child for other in self.edges if group_of(other) == group]
 
-    def _known(self, frame: str, at: Span, inside: list[str] | None = None) -> str:
+    def _known_frame(self, frame: str, at: Span, inside: list[str] | None = None) -> str:
         """Return the frame, which must be one of ``inside``, those that nobody else brings."""
         if frame in self.draft.frames:
             return frame

@@ -47,7 +47,7 @@ class Sensor:
 
     def named(self, pattern: str) -> str:
         """Return a preset's name with the sensor's in it."""
-        return filled(pattern, self.name, self.preset.words)
+        return fill_name(pattern, self.name, self.preset.words)
 
     def holds(self, condition: dict[str, Any]) -> bool:
         """Return whether every option has, or holds, the value that the condition names."""
@@ -78,7 +78,7 @@ class Sensor:
         return {name: frame for name, frame in self.frames().items() if frame.driver}
 
 
-def filled(pattern: str, name: str, words: dict[str, str]) -> str:
+def fill_name(pattern: str, name: str, words: dict[str, str]) -> str:
     """Return the pattern with the sensor's name and the preset's words in it."""
     for hole, means in words.items():
         pattern = pattern.replace(f"{{{hole}}}", means)
@@ -107,7 +107,7 @@ def sensor_of(
     span = spec.at((*at, "preset"))
     try:
         plain = library.get(declared.preset)
-        options, refusals = decided(plain, declared, at, spec)
+        options, refusals = decide_options(plain, declared, at, spec)
         choices = {
             key: options[key] for key, option in plain.options.items() if option.type == "choice"
         }
@@ -171,7 +171,7 @@ def _publisher(sensor: Sensor) -> str:
     return sensor.spec.tf or driver.tf
 
 
-def decided(
+def decide_options(
     preset: PresetSpec, declared: SensorSpec, at: Path, spec: RobotSpec
 ) -> tuple[dict[str, Any], list[Finding]]:
     """Return the values of the preset's options, and what is wrong with those given."""
@@ -302,7 +302,7 @@ class Library:
             if file is None:
                 raise KeyError(name)
             own = load_named(self.storage.read(file), file)
-            self._sources[name] = self._extended(own, name, deep)
+            self._sources[name] = self._extend(own, name, deep)
         return self._sources[name]
 
     def get(self, name: str, choices: Mapping[str, str] | None = None) -> PresetSpec:
@@ -321,7 +321,7 @@ class Library:
             self._specs[name, options] = validate_preset(source)
         return self._specs[name, options]
 
-    def _extended(self, own: Source, name: str, deep: int) -> Source:
+    def _extend(self, own: Source, name: str, deep: int) -> Source:
         base = extended_by(own)
         if base is None:
             return own
@@ -331,7 +331,7 @@ class Library:
         if base == name:  # it stands before one of the same name, and changes it
             later = self._later(own.file)
             below = (
-                self._extended(load_named(self.storage.read(later), later), name, deep + 1)
+                self._extend(load_named(self.storage.read(later), later), name, deep + 1)
                 if later
                 else None
             )

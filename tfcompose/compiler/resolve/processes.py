@@ -305,7 +305,7 @@ _JOINTS_PARAMS: dict[str, Any] = {"publish_frequency": 30.0, "ignore_timestamp":
 _KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
 
 
-def built_in(spec: RobotSpec) -> list[Process]:
+def built_in_processes(spec: RobotSpec) -> list[Process]:
     """Return tfcompose's own processes, with what stands of them under ``processes``."""
     own = []
     for name in BUILT_IN:
@@ -331,7 +331,7 @@ def says_how(declared: ProcessSpec | None) -> bool:
     )
 
 
-def added(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
+def added_process(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Process:
     """Return a process that tfcompose adds, with what stands under its name.
 
     It runs where ``static`` does.
@@ -345,7 +345,7 @@ def added(process: Process, declared: ProcessSpec | None, spec: RobotSpec) -> Pr
     return replace(process, host=process.host or (static.host if static else None))
 
 
-def built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> Iterator[Finding]:
+def check_built_in_keys(name: str, declared: ProcessSpec, spec: RobotSpec) -> Iterator[Finding]:
     """Yield findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
     known = keys_of("built-in") | ({"params"} if name == JOINTS else set())

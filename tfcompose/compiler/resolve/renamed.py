@@ -55,7 +55,7 @@ class Names:
         return name if name in BUILT_IN and not self.alone else f"{self.part}/{name}"
 
 
-def renamed(robot: Robot, names: Names) -> Robot:
+def rename_robot(robot: Robot, names: Names) -> Robot:
     """Return the robot with the names that it has as a part."""
     again = _again(robot, names) if robot.hardware else {}
     kept = [process for process in robot.processes if process.name not in BUILT_IN or names.alone]

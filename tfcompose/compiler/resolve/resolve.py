@@ -25,9 +25,9 @@ from tfcompose.compiler.resolve.middleware import is_own_router, own_router, use
 from tfcompose.compiler.resolve.param_files import read_param_files
 from tfcompose.compiler.resolve.poses import solve_poses
 from tfcompose.compiler.resolve.processes import (
-    built_in,
-    built_in_keys,
+    built_in_processes,
     check_arguments,
+    check_built_in_keys,
     check_keys,
     check_launch_nodes,
     check_names,
@@ -83,14 +83,14 @@ def resolve(
 def add_processes(draft: Draft) -> Iterator[Finding]:
     """Take tfcompose's own processes, those of tools, the containers, and what the user starts."""
     spec = draft.spec
-    draft.processes += [*built_in(spec), *([] if draft.holder else own_router(spec))]
+    draft.processes += [*built_in_processes(spec), *([] if draft.holder else own_router(spec))]
     yield from add_sections(draft)
     added = draft.process_names
     for name, container in spec.containers.items():
         draft.processes.append(container_process(name, container, spec))
     for name, declared in spec.processes.items():
         if name in added or is_own_router(name, declared, spec):
-            yield from built_in_keys(name, declared, spec)
+            yield from check_built_in_keys(name, declared, spec)
             continue
         process = yield from user_process(name, declared, draft.validated)
         if process and process.kind == "component":

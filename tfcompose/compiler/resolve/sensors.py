@@ -281,7 +281,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     spec = validated.spec
     at: Path = ("sensors", sensor.name, "driver")
     if declared and declared.process is not None:
-        return None, [*_named_driver(sensor, declared.process, validated)]
+        return None, [*_check_driver(sensor, declared.process, validated)]
     if declared and declared.simulate:
         advice = "driver: none, and tf: tfcompose, where there is no device"
         return None, [
@@ -332,8 +332,8 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     elif driver:
         process = replace(process, package=driver.package, executable=driver.executable)
     return process, [
-        *_given_parameters(sensor, computed, spec),
-        *_unreached(sensor, spec),
+        *_check_parameters(sensor, computed, spec),
+        *_check_driver_names(sensor, spec),
     ]
 
 
@@ -485,7 +485,7 @@ def _plain(value: Any) -> str:
     return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
 
 
-def _unreached(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
+def _check_driver_names(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
     """Yield findings about names that the driver makes itself, against the spec."""
     driver, declared = sensor.preset.driver, sensor.spec
     if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
@@ -536,7 +536,7 @@ def _unreached(sensor: Sensor, spec: RobotSpec) -> Iterator[Finding]:
 OFF = frozenset({"off", "Off", "OFF", "no", "No", "NO", "null", "None", "NONE", "disabled"})
 
 
-def _named_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[Finding]:
+def _check_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[Finding]:
     """Yield findings about a driver that is the name of a process.
 
     It must be one, and has its own keys.
@@ -564,7 +564,7 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> Iterator[F
         yield finding("TF107", f"{key} and process exclude each other", place, help=advice)
 
 
-def _given_parameters(
+def _check_parameters(
     sensor: Sensor, computed: dict[str, Any], spec: RobotSpec
 ) -> Iterator[Finding]:
     """Yield a finding for each parameter that the user gives and tfcompose computes."""

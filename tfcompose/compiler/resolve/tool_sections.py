@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.compiler.resolve.processes import added, says_how
+from tfcompose.compiler.resolve.processes import added_process, says_how
 from tfcompose.foundation.findings import Finding
 from tfcompose.foundation.hooks import run_hook
 from tfcompose.model.robot import Section
@@ -84,7 +84,7 @@ def add_sections(draft: Draft) -> Iterator[Finding]:
             if declared is not None:
                 at = draft.spec.at_key(("processes", process.name))
                 process = replace(process, at=at)  # noqa: PLW2901 (the place of its own entry)
-            draft.processes.append(added(process, declared, draft.spec))
+            draft.processes.append(added_process(process, declared, draft.spec))
 
 
 def check_sections(draft: Draft) -> Iterator[Finding]:

@@ -98,7 +98,7 @@ def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
         waiting += [(child, known) for child in element.children]
 
 
-def unexpanded(text: str, file: str) -> Iterator[Finding]:
+def find_unexpanded(text: str, file: str) -> Iterator[Finding]:
     """Yield a finding for each substitution of xacro or launch in the text of a block."""
     for found in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
         before = text[: found.start()]

@@ -436,7 +436,9 @@ class _Bodies:
         if material is None:
             return None
         name = material.attributes.get("name", "")
-        found = self._described(name, material) or (self._named(name) if name else None)
+        found = self._describe_material(name, material) or (
+            self._material_named(name) if name else None
+        )
         if found is None and name and element.tag == "visual" and name not in self._undescribed:
             self._undescribed.add(name)
             advice = did_you_mean(name, self._described_names, 'describe it: <color rgba="…"/>')
@@ -448,15 +450,15 @@ class _Bodies:
     def _described_names(self) -> list[str]:
         return [name for name, (element, *_) in self._elements.items() if element.children]
 
-    def _named(self, name: str) -> Material | None:
+    def _material_named(self, name: str) -> Material | None:
         if name not in self._materials:
             described = (
-                self._described(name, element) for element in self._elements.get(name, ())
+                self._describe_material(name, element) for element in self._elements.get(name, ())
             )
             self._materials[name] = next((material for material in described if material), None)
         return self._materials[name]
 
-    def _described(self, name: str, material: Element) -> Material | None:
+    def _describe_material(self, name: str, material: Element) -> Material | None:
         colour, texture = material.first("color"), material.first("texture")
         if colour is None and texture is None:
             return None

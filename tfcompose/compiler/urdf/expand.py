@@ -138,18 +138,18 @@ def expand(
             unconfined = finding("TF923", message, Span(file), severity="error")
             raise RejectedError([_where_used(unconfined, use)])
         if not (_is_made(answer) or fits(answer, _STOPPED)):
-            raise RejectedError([_where_used(_ended(outcome, _text_in(noted), files), use)])
+            raise RejectedError([_where_used(_end_finding(outcome, _text_in(noted), files), use)])
     if "text" not in answer:
-        raise RejectedError([_refused(_Stop.of(answer, files), files, packages, use)])
+        raise RejectedError([_refusal_of(_Stop.of(answer, files), files, packages, use)])
     if files.refused:  # the file kept quiet about it
         outside = finding(
             "TF021", f"{files.refused[0]} may not be read", Span(file), help=_OUTSIDE
         )
         raise RejectedError([_where_used(outside, use)])
     if not all(map(files.has_served, answer["files"])):
-        raise RejectedError([_where_used(_ended(outcome, "", files), use)])
+        raise RejectedError([_where_used(_end_finding(outcome, "", files), use)])
     _refuse_unknown(values, files.served, file, use)
-    names = tuple(_shown(name, file) for name in answer["files"])
+    names = tuple(_show_file(name, file) for name in answer["files"])
     places = tuple(place and tuple(place) for place in answer["places"])
     return Expansion(answer["text"], names, places, tuple(map(tuple, answer["comments"])))
 
@@ -329,7 +329,7 @@ class _Stop:
         )
 
 
-def _refused(stop: _Stop, files: _XacroFiles, packages: Packages, use: Use | None) -> Finding:
+def _refusal_of(stop: _Stop, files: _XacroFiles, packages: Packages, use: Use | None) -> Finding:
     """Return what xacro did not like, or something that it called, and where."""
     file = files.file
     begins = [(stop.at[0], stop.at[1])] if stop.at else []
@@ -342,15 +342,19 @@ def _refused(stop: _Stop, files: _XacroFiles, packages: Packages, use: Use | Non
         missing = finding("TF106", message, Span(file), help=advice)
         found = _at_words(missing, rf"\$\(arg\s+{re.escape(stop.reason)}\s*\)", begins)
     elif stop.kind == "limit":
-        found = _placed(
+        found = _place_finding(
             finding("TF008", stop.reason, Span(file), help=_ALONE.format(file=file)), stop, begins
         )
     elif stop.kind == "outside":
-        found = _placed(finding("TF021", stop.reason, Span(file), help=_OUTSIDE), stop, begins)
+        found = _place_finding(
+            finding("TF021", stop.reason, Span(file), help=_OUTSIDE), stop, begins
+        )
     elif stop.kind == "unsafe":
-        found = _placed(finding("TF022", stop.reason, Span(file), help=_UNSAFE), stop, begins)
+        found = _place_finding(
+            finding("TF022", stop.reason, Span(file), help=_UNSAFE), stop, begins
+        )
     else:
-        found = _placed(finding("TF018", f"xacro: {stop.reason}", Span(file)), stop, begins)
+        found = _place_finding(finding("TF018", f"xacro: {stop.reason}", Span(file)), stop, begins)
     found = _relative_to(file, found)
     others = [name for name in stop.files[-1:] if Path(name).absolute() != Path(file).absolute()]
     if others and found.span == Span(file) and stop.kind not in {"package", "argument"}:
@@ -365,7 +369,7 @@ def _at_words(found: Finding, pattern: str, begins: list[tuple[str, int]]) -> Fi
     return replace(found, span=at)
 
 
-def _placed(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Finding:
+def _place_finding(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Finding:
     """Return the finding at its words, with notes about the macros being expanded.
 
     Where the words are not to be found it is at the element that xacro was busy with. Places are
@@ -384,7 +388,8 @@ def _placed(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Findi
         ]
         busy = _mark(*stop.at) if stop.at else found.span
         at = next(
-            (name for file, line in begins for name in _named_at(found.message, file, line)), busy
+            (name for file, line in begins for name in _spans_named(found.message, file, line)),
+            busy,
         )
     return replace(found, span=at, notes=(*found.notes, *notes))
 
@@ -393,7 +398,7 @@ def _mark(file: str, line: int, column: int) -> Span:
     return Span(file, line, column + 1, line, column + 2)
 
 
-def _ended(outcome: Outcome, noted: str, files: _XacroFiles) -> Finding:
+def _end_finding(outcome: Outcome, noted: str, files: _XacroFiles) -> Finding:
     """Return the finding that the process was ended, and what it was evaluating then."""
     code, file = outcome.code, files.file
     if outcome.timed_out:
@@ -435,7 +440,7 @@ def _definition(file: str | None, macro: str) -> Span | None:
     )
 
 
-def _named_at(message: str, file: str, line: int) -> Iterator[Span]:
+def _spans_named(message: str, file: str, line: int) -> Iterator[Span]:
     """Yield where the file has what the message names, from a line on."""
     for naming, before, after in _NAMED:
         for found in naming.finditer(message):
@@ -470,12 +475,12 @@ def _relative_to(file: str, found: Finding) -> Finding:
     """Return the finding with places relative to the working folder, ``file`` as named."""
 
     def shown(span: Span | None) -> Span | None:
-        return span._replace(file=_shown(span.file, file)) if span else None
+        return span._replace(file=_show_file(span.file, file)) if span else None
 
     notes = tuple(replace(note, span=shown(note.span)) for note in found.notes)
     return replace(found, span=shown(found.span), notes=notes)
 
 
-def _shown(name: str, file: str) -> str:
+def _show_file(name: str, file: str) -> str:
     """Return a file's name as seen from the working folder; ``file`` is as it is named."""
     return file if Path(name).absolute() == Path(file).absolute() else os.path.relpath(name)

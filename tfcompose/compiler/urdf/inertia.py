@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.geometry import Pose, matrix_from_quat, normalised, rotate
+from tfcompose.foundation.geometry import Pose, matrix_from_quat, normalise, rotate
 from tfcompose.model.robot import Inertial
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Moments:
         """Return the same solid moved by the pose, in the axes of the pose's parent: R I R^T."""
         if pose == _UNMOVED:
             return self
-        rows = matrix_from_quat(normalised(pose.quat_xyzw))
+        rows = matrix_from_quat(normalise(pose.quat_xyzw))
         xx, xy, xz, yy, yz, zz = self.tensor
         own = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         x, y, z = (
@@ -61,7 +61,7 @@ class Moments:
         turned = [
             [math.fsum(half[k] * row[k] for k in range(3)) for row in rows] for half in (x, y, z)
         ]
-        dx, dy, dz = rotate(normalised(pose.quat_xyzw), self.centre)
+        dx, dy, dz = rotate(normalise(pose.quat_xyzw), self.centre)
         centre = (pose.xyz[0] + dx, pose.xyz[1] + dy, pose.xyz[2] + dz)
         tensor = (
             turned[0][0],
@@ -88,7 +88,7 @@ class Moments:
         )
 
 
-def joined(parts: Sequence[Moments]) -> Moments:
+def join_moments(parts: Sequence[Moments]) -> Moments:
     """Return the moments of what the parts make together; where they overlap, both count."""
     if len(parts) == 1:
         return parts[0]
@@ -132,7 +132,7 @@ def inertial(moments: Moments, density: float, mass: float | None = None) -> Ine
 
 def of_primitives(mass: float, shapes: Sequence[Shape]) -> Inertial:
     """Return the inertia of a body of this mass (kg) and one density, in its shapes' axes."""
-    moments = joined([of_primitive(shape) for shape in shapes])
+    moments = join_moments([of_primitive(shape) for shape in shapes])
     return inertial(moments, mass / moments.volume, mass)
 
 

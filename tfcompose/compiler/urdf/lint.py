@@ -93,7 +93,7 @@ def read_urdf(
     if is_xacro:
         expansion = disk.expand(file, packages, arguments or {}, None)
         root, files = read_expansion(expansion, file, disk.read), expansion.files
-        allows = tuple(_kept(expansion, disk.read))
+        allows = tuple(_kept_allows(expansion, disk.read))
     else:
         root, files, allows = read_xml(raw, file), (), allows_in_xml(raw, file)
     converted = robot_of(root, file, packages.asset, files)
@@ -105,7 +105,7 @@ def read_urdf(
     return Document(root, converted, allows)
 
 
-def _kept(expansion: Expansion, read: Callable[[str], str]) -> Iterator[Allow]:
+def _kept_allows(expansion: Expansion, read: Callable[[str], str]) -> Iterator[Allow]:
     """Yield the comments that allow findings, of those that xacro keeps.
 
     It leaves out what it does not expand.

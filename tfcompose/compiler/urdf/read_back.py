@@ -121,14 +121,14 @@ def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
         yield f"axis is {axis}, not {joint.axis}"
     for tag, expected in _values(joint).items():
         found = getattr(there, tag)
-        actual = None if found is None else _given(found)
+        actual = None if found is None else _set_values(found)
         if (actual is None) != (expected is None):
             yield f"{tag} is {'missing' if actual is None else 'new'}"
         elif actual != expected:
             yield f"{tag} is {actual}, not {expected}"
 
 
-def _given(values: Any) -> dict[str, Any]:
+def _set_values(values: Any) -> dict[str, Any]:
     """Return the values that a dataclass holds; yourdfpy leaves those of ``dynamics`` as text."""
     present = {}
     for field in fields(values):
@@ -150,10 +150,10 @@ def _values(joint: Joint) -> dict[str, dict[str, Any] | None]:
     }
     is_limited = limit is not None or joint.type in {"revolute", "prismatic"}
     return {
-        "limit": (_given(limit) if limit else {}) | rates if is_limited else None,
-        "dynamics": _given(joint.dynamics) if joint.dynamics else None,
-        "safety_controller": _given(joint.safety) if joint.safety else None,
-        "calibration": _given(joint.reference) if joint.reference else None,
+        "limit": (_set_values(limit) if limit else {}) | rates if is_limited else None,
+        "dynamics": _set_values(joint.dynamics) if joint.dynamics else None,
+        "safety_controller": _set_values(joint.safety) if joint.safety else None,
+        "calibration": _set_values(joint.reference) if joint.reference else None,
         "mimic": (
             {"joint": mimic, "multiplier": joint.multiplier, "offset": joint.offset}
             if mimic

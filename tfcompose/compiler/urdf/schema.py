@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Span, finding, nearest, slip_of
-from tfcompose.foundation.geometry import Pose, normalised, quat_from_rpy, rpy_from_quat
+from tfcompose.foundation.geometry import Pose, normalise, quat_from_rpy, rpy_from_quat
 from tfcompose.model.robot import FREE, MOVING
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def unknown_words(root: Element) -> Iterator[Finding]:
                 )
         for child in element.children:
             if child.tag in _XACRO or child.tag.startswith("xacro:"):
-                yield _unexpanded(child)
+                yield _unexpanded_finding(child)
             elif child.tag in inside:
                 waiting += [child] if child.tag not in OPAQUE else []
             elif ":" not in child.tag and (element is not root or nearest(child.tag, inside)):
@@ -107,7 +107,7 @@ def unknown_words(root: Element) -> Iterator[Finding]:
                 )
 
 
-def _unexpanded(element: Element) -> Finding:
+def _unexpanded_finding(element: Element) -> Finding:
     """Return the finding about an element that xacro should have replaced.
 
     Readers of URDF ignore it.
@@ -234,7 +234,7 @@ class AttributeReader:
         if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
             self.refuse("rpy is out of range", origin.at_value("rpy") if origin else parent.at)
             return Pose((x, y, z))
-        return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
+        return Pose((x, y, z), normalise(quat_from_rpy(roll, pitch, yaw)))
 
     def _quaternion(self, origin: Element) -> Quaternion:
         """Return the rotation given as a quaternion, which URDF has since version 1.1."""
@@ -244,7 +244,7 @@ class AttributeReader:
             self.refuse("the quaternion has no length", at, "no rotation is 0 0 0 1")
         if self.refused > before:
             return (0.0, 0.0, 0.0, 1.0)
-        turned = normalised((x, y, z, w))
+        turned = normalise((x, y, z, w))
         angles = " ".join(f"{angle + 0.0:.17g}" for angle in rpy_from_quat(turned))
         if "rpy" in origin.attributes:
             self.refuse(

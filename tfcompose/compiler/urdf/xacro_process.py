@@ -177,7 +177,7 @@ class XacroRun:
     def made(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return xacro's document with the places of its elements, or why there is none."""
         try:
-            with self._hooked():
+            with self._hook_xacro():
                 document = self._document(request)
                 for node in document.childNodes:
                     if node.nodeType == Node.COMMENT_NODE:  # xacro's own names the file
@@ -206,7 +206,7 @@ class XacroRun:
         return document
 
     @contextmanager
-    def _hooked(self) -> Iterator[None]:
+    def _hook_xacro(self) -> Iterator[None]:
         """Put this between xacro and what it opens, parses, evaluates and looks for.
 
         It offers no other way.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.guard.verdict import (
     consumers,
     joints,
@@ -133,7 +133,7 @@ def cost(state: TreeState) -> str:
     transforms = sum(count.transforms for count in state.sent.values())
     text = (
         f"{name} carries {messages / state.seconds:.0f} messages a second with"
-        f" {transforms / state.seconds:.0f} transforms to {counted(len(readers), 'listener')}"
+        f" {transforms / state.seconds:.0f} transforms to {plural(len(readers), 'listener')}"
     )
     single = []
     for gid, count in state.sent.items():

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
 from tfcompose.foundation.geometry import Offset, Pose, norm, offset_of
-from tfcompose.foundation.text import counted
-from tfcompose.guard.verdict.publishers import SAME_POSE, compared, pose_differs
+from tfcompose.foundation.text import plural
+from tfcompose.guard.verdict.publishers import SAME_POSE, compare, pose_differs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -57,9 +57,9 @@ def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
     return owner.kind == "static" or edge.pose != Pose()
 
 
-def fixed_of(plan: Plan) -> dict[str, PlanEdge]:
+def fixed_driver_edges(plan: Plan) -> dict[str, PlanEdge]:
     """Return the fixed edges with a pose that others than ``static`` own, by child."""
-    known, owners = expected_of(plan), {process.name: process for process in plan.processes}
+    known, owners = expected_frames(plan), {process.name: process for process in plan.processes}
     return {
         edge.child: edge
         for edge in plan.edges
@@ -79,7 +79,7 @@ class Expected:
     nominal: bool
 
 
-def expected_of(plan: Plan) -> dict[str, Expected]:
+def expected_frames(plan: Plan) -> dict[str, Expected]:
     """Return the frames inside sensors that their drivers publish, by the frame's name."""
     edges = {edge.child: edge for edge in plan.edges}
     return {
@@ -115,15 +115,15 @@ def driver_pose_differs(
     """Return the finding for a sensor's frames that its driver sends with other poses."""
     (expected, sent), *others = off
     driven, edge = expected.driven, expected.edge
-    more = f", and {counted(len(others), 'more frame')} elsewhere" if others else ""
+    more = f", and {plural(len(others), 'more frame')} elsewhere" if others else ""
     sender = f"the driver {node}" if node else f"the driver of {driven.sensor}"
     message = (
         f"the pose of {edge.child} in {edge.parent} from {sender} is"
         f" {offset_of(edge.pose, sent).text} off preset {driven.preset}{more}:"
-        f" {compared(edge.pose, sent)}"
+        f" {compare(edge.pose, sent)}"
     )
     notes = [
-        Note(f"{reading.edge.child} in {reading.edge.parent}: {compared(reading.edge.pose, pose)}")
+        Note(f"{reading.edge.child} in {reading.edge.parent}: {compare(reading.edge.pose, pose)}")
         for reading, pose in others
     ]
     own = f"{{{edge.child}: {{xyz: [{_row(sent.xyz)}], quat_xyzw: [{_row(sent.quat_xyzw)}]}}}}"
@@ -165,14 +165,17 @@ class SentPoses:
 
     def __init__(self, plan: Plan, publishers: Publishers) -> None:
         self._publishers = publishers
-        self._expected: dict[str, Expected | PlanEdge] = {**fixed_of(plan), **expected_of(plan)}
+        self._expected: dict[str, Expected | PlanEdge] = {
+            **fixed_driver_edges(plan),
+            **expected_frames(plan),
+        }
         self._received: set[tuple[bytes, str]] = set()
         self._waiting: list[SentPose] = []
 
     def follow(self, plan: Plan) -> None:
         """Compare with another plan's poses; those that are new, with what comes from now on."""
         before = self._expected
-        self._expected = {**fixed_of(plan), **expected_of(plan)}
+        self._expected = {**fixed_driver_edges(plan), **expected_frames(plan)}
         self._received = {
             (gid, child)
             for gid, child in self._received

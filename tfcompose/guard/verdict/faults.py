@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import counted, listed
+from tfcompose.foundation.text import listed, plural
 from tfcompose.guard.verdict import publishers, stamps, tree
 from tfcompose.guard.verdict.simulators import switch_of_simulator
 from tfcompose.model.plan import PlanEdge  # noqa: TC001 (faults are decoded by their types)
@@ -163,7 +163,7 @@ class FaultGroup:
     def more(self) -> str:
         """How many edges there are besides the first one."""
         more = len(self.faults) - 1
-        return f" and {counted(more, 'more edge')}" if more else ""
+        return f" and {plural(more, 'more edge')}" if more else ""
 
     @property
     def are(self) -> str:
@@ -195,7 +195,7 @@ def fault_finding(group: FaultGroup, place: Span | None = None) -> Finding:
         first.code == UNDECLARED and group.plan.guard.unknown_edges == "warn"
     )
     severity: Severity = "warning" if is_mild else "error"
-    notes = [*_edge_notes(group), *([] if place else _declared(first)), *_run_notes(group)]
+    notes = [*_edge_notes(group), *([] if place else _declared_notes(first)), *_run_notes(group)]
     message, advice = _SENTENCES[first.code](group)
     advice = _misnamed_help(group) or _driver_help(group) or _switch_help(group) or advice
     return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
@@ -231,7 +231,7 @@ def _wrong_parent(group: FaultGroup) -> tuple[str, str]:
     return message, _leave_out_help(group)
 
 
-def _undeclared(group: FaultGroup) -> tuple[str, str]:
+def _undeclared_text(group: FaultGroup) -> tuple[str, str]:
     first = group.first
     by = "recorded" if first.recorded else f"published by {first.who}"
     message = _sent_by_driver(group) or f"{group.edges} {group.are} {by}, but not declared"
@@ -278,7 +278,7 @@ def _stamps(group: FaultGroup) -> tuple[str, str]:
 _SENTENCES: Mapping[str, Callable[[FaultGroup], tuple[str, str]]] = {
     NOT_OWNER: _not_owner,
     WRONG_PARENT: _wrong_parent,
-    UNDECLARED: _undeclared,
+    UNDECLARED: _undeclared_text,
     WRONG_TOPIC: _wrong_topic,
     LOOP: _loop,
     SELF: _self,
@@ -301,7 +301,7 @@ def taken_finding(group: FaultGroup) -> Finding:
         message += " or ".join((first.edge.parent, *first.edge.switched))
     if first.loop:
         message += f", which closes the loop {tree.way(first.loop)}"
-    notes = [*_edge_notes(group), *_declared(first), *_run_notes(group)]
+    notes = [*_edge_notes(group), *_declared_notes(first), *_run_notes(group)]
     advice = f"end {first.whom}"
     if first.namesake:
         advice += ": is the robot running already?"
@@ -457,7 +457,7 @@ def _edge_notes(group: FaultGroup) -> list[Note]:
     return [*notes, Note(f"and {more} more")] if more else notes
 
 
-def _declared(fault: Fault) -> list[Note]:
+def _declared_notes(fault: Fault) -> list[Note]:
     edge = fault.edge
     return [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")] if edge else []
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.geometry import Offset, Pose, normalised, offset_of
-from tfcompose.foundation.text import counted, listed, with_more
+from tfcompose.foundation.geometry import Offset, Pose, normalise, offset_of
+from tfcompose.foundation.text import listed, plural, with_more
 from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.tf.live.state import NAMELESS, who
 from tfcompose.tf.ros.environment import PROFILE_VARIABLES
@@ -87,7 +87,7 @@ def flooded(state: TreeState) -> Iterator[Finding]:
         sender = named.get(gid) if gid is not None else None
         node = sender.node if sender and sender.node else NAMELESS
         message = (
-            f"{node} publishes more edges than are kept: {counted(number, 'transform')} of further"
+            f"{node} publishes more edges than are kept: {plural(number, 'transform')} of further"
             " ones came"
         )
         notes = [Note(f"{node} runs {sender.where}")] if sender and sender.where else []
@@ -173,7 +173,7 @@ def leak(node: str, topic: str, own: str) -> Finding:
 
 def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Finding:
     """Return the finding for a publisher whose last latched message lacks these edges."""
-    lost, named = counted(sent_before, "message"), listed(missing, LISTED_AT_MOST)
+    lost, named = plural(sent_before, "message"), listed(missing, LISTED_AT_MOST)
     message = (
         f"{node} sent {lost} on /tf_static before the guard received it, and none since contains"
         f" {named}"
@@ -320,7 +320,7 @@ def unreadable(state: TreeState) -> Iterator[Finding]:
             (sender.node or NAMELESS, sender.topic) if sender else (NAMELESS, listed(state.topics))
         )
         message = (
-            f"{counted(number, 'message')} on {topic} from {node} cannot be read as {TF_MESSAGE}"
+            f"{plural(number, 'message')} on {topic} from {node} cannot be read as {TF_MESSAGE}"
         )
         yield finding(
             "TF832",
@@ -394,17 +394,17 @@ def _where(state: TreeState, edge: EdgeState) -> str:
     return f"{who(edge)} sends it {how}{', and runs ' if where else ''}{where}"
 
 
-def shown(pose: Pose) -> str:
+def show_pose(pose: Pose) -> str:
     """Return the pose in one line: metres, and fixed-axis angles in degrees."""
     xyz = " ".join(f"{round(value, 5) + 0.0:g}" for value in pose.xyz)
-    angles = Pose(pose.xyz, normalised(pose.quat_xyzw)).rpy
+    angles = Pose(pose.xyz, normalise(pose.quat_xyzw)).rpy
     rpy = " ".join(f"{round(math.degrees(angle), 3) + 0.0:g}" for angle in angles)
     return f"xyz {xyz} m, rpy {rpy} deg"
 
 
-def compared(expected: Pose, observed: Pose) -> str:
+def compare(expected: Pose, observed: Pose) -> str:
     """Return both poses as people read them."""
-    return f"seen {shown(observed)}; expected {shown(expected)}"
+    return f"seen {show_pose(observed)}; expected {show_pose(expected)}"
 
 
 def pose_differs(
@@ -419,7 +419,7 @@ def pose_differs(
     """
     (edge, parent, pose), *others = off
     by = f" from {publisher}" if publisher else ""
-    more = f", and of {counted(len(others), 'more frame')} too" if others else ""
+    more = f", and of {plural(len(others), 'more frame')} too" if others else ""
     message = (
         f"the pose of {edge.child} in {parent}{by} is off by"
         f" {offset_of(edge.pose, pose).text}{more}"
@@ -427,7 +427,7 @@ def pose_differs(
     notes = [
         Note(
             f"{edge.child} in {above} by {offset_of(edge.pose, sent).text}:"
-            f" {compared(edge.pose, sent)}"
+            f" {compare(edge.pose, sent)}"
         )
         for edge, above, sent in others[:LISTED_AT_MOST]
     ]
@@ -439,5 +439,5 @@ def pose_differs(
         " that is wrong"
     )
     return finding(
-        "TF846", f"{message}: {compared(edge.pose, pose)}", place, notes=notes, help=advice
+        "TF846", f"{message}: {compare(edge.pose, pose)}", place, notes=notes, help=advice
     )

@@ -51,7 +51,7 @@ def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = 
         "TF811",
         message + _owner(edges[0]),
         place,
-        notes=[] if place else _declared(edges),
+        notes=[] if place else _declared_notes(edges),
         help=advice,
     )
 
@@ -78,13 +78,13 @@ def silent(
         place,
         over=over,
         gone=gone,
-        notes=_rated(first, place),
+        notes=_rate_notes(first, place),
     )
 
 
-def left(edges: Sequence[PlanEdge], place: Span | None = None) -> Finding:
+def owner_left(edges: Sequence[PlanEdge], place: Span | None = None) -> Finding:
     """Return the finding for fixed edges whose owner has left."""
-    return _unlatched(_owner(edges[0]), [edge.name for edge in edges], place)
+    return _unlatched_finding(_owner(edges[0]), [edge.name for edge in edges], place)
 
 
 def slow(
@@ -101,7 +101,7 @@ def slow(
         f"{named} {come} at {rate:.3g} Hz from {_owner(first)}, but {first.rate or 0.0:g} Hz is"
         " declared"
     )
-    notes = [] if place else _declared(edges[:1])
+    notes = [] if place else _declared_notes(edges[:1])
     advice = "raise its rate, or declare the rate that it has"
     return finding("TF805", message, place, severity=severity, notes=notes, help=advice)
 
@@ -130,7 +130,7 @@ def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are na
     return finding("TF804", message, place, notes=notes, help=advice)
 
 
-def _unlatched(publisher: str, names: Sequence[str], place: Span | None = None) -> Finding:
+def _unlatched_finding(publisher: str, names: Sequence[str], place: Span | None = None) -> Finding:
     message = f"{publisher} has left: nobody latches {listed(names)} any more"
     advice = "listeners that are there keep these frames; those that join later do not get them"
     return finding("TF804", message, place, help=advice)
@@ -140,14 +140,14 @@ def _owner(edge: PlanEdge) -> str:
     return f"{edge.owner} ({edge.node})"
 
 
-def _rated(edge: PlanEdge, place: Span | None) -> list[Note]:
+def _rate_notes(edge: PlanEdge, place: Span | None) -> list[Note]:
     if not edge.rate:
         return []
     declared = f"declared at {edge.rate:g} Hz"
     return [Note(declared if place else f"{declared} in {edge.source[0]}:{edge.source[1]}")]
 
 
-def _declared(edges: Sequence[PlanEdge]) -> list[Note]:
+def _declared_notes(edges: Sequence[PlanEdge]) -> list[Note]:
     notes = [
         Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")
         for edge in edges[:NAMED_AT_MOST]
@@ -233,7 +233,7 @@ def fixed_left(state: TreeState) -> Iterator[Finding]:
         if edge.stream.static and edge.present is False and child not in held:
             lost.setdefault(who(edge), []).append(edge)
     for publisher, edges in lost.items():
-        yield _unlatched(publisher, [edge.name for edge in edges])
+        yield _unlatched_finding(publisher, [edge.name for edge in edges])
 
 
 def _speed(state: TreeState, edge: EdgeState) -> float:

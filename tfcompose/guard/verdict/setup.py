@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import counted, listed
+from tfcompose.foundation.text import listed, plural
 from tfcompose.model.plan.topics import namespace_options
 from tfcompose.tf.ros.environment import DOMAIN, RANGE, RMW
 from tfcompose.tf.ros.tf_codec import TF_MESSAGE
@@ -44,14 +44,14 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
     if state.publishers or state.edges or state.malformed:
         return
     moving, fixed = state.topics
-    others = counted(len(state.nodes), "other node") if state.nodes else "no other node"
+    others = plural(len(state.nodes), "other node") if state.nodes else "no other node"
     message = f"nobody publishes {moving} or {fixed}; in {state.seconds:.1f} s {others} "
     message += "was seen" if len(state.nodes) < 2 else "were seen"  # noqa: PLR2004 (one, or none)
     notes = [Note(f"seen: {listed(state.nodes)}")] if state.nodes else []
     notes.append(Note(f"looked with {settings_text(state.settings)}"))
     if state.plan:
         notes.append(
-            Note(f"{counted(len(state.plan.edges), 'edge')} of {state.plan.robot} should be there")
+            Note(f"{plural(len(state.plan.edges), 'edge')} of {state.plan.robot} should be there")
         )
     elsewhere = _elsewhere(state)
     if elsewhere:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.findings import Finding, Note, finding
-from tfcompose.foundation.text import counted, duration, listed, with_more
+from tfcompose.foundation.text import duration, listed, plural, with_more
 from tfcompose.tf.live.arrivals import KEPT_NS
 from tfcompose.tf.live.state import who
 
@@ -181,7 +181,7 @@ class Clocks:
         if self._since is None or sim_ns < self._since[1]:
             self._since = (now, sim_ns)
         elif now - self._since[0] >= SPEED_OVER_S:
-            self._speed = self._passed(now)
+            self._speed = self._measure_speed(now)
             self._since = (now, sim_ns)
 
     def stands(self, now: float) -> bool:
@@ -202,9 +202,9 @@ class Clocks:
         The least of what is, and was a while ago.
         """
         enough = self._since is not None and now - self._since[0] >= SPEED_OVER_S / 4
-        return min(self._speed, self._passed(now)) if enough else self._speed
+        return min(self._speed, self._measure_speed(now)) if enough else self._speed
 
-    def _passed(self, now: float) -> float:
+    def _measure_speed(self, now: float) -> float:
         """Return the speed since the last time that it was measured."""
         begun, begun_ns = self._since or (now, 0)
         return min(1.0, ((self.sim_ns or 0) - begun_ns) / _SECOND_NS / max(now - begun, 1e-9))
@@ -292,7 +292,7 @@ def stamp_went_back(state: TreeState) -> Iterator[Finding]:
         stream = edges[0].stream
         now_s = _behind_newest_s(edges[0])
         by = f", the newest is {duration(now_s)} before an earlier one" if now_s > 0 else ""
-        detail = f"{counted(stream.stamps_back, 'time')} in {stream.arrivals.count}{by}"
+        detail = f"{plural(stream.stamps_back, 'time')} in {stream.arrivals.count}{by}"
         yield _stamp_finding(BACK, edges, detail)
 
 

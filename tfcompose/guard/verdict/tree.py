@@ -159,7 +159,7 @@ def second_parent(state: TreeState) -> Iterator[Finding]:
         if _hands_over(edges):
             continue  # one node hands it over, which is what a gripper does
         message = two_parents_message(child, [(edge.parent, who(edge)) for edge in edges])
-        notes = [Note(_described(state, edge)) for edge in edges[:MOST_NOTES]]
+        notes = [Note(_describe_edge(state, edge)) for edge in edges[:MOST_NOTES]]
         nodes = {who(edge) for edge in edges}
         advice = f"let one node publish {child}: end the other, or switch its TF off"
         if len(nodes) == 1:
@@ -230,7 +230,7 @@ def _tree(root: str, frames: set[str]) -> str:
     return f"the tree below {root} ({listed(some)})"
 
 
-def _described(state: TreeState, edge: EdgeState) -> str:
+def _describe_edge(state: TreeState, edge: EdgeState) -> str:
     where = state.where(edge)
     rate = f" at {edge.timing.rate:.3g} Hz" if edge.timing.rate and not edge.stream.static else ""
     return f"{edge.name} is published by {who(edge)}{rate}{', ' if where else ''}{where}"

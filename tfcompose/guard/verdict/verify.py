@@ -23,7 +23,7 @@ from tfcompose.guard.verdict.drivers import (
     Expected,
     driver_pose_differs,
     drives_of,
-    expected_of,
+    expected_frames,
     is_fixed,
     is_off,
 )
@@ -31,7 +31,7 @@ from tfcompose.guard.verdict.faults import SELF, Fault, fault_finding, group_of,
 from tfcompose.guard.verdict.joints import planned_joints, sent_twice, unknown_joints
 from tfcompose.guard.verdict.ownership import code_of, may_be_owners, relays_of
 from tfcompose.guard.verdict.publishers import SAME_POSE, flooded, pose_differs, volatile_static
-from tfcompose.guard.verdict.rates import left, never_received, silent, slow
+from tfcompose.guard.verdict.rates import never_received, owner_left, silent, slow
 from tfcompose.guard.verdict.stamps import stamp_repeated, stamps_ahead, wrong_clock
 from tfcompose.guard.verdict.tree import loop, rejected_transforms
 from tfcompose.model.plan.stock import stand_ins
@@ -83,7 +83,7 @@ def differences(state: TreeState, plan: Plan, tolerance: Offset = SAME_POSE) -> 
     """Return what differs from the plan: edge by edge in its order, then what is not in it."""
     comparison = _Comparison(state, plan, tolerance)
     planned = [difference for edge in plan.edges for difference in comparison.of_planned(edge)]
-    return [*planned, *comparison.undeclared()]
+    return [*planned, *comparison.find_undeclared()]
 
 
 @dataclass
@@ -117,7 +117,7 @@ class _Comparison:
 
     @cached_property
     def drivers(self) -> dict[str, Expected]:
-        return expected_of(self.plan)
+        return expected_frames(self.plan)
 
     def of_planned(self, edge: PlanEdge) -> Iterator[Difference]:
         some = self.by_child.get(edge.child, [])
@@ -144,7 +144,7 @@ class _Comparison:
             )
             yield from _times(edge, newest, simulated=self.plan.ros.clock == "sim")
 
-    def undeclared(self) -> Iterator[Difference]:
+    def find_undeclared(self) -> Iterator[Difference]:
         planned = {edge.child for edge in self.plan.edges}
         for edge in self.state.edges:
             stream = edge.stream
@@ -288,7 +288,7 @@ def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
 # Differences as findings.
 
 
-def grouped(found: Iterable[Difference]) -> list[list[Difference]]:
+def group_differences(found: Iterable[Difference]) -> list[list[Difference]]:
     """Return those that are reported together, in the order in which the first of each came."""
     groups: dict[tuple[object, ...], list[Difference]] = {}
     for finding in found:
@@ -346,7 +346,7 @@ def _difference_finding(
             slow_is,
         )
     if stream.static:
-        return left(edges, place)
+        return owner_left(edges, place)
     gone = first.live.present is False
     return silent(
         edges, max(difference.silence_s for difference in group), place, over=first.over, gone=gone
@@ -433,7 +433,7 @@ def differs_from_plan(state: TreeState) -> Iterator[Finding]:
     found = [
         difference for difference in differences(state, state.plan) if difference.code != SELF
     ]  # found for every edge, planned or not
-    for group in grouped(found):
+    for group in group_differences(found):
         yield group_finding(group, state, state.plan)
 
 

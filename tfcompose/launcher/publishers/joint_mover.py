@@ -153,7 +153,7 @@ class JointMover:
                 return source
         if len(self._sources) >= _MOST_SOURCES:
             self._sources.clear()
-        followed = self._joints.followed(names.names)
+        followed = self._joints.follow(names.names)
         moving = (
             JointGroup(self._edges, self._all_joints, followed, names.names) if followed else None
         )

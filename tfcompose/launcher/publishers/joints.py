@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import counted, listed
+from tfcompose.foundation.text import listed, plural
 from tfcompose.tf.process import ready, say, start, wait_for_go
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def joints(own: Own, stop: Stop) -> None:
         at_most = (
             f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""
         )
-        say(f"{counted(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
+        say(f"{plural(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
         ready()
         missing = _Missing(mover, states.topic, lambda: publishing_nodes(node, states.topic))
         texts = [description.subscription] if description else []

@@ -38,7 +38,7 @@ class Joints:
         self._joints = list(joints)
         self._mimics = {joint.name: joint for joint in joints if joint.mimic is not None}
 
-    def followed(self, names: Sequence[str]) -> list[Followed]:
+    def follow(self, names: Sequence[str]) -> list[Followed]:
         """Return the joints that a message with these names determines.
 
         Of a name that comes twice the first counts.
@@ -46,10 +46,10 @@ class Joints:
         columns: dict[str, int] = {}
         for column, name in enumerate(names):
             columns.setdefault(name, column)
-        found = (self._followed(index, joint, columns) for index, joint in enumerate(self._joints))
+        found = (self._follow(index, joint, columns) for index, joint in enumerate(self._joints))
         return [joint for joint in found if joint is not None]
 
-    def _followed(self, index: int, joint: PlanJoint, columns: dict[str, int]) -> Followed | None:
+    def _follow(self, index: int, joint: PlanJoint, columns: dict[str, int]) -> Followed | None:
         multiplier, offset, name = 1.0, 0.0, joint.name
         for _ in range(len(self._mimics) + 1):
             if name in columns:

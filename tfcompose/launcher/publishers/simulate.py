@@ -12,7 +12,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.geometry import Pose, quat_from_rpy
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.launcher.publishers.mimics import SLIDING, TURNING, Joints
 from tfcompose.tf.process import ready, say, start, wait_for_go
 from tfcompose.tf.ros.tf_codec import Template
@@ -76,7 +76,7 @@ def _body(
         template.set_stamp(stamp_ns)
         publisher.publish(template.data)
 
-    return publish, f"{counted(len(edges), 'edge')} on /tf"
+    return publish, f"{plural(len(edges), 'edge')} on /tf"
 
 
 def _joint_states(
@@ -91,7 +91,7 @@ def _joint_states(
     def publish(time_s: float, stamp_ns: int) -> None:
         publisher.publish(stamp_ns, source.positions(time_s))
 
-    return publish, f"{counted(len(source.names), 'joint')} on {publisher.topic}"
+    return publish, f"{plural(len(source.names), 'joint')} on {publisher.topic}"
 
 
 def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
@@ -146,7 +146,7 @@ class JointSource:
             (start, simulation.sweep.get(name)) for name, start in simulation.joints.items()
         ]
         movable = [joint for joint in joints if joint.type in TURNING + SLIDING]
-        followed = {movable[joint.joint].name: joint for joint in Joints(movable).followed(own)}
+        followed = {movable[joint.joint].name: joint for joint in Joints(movable).follow(own)}
         self._mimics = [joint for name, joint in followed.items() if name not in simulation.joints]
         #: The names, in the order of the positions.
         self.names = own + [name for name in followed if name not in simulation.joints]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.tf.process import ready, say, start, wait_for_go
 from tfcompose.tf.ros.tf_codec import SentTransform, encode
 
@@ -43,7 +43,7 @@ def static(own: Own, stop: Stop) -> None:
         if edges:
             publisher.publish(encode(edges))
         say(
-            f"{counted(len(edges), 'edge')} on /tf_static"
+            f"{plural(len(edges), 'edge')} on /tf_static"
             if edges
             else "the description; no edge is fixed"
         )

@@ -80,7 +80,7 @@ def load_request(
     if private and (own := private_topics(plan).get(process.name)):
         remap = dict([*zip(GLOBAL, own, strict=True), *zip(process.topics, own, strict=True)])
         remap |= {old: new for old, new in process.remap.items() if old not in remap}
-    params = {name: _filled(value, fill) for name, value in component.params.items()}
+    params = {name: _fill(value, fill) for name, value in component.params.items()}
     loaded = replace(component, params=params)
     return LoadRequest(container.nodes[0], process.nodes[0], loaded, remap)
 
@@ -101,7 +101,7 @@ def ros_value(value: Any) -> Any:
     return float(value[_DOUBLE]) if isinstance(value, dict) else value
 
 
-def _filled(value: Any, fill: Callable[[str], str]) -> Any:
+def _fill(value: Any, fill: Callable[[str], str]) -> Any:
     if isinstance(value, list):
-        return [_filled(item, fill) for item in value]
+        return [_fill(item, fill) for item in value]
     return fill(value) if isinstance(value, str) else value

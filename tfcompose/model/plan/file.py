@@ -76,7 +76,7 @@ def read_plan(text: str, file: str) -> Plan:
         raise RejectedError([_bad("not a plan: it has no edges or processes", Span(file))])
     if data.get("version") != VERSION or data["version"] is True:
         message = (
-            f"the plan has version {_shown(data.get('version'))}; this tfcompose reads version"
+            f"the plan has version {_shorten(data.get('version'))}; this tfcompose reads version"
             f" {VERSION}"
         )
         raise RejectedError([_bad(message, Span(file))])
@@ -131,20 +131,20 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
     Those that no robot file can give, of nothing, and of files elsewhere.
     """
     if not _ROBOT.fullmatch(plan.robot):
-        yield f"robot is {_shown(plan.robot)}, not a name of lower case letters, digits and _"
+        yield f"robot is {_shorten(plan.robot)}, not a name of lower case letters, digits and _"
     known = Counter(process.name for process in plan.processes)
     for name, times in known.items():
         if not _PROCESS.fullmatch(name):
-            yield f"a process is named {_shown(name)}, not with letters, digits, _, - and ."
+            yield f"a process is named {_shorten(name)}, not with letters, digits, _, - and ."
         if times > 1:
             yield f"{times} processes are named {name}"
     yield from (
-        f"the owner of {edge.name} is {_shown(edge.owner)}, which is not a process"
+        f"the owner of {edge.name} is {_shorten(edge.owner)}, which is not a process"
         for edge in plan.edges
         if edge.owner not in known
     )
     yield from (
-        f"{process.name} waits for {_shown(other)}, which is not a process"
+        f"{process.name} waits for {_shorten(other)}, which is not a process"
         for process in plan.processes
         for other in process.after
         if other not in known
@@ -153,7 +153,7 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
         yield from _wrong_order(plan)
     for ready, name in ((process.ready, process.name) for process in plan.processes):
         if ready and ready.kind == "log" and (error := _regex_error(ready.text)):
-            yield f"{name} is ready at {_shown(ready.text)}, not a regular expression: {error}"
+            yield f"{name} is ready at {_shorten(ready.text)}, not a regular expression: {error}"
     yield from _wrong_components(plan)
     poses = {edge.name: edge.pose for edge in plan.edges}
     poses |= {
@@ -166,7 +166,7 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
     )
     yield from _wrong_files(plan)
     yield from (
-        f"a host is named {_shown(name)}, not with letters, digits, _, - and ."
+        f"a host is named {_shorten(name)}, not with letters, digits, _, - and ."
         for name in _wrong_hosts(plan)
     )
 
@@ -185,7 +185,7 @@ def _wrong_components(plan: Plan) -> Iterator[str]:
             )
         elif component and component.container not in containers:
             yield (
-                f"the container of {process.name} is {_shown(component.container)}, which is no"
+                f"the container of {process.name} is {_shorten(component.container)}, which is no"
                 " process with a node"
             )
         elif component and not process.nodes:
@@ -198,7 +198,7 @@ def _wrong_order(plan: Plan) -> Iterator[str]:
             {process.name: process.after for process in plan.processes}
         ).prepare()
     except graphlib.CycleError as error:
-        yield f"processes wait for each other: {', '.join(map(_shown, error.args[1]))}"
+        yield f"processes wait for each other: {', '.join(map(_shorten, error.args[1]))}"
 
 
 def _wrong_files(plan: Plan) -> Iterator[str]:
@@ -213,7 +213,7 @@ def _wrong_files(plan: Plan) -> Iterator[str]:
     for file in dict.fromkeys(filter(None, files)):
         path = PurePosixPath(file)
         if path.is_absolute() or ".." in path.parts:
-            yield f"the file {_shown(file)} is not in the plan's folder"
+            yield f"the file {_shorten(file)} is not in the plan's folder"
 
 
 def _wrong_hosts(plan: Plan) -> Iterator[str]:
@@ -243,7 +243,7 @@ def _short(error: msgspec.ValidationError) -> str:
     )
 
 
-def _shown(value: Any) -> str:
+def _shorten(value: Any) -> str:
     """Return a value that was read as an error shows it, shortened."""
     text = _json(value)
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"

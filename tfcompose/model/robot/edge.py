@@ -14,7 +14,7 @@ from tfcompose.foundation.units import (  # noqa: TC001 (read by them)
     JointVelocity,
     Number,
 )
-from tfcompose.model.fields import documented, narrowed
+from tfcompose.model.fields import documented, narrow
 from tfcompose.model.plan import PlanEdge, PlanJoint, SourceLine
 
 if TYPE_CHECKING:
@@ -210,4 +210,4 @@ class Edge(PlanEdge):
 
     def planned(self, **made: Any) -> PlanEdge:
         """Return the edge as the plan has it, with fields that follow from the whole robot."""
-        return narrowed(PlanEdge, self, **made)
+        return narrow(PlanEdge, self, **made)

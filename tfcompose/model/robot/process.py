@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.model.fields import narrowed
+from tfcompose.model.fields import narrow
 from tfcompose.model.plan import PlanClaim, PlanHost, PlanProcess, switch_text
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
@@ -52,7 +52,7 @@ class Node:
     @property
     def flat_params(self) -> dict[str, Any]:
         """The parameters by their full names, with dots."""
-        return {name: _meant(value) for name, value in self.flat_texts.items()}
+        return {name: _read_as_ros(value) for name, value in self.flat_texts.items()}
 
     @property
     def flat_texts(self) -> dict[str, Any]:
@@ -98,7 +98,7 @@ def value_of_word(text: str) -> bool | float | str:
     return str(text)
 
 
-def _meant(value: Any) -> Any:
+def _read_as_ros(value: Any) -> Any:
     """Return a word of a parameter file as ROS reads it if it is a switch, or as text."""
     if not isinstance(value, AsInFile):
         return value
@@ -142,7 +142,7 @@ class Process(PlanProcess):
 
     def planned(self, **made: Any) -> PlanProcess:
         """Return the process as the plan has it, with fields that follow from the whole robot."""
-        return narrowed(PlanProcess, self, **made)
+        return narrow(PlanProcess, self, **made)
 
     @property
     def takes_ros_arguments(self) -> bool:
@@ -171,7 +171,7 @@ class Host(PlanHost):
 
     def planned(self) -> PlanHost:
         """Return the computer as the plan has it."""
-        return narrowed(PlanHost, self)
+        return narrow(PlanHost, self)
 
 
 @dataclass(frozen=True, slots=True)

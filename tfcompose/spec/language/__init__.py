@@ -9,7 +9,7 @@ sources, ``validate`` makes a ``RobotSpec`` of one.
 from tfcompose.spec.language.args import ArgSpec, Given, GivenArg
 from tfcompose.spec.language.overlay import (
     as_part,
-    composed,
+    compose,
     lay_over,
     profiles_in,
     set_value,
@@ -32,7 +32,7 @@ __all__ = [
     "GivenArg",
     "Validated",
     "as_part",
-    "composed",
+    "compose",
     "is_recognized",
     "lay_over",
     "levels_of",

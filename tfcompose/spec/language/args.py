@@ -13,12 +13,12 @@ from tfcompose.foundation.units import (
     Quantity,
     Truth,
     UnitError,
+    invalid,
     quantity,
-    refused,
     shown,
     with_article,
 )
-from tfcompose.spec.language.expressions import IDENTIFIER, Value, inserted
+from tfcompose.spec.language.expressions import IDENTIFIER, Value, insertable_text
 from tfcompose.spec.language.spec import Checked, key
 from tfcompose.spec.language.values import Text, VariableName, plain
 from tfcompose.spec.load import Path
@@ -68,7 +68,7 @@ class ArgError(ValueError):
 def _scalar(value: Any) -> Any:
     value = plain(value)
     if isinstance(value, (dict, list)):
-        raise refused("TF103", f"{shown(value)} is not a string, number, true or false")
+        raise invalid("TF103", f"{shown(value)} is not a string, number, true or false")
     return value
 
 
@@ -125,7 +125,7 @@ class ArgSpec(Checked):
         if self.kind == "int" and (self.min is not None or self.max is not None):
             try:
                 known = {
-                    inserted(self.typed(value)): None
+                    insertable_text(self.typed(value)): None
                     for value in (self.min, self.default, self.max)
                     if value is not None
                 }
@@ -147,20 +147,24 @@ class ArgSpec(Checked):
         for name in ("min", "max"):
             if name in data and spec.kind not in {"int", "float"}:
                 message = f"{name} is for numbers, and the argument is {_CALLED[spec.kind]}"
-                yield (name,), refused("TF107", message, on_key=True)
+                yield (name,), invalid("TF107", message, on_key=True)
                 return
-        for path, value in ((("min",), spec.min), (("max",), spec.max), *_indexed(spec.choices)):
+        for path, value in (
+            (("min",), spec.min),
+            (("max",), spec.max),
+            *_with_index(spec.choices),
+        ):
             try:
                 if value is not None:
                     spec.typed(value)
             except ArgError as error:
-                yield path, refused(error.code, str(error), error.advice)
+                yield path, invalid(error.code, str(error), error.advice)
                 return
         try:
             if spec.default is not None:
                 spec.value(spec.default)
         except ArgError as error:
-            yield ("default",), refused(error.code, str(error), error.advice)
+            yield ("default",), invalid(error.code, str(error), error.advice)
 
     def value(self, given: Any) -> Value:
         """Return what an expression has for a value that is given, or is the default.
@@ -176,7 +180,7 @@ class ArgSpec(Checked):
                 raise ArgError(
                     "TF106",
                     f"{shown(given)} is not one of the choices",
-                    _one_of(inserted(value), texts),
+                    _one_of(insertable_text(value), texts),
                 )
         for bound, sign, what in ((self.min, 1, "less"), (self.max, -1, "greater")):
             limit = self.typed(bound) if bound is not None else None
@@ -241,7 +245,7 @@ class ArgSpec(Checked):
             )
 
 
-def _indexed(values: tuple[Any, ...]) -> Iterator[tuple[Path, Any]]:
+def _with_index(values: tuple[Any, ...]) -> Iterator[tuple[Path, Any]]:
     for index, value in enumerate(values):
         yield ("choices", index), value
 
@@ -277,7 +281,7 @@ def as_given(value: Any) -> str:
 
 def _is_name(name: str) -> str:
     if not IDENTIFIER.fullmatch(name):
-        raise refused(
+        raise invalid(
             "TF106",
             f"{name!r} cannot name an argument",
             "letters, digits and _: for example cameras",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from pydantic import ValidationError
 
 from tfcompose.spec.language.args import ArgSpec, Given, full
-from tfcompose.spec.language.expressions import Value, constant, evaluate, inserted, parse
+from tfcompose.spec.language.expressions import Value, constant, evaluate, insertable_text, parse
 from tfcompose.spec.language.variables import Variables, unused
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def alternatives_of(
 def _first(value: Value | None, texts: tuple[str, ...]) -> str:
     """Return the word that says the value, or the first of all."""
     return next(
-        (text for text in texts if value is not None and text == inserted(value)), texts[0]
+        (text for text in texts if value is not None and text == insertable_text(value)), texts[0]
     )
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Discriminator, Tag
 from pydantic_core import PydanticCustomError
 
-from tfcompose.foundation.units import Density, Inertia, Mass, Size, refused
+from tfcompose.foundation.units import Density, Inertia, Mass, Size, invalid
 from tfcompose.spec.language.pose import MountKeys, Posed, Rotated
 from tfcompose.spec.language.spec import Spec, key
 from tfcompose.spec.language.values import Colour, Name, Scale, Sizes, Text, Xyz, listed, short
@@ -107,7 +107,7 @@ class ShapeSpec(Posed):
         yield from super().check(data)
         if not SHAPES & data.keys() and data.keys() <= cls.model_fields.keys():
             advice = f"one of {', '.join(sorted(SHAPES))}"
-            yield (), refused("TF102", "no shape is given", advice, on_key=True, keeps=True)
+            yield (), invalid("TF102", "no shape is given", advice, on_key=True, keeps=True)
 
 
 class Tensor(Spec):
@@ -151,7 +151,7 @@ class InertialSpec(Rotated):
         yield from super().check(data)
         if not MASSES & data.keys():
             advice = "for example mass: 10 kg, or density: 1 g/cm^3"
-            yield (), refused("TF102", "mass is missing", advice, on_key=True, keeps=True)
+            yield (), invalid("TF102", "mass is missing", advice, on_key=True, keeps=True)
 
 
 #: A list of shapes, or one shape for a list of one.
@@ -188,4 +188,4 @@ class LinkSpec(MountKeys):
         ):
             advice = "give a visual or a collision shape, or mass and inertia: {ixx, iyy, izz}"
             message = "no shape and no inertia: the mass has no distribution"
-            yield ("inertial",), refused("TF102", message, advice, on_key=True, keeps=True)
+            yield ("inertial",), invalid("TF102", message, advice, on_key=True, keeps=True)

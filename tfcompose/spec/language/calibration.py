@@ -28,11 +28,11 @@ from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, fi
 from tfcompose.foundation.geometry import (
     Pose,
     Quaternion,
-    normalised,
+    normalise,
     quat_from_matrix,
     quat_from_rpy,
 )
-from tfcompose.foundation.units import Number, refused, shown
+from tfcompose.foundation.units import Number, invalid, shown
 from tfcompose.spec.language.pose import CalibrationFormat, has_unit_length, is_rotation
 from tfcompose.spec.language.reading import SpecRefusal, read
 from tfcompose.spec.language.spec import Spec
@@ -57,17 +57,17 @@ _NO_ROTATION = frozenset({"TF402", "TF403", "TF614"})
 def _is_no_expression(value: Any) -> Any:
     if isinstance(value, str) and ("${" in value or "(" in value):
         advice = "write the number; an angle in degrees: !degrees 15"
-        raise refused(
+        raise invalid(
             "TF103", f"{shown(value)} is an expression, which is not computed here", advice
         )
     if isinstance(value, str) and len(value) > _LONGEST_NUMBER:
-        raise refused("TF103", f"{shown(value)} is not a number")
+        raise invalid("TF103", f"{shown(value)} is not a number")
     return value
 
 
 def _frame(name: str) -> str:
     if not name.strip("/"):
-        raise refused("TF103", f"{shown(name)} is not a frame's name")
+        raise invalid("TF103", f"{shown(name)} is not a frame's name")
     return name.lstrip("/")
 
 
@@ -87,7 +87,7 @@ def _last_row(rows: _Rows) -> _Rows:
             "it is transposed: the position belongs in the last column" if is_transposed else ""
         )
         message = f"the last row is {' '.join(f'{value:g}' for value in rows[3])}, not 0 0 0 1"
-        raise refused("TF614", message, advice)
+        raise invalid("TF614", message, advice)
     a, b, c, _ = rows
     is_rotation(((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])))
     return rows
@@ -140,7 +140,7 @@ class RecordedTransform(FileEntry):
     def pose(self) -> Pose:
         """The pose that it is."""
         xyz = (self.translation.x, self.translation.y, self.translation.z)
-        return Pose(xyz, normalised(self.rotation.quat_xyzw))
+        return Pose(xyz, normalise(self.rotation.quat_xyzw))
 
 
 class RecordedHeader(FileEntry):
@@ -187,7 +187,7 @@ class PoseXyzQuat(FileEntry):
     @property
     def pose(self) -> Pose:
         """The pose that it is."""
-        return Pose((self.x, self.y, self.z), normalised((self.qx, self.qy, self.qz, self.qw)))
+        return Pose((self.x, self.y, self.z), normalise((self.qx, self.qy, self.qz, self.qw)))
 
     @model_validator(mode="after")
     def _has_unit_length(self) -> PoseXyzQuat:
@@ -310,7 +310,7 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
         return CalibrationFile(
             file, form, (), tuple(_inside("TF610", refusal, file, at) for refusal in wrong)
         )
-    known = _recognised(kind, documents)
+    known = _recognise(kind, documents)
     chosen = known if form == "auto" else form
     if chosen is None or not documents:
         what = "is empty" if not documents else "is in no known format"
@@ -356,7 +356,7 @@ _AUTOWARE_KEYS = frozenset(PoseXyzRpy.model_fields)
 _CAMERA = re.compile(r"cam(\d+)\Z")
 
 
-def _recognised(kind: Form, documents: tuple[Source, ...]) -> str | None:
+def _recognise(kind: Form, documents: tuple[Source, ...]) -> str | None:
     """Return the format that the documents look like, or None."""
     if kind != "yaml":
         return {"rows": "matrix", "launch": "moveit"}[kind]
@@ -400,14 +400,14 @@ class _FormatReader:
                 continue  # one of several keys tells what the mapping should have been
             missing.add(refusal.path)
             at = (*path, *refusal.path[1:]) if model is MatrixFile else (*path, *refusal.path)
-            self._refused(replace(refusal, path=at, on_key=False))
+            self._refuse(replace(refusal, path=at, on_key=False))
         return None if refusals else made
 
     def refuse(self, path: Path, message: str, advice: str = "") -> None:
         """Note what is wrong at a path."""
-        self._refused(SpecRefusal("TF610", path, message, advice))
+        self._refuse(SpecRefusal("TF610", path, message, advice))
 
-    def _refused(self, refusal: SpecRefusal) -> None:
+    def _refuse(self, refusal: SpecRefusal) -> None:
         code = "TF614" if refusal.code in _NO_ROTATION else "TF610"
         self.found.append(
             _inside(code, refusal.finding(self.source), self.source.file, self.named_at)
@@ -564,7 +564,7 @@ class _FormatReader:
                 if refusal.path and str(refusal.path[0]) in where
                 else (index,)
             )
-            self._refused(replace(refusal, path=path, on_key=False))
+            self._refuse(replace(refusal, path=path, on_key=False))
         return made.pose if made and not refusals else None
 
 

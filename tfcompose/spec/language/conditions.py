@@ -19,7 +19,7 @@ from tfcompose.spec.language.expressions import (
     MOST_ITEMS,
     RESERVED,
     ExpressionError,
-    inserted,
+    insertable_text,
     items,
 )
 from tfcompose.spec.language.reading import SpecRefusal
@@ -65,7 +65,7 @@ class Unfolded:
     conditions: dict[tuple[str, str], str] = field(default_factory=dict)
 
 
-def unfolded(source: Source, variables: Variables) -> Unfolded:
+def unfold(source: Source, variables: Variables) -> Unfolded:
     """Return the source without entries whose conditions fail, loops unrolled."""
     return _Unfolding(source, variables).unfolded()
 
@@ -76,10 +76,10 @@ def holds(condition: Any, variables: Variables) -> bool:
     Raises:
         ExpressionError: if it is neither true nor false.
     """
-    return _decided(condition, variables, {})
+    return _decide(condition, variables, {})
 
 
-def _decided(condition: Any, variables: Variables, scope: Scope) -> bool:
+def _decide(condition: Any, variables: Variables, scope: Scope) -> bool:
     value = (
         variables.value_in(condition, scope)
         if isinstance(condition, str) and "${" in condition
@@ -136,7 +136,7 @@ class _Unfolding:
             made = (
                 [(template, entry, place.inside[template])]
                 if is_plain
-                else list(self._made(at, entry))
+                else list(self._make_entries(at, entry))
             )
             for name, content, where in made:
                 if name in data:
@@ -148,7 +148,7 @@ class _Unfolding:
                 data[name], inside[name], keys[name] = content, where, place.keys[template]
         return data, place.with_inside(inside, keys)
 
-    def _made(
+    def _make_entries(
         self, at: Path, entry: dict[str, Any]
     ) -> Iterator[tuple[str, dict[str, Any], Place]]:
         """Yield the names, the data and the places of what an entry stands for."""
@@ -170,12 +170,16 @@ class _Unfolding:
         )
         for scope in scopes:
             try:
-                name = inserted(self.variables.value_in(template, scope)) if scope else template
+                name = (
+                    insertable_text(self.variables.value_in(template, scope))
+                    if scope
+                    else template
+                )
             except ExpressionError as error:
                 self._refuse(at, error, on_key=True)
                 continue
             try:
-                if "when" in decided and not _decided(entry["when"], self.variables, scope):
+                if "when" in decided and not _decide(entry["when"], self.variables, scope):
                     self.done.conditions[section, name] = (
                         entry["when"] if isinstance(entry["when"], str) else shown(entry["when"])
                     )
@@ -189,7 +193,7 @@ class _Unfolding:
             )
             if scope:
                 self.done.scopes[section, name] = scope
-                inner, where = self._named(inner, where, scope)
+                inner, where = self._fill_keys(inner, where, scope)
                 for old, spans in self.source.replaced.items():
                     if old[:2] == at:
                         self.replaced[(section, name) + old[2:]] = spans  # noqa: RUF005 (Python 3.10 cannot)
@@ -250,7 +254,7 @@ class _Unfolding:
             )
         return found
 
-    def _named(self, value: Any, place: Place, scope: Scope) -> tuple[Any, Place]:
+    def _fill_keys(self, value: Any, place: Place, scope: Scope) -> tuple[Any, Place]:
         """Return the mapping with the loops' variables in the names of keys filled in."""
         if not isinstance(value, dict):
             return value, place
@@ -261,11 +265,11 @@ class _Unfolding:
             name = key
             if "${" in key:
                 try:
-                    name = inserted(self.variables.value_in(key, scope))
+                    name = insertable_text(self.variables.value_in(key, scope))
                 except ExpressionError as error:
                     at = place.keys[key].span
                     self.done.found.append(finding("TF105", str(error), at, help=error.advice))
-            data[name], inside[name] = self._named(item, place.inside[key], scope)
+            data[name], inside[name] = self._fill_keys(item, place.inside[key], scope)
             keys[name] = place.keys[key]
         return data, place.with_inside(inside, keys)
 

@@ -120,9 +120,9 @@ def _fill_around(text: str, lookup: Callable[[str], Value], later: re.Pattern[st
     """Return ``text`` with what is before, between and after the matches of ``later`` filled."""
     parts, end = [], 0
     for match in later.finditer(text):
-        parts += [inserted(fill(text[end : match.start()], lookup, later)), match[0]]
+        parts += [insertable_text(fill(text[end : match.start()], lookup, later)), match[0]]
         end = match.end()
-    return "".join([*parts, inserted(fill(text[end:], lookup, later))])
+    return "".join([*parts, insertable_text(fill(text[end:], lookup, later))])
 
 
 def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | None = None) -> Value:
@@ -137,7 +137,7 @@ def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | Non
         text = (
             text[: nested.start()]
             + nested[1]
-            + inserted(evaluate(nested[2], lookup))
+            + insertable_text(evaluate(nested[2], lookup))
             + text[nested.end() :]
         )
     if later and later.search(text):
@@ -157,7 +157,7 @@ def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | Non
         raise ExpressionError("${ without its }", "close the expression: ${name}")
     parts, length, end = [], 0, 0
     for hole in _HOLE.finditer(text):
-        parts += [text[end : hole.start()], inserted(evaluate(hole[1], lookup))]
+        parts += [text[end : hole.start()], insertable_text(evaluate(hole[1], lookup))]
         end = hole.end()
         length += len(parts[-1])
         if length > LONGEST_TEXT:
@@ -251,7 +251,7 @@ _DOTTED = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*")
 _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 
 
-def inserted(value: Value) -> str:
+def insertable_text(value: Value) -> str:
     """Return a value as it is written in a text: a quantity is its number, in SI units."""
     if isinstance(value, str):
         return str(value)
@@ -277,7 +277,7 @@ class Expression:
     operands: Mapping[str, str]
 
     def __str__(self) -> str:
-        return _quoted(self.text)
+        return _quote(self.text)
 
     def operand(self, node: ast.expr) -> str:
         """Return the number with its unit, text or name that a node is, or an empty string."""
@@ -312,7 +312,7 @@ def parse(text: str) -> Expression:
         is_open = bool(symbols) and symbols[-1] not in {*operands, ")"}
         raise _refusal(text, symbols, "" if is_open else operands.get(symbol, symbol)) from None
     except (MemoryError, RecursionError):
-        raise ExpressionError(f"{_quoted(text)} is too deep") from None
+        raise ExpressionError(f"{_quote(text)} is too deep") from None
 
 
 def _with_names(text: str) -> tuple[list[str], dict[str, str]]:
@@ -324,7 +324,7 @@ def _with_names(text: str) -> tuple[list[str], dict[str, str]]:
         match = _SYMBOL.match(text, end)
         if not match:
             sign = text[end:].strip()[0]
-            raise ExpressionError(f"{sign!r} has no meaning in {_quoted(text)}")
+            raise ExpressionError(f"{sign!r} has no meaning in {_quote(text)}")
         symbol = match["sign"] or f"_{len(operands)}"
         if match["operand"]:
             operands[symbol] = match["operand"]
@@ -335,7 +335,7 @@ def _with_names(text: str) -> tuple[list[str], dict[str, str]]:
 
 def _refusal(text: str, symbols: Sequence[str], symbol: str) -> ExpressionError:
     """Return why Python stops at a symbol, or, where that is empty, at the end."""
-    quoted = _quoted(text)
+    quoted = _quote(text)
     if not symbols:
         return ExpressionError("an empty expression", "name a variable: ${name}")
     if not symbol:
@@ -347,7 +347,7 @@ def _refusal(text: str, symbols: Sequence[str], symbol: str) -> ExpressionError:
     return ExpressionError(f"{symbol!r} is not expected in {quoted}")
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     if len(text) >= LONGEST_QUOTED:
         text = f"{text[:LONGEST_QUOTED]}…"
     return f"${{{text}}}"
@@ -389,14 +389,14 @@ class _Evaluation:
 
     def condition(self, node: ast.expr) -> bool:
         """Return the value of a node that has to be true or false."""
-        value = _spoken(self.value(node))
+        value = _value_of_word(self.value(node))
         if isinstance(value, bool):
             return value
         raise self._refusal(node, value, "true or false")
 
     def number(self, node: ast.expr) -> Quantity:
         """Return the value of a node that has to be a number."""
-        return self._as_number(node, _spoken(self.value(node)))
+        return self._as_number(node, _value_of_word(self.value(node)))
 
     def _as_number(self, node: ast.expr, value: Value) -> Quantity:
         if isinstance(value, Quantity):
@@ -408,7 +408,7 @@ class _Evaluation:
         return ExpressionError(f"{first} is {_kind(value)}, and {self.expression} needs {needed}")
 
     def _compare(self, left: ast.expr, sign: _Comparison, right: ast.expr) -> bool:
-        a, b = _spoken(self.value(left)), _spoken(self.value(right))
+        a, b = _value_of_word(self.value(left)), _value_of_word(self.value(right))
         is_equality = sign in {operator.eq, operator.ne}
         if is_equality and not (isinstance(a, Quantity) and isinstance(b, Quantity)):
             if _kind(a) != _kind(b):
@@ -489,7 +489,7 @@ def _number(text: str) -> float:
     return int(text) if text.isdigit() else float(text)
 
 
-def _spoken(value: Value) -> Value:
+def _value_of_word(value: Value) -> Value:
     return value.value if isinstance(value, EnvironmentText) else value
 
 

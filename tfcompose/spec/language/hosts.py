@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, Strict
 
-from tfcompose.foundation.units import refused, shown
+from tfcompose.foundation.units import invalid, shown
 from tfcompose.spec.language.spec import Entry, key
 from tfcompose.spec.language.values import Integral, Matches, OneOrMore, Text
 
@@ -16,7 +16,7 @@ _WITH_PORT = re.compile(r"((?:[^@:]+@)?[^@:]+):([0-9]+)")
 
 def _without_port(value: str) -> str:
     if found := _WITH_PORT.fullmatch(value):
-        raise refused("TF106", f"{shown(value)} has a port", f"ssh: {found[1]}, port: {found[2]}")
+        raise invalid("TF106", f"{shown(value)} has a port", f"ssh: {found[1]}, port: {found[2]}")
     return value
 
 

@@ -16,7 +16,7 @@ from tfcompose.foundation.tool import installed, load
 from tfcompose.foundation.units import EXPRESSION
 from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.preset import PresetSpec
-from tfcompose.spec.language.spec import described, examples_of, fields_of, walk
+from tfcompose.spec.language.spec import describe_key, examples_of, fields_of, walk
 from tfcompose.spec.language.tool_keys import full_robot_model
 from tfcompose.spec.language.values import COMPUTED
 from tfcompose.spec.load.scalars import plain
@@ -64,7 +64,7 @@ def json_schema(
             form.pop(
                 "to", None
             )  # which processes a key applies to: JSON Schema would not warn, it would refuse
-            form |= {"description": described(field), "examples": _examples(field, form)}
+            form |= {"description": describe_key(field), "examples": _examples(field, form)}
         if kind is not root:
             schema["title"] = kind.__name__.removesuffix("Spec")
         _exclude(schema, getattr(kind, "EXCLUSIVE", ()), definitions)

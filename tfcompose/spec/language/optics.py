@@ -15,7 +15,7 @@ from tfcompose.foundation.units import (
     Measure,
     Rate,
     Size,
-    refused,
+    invalid,
     shown,
 )
 from tfcompose.model.robot import OpticsKind, Projection, Shutter
@@ -32,7 +32,7 @@ def _about_zero(value: Any) -> Any:
         return value
     angle = _ANGLE.read(value)
     if angle < 0:
-        raise refused(
+        raise invalid(
             "TF106", f"{shown(value)} is less than 0", "give the whole angle, or [from, to]"
         )
     return [-angle / 2, angle / 2]
@@ -41,14 +41,14 @@ def _about_zero(value: Any) -> Any:
 def _has_order(sector: tuple[float, float]) -> tuple[float, float]:
     start, end = sector
     if start > end:
-        raise refused(
+        raise invalid(
             "TF106",
             "it ends before it begins",
             f"[{math.degrees(end):g} deg, {math.degrees(start):g} deg]",
         )
     if end - start > math.tau * (1 + 1e-9):
         message = f"{math.degrees(end - start):.5g} deg is more than a turn"
-        raise refused("TF106", message, f"if it is in degrees: {end - start:g} deg")
+        raise invalid("TF106", message, f"if it is in degrees: {end - start:g} deg")
     return sector
 
 
@@ -56,7 +56,7 @@ def _is_angle(angle: float) -> float:
     if 0 < angle <= math.tau * (1 + 1e-9):
         return angle
     message = f"{math.degrees(angle):.5g} deg is not an angle of view"
-    raise refused("TF106", message, f"if it is in degrees: {angle:g} deg")
+    raise invalid("TF106", message, f"if it is in degrees: {angle:g} deg")
 
 
 _FromTo = Annotated[tuple[Angle, Angle], InARow(2, "[-135 deg, 135 deg]")]
@@ -158,9 +158,9 @@ class OpticsSpec(Checked):
             message = f"{len(elevations)} elevations, and {channels} channels"
             yield (
                 ("elevations",),
-                refused("TF106", message, "give one for each, or leave channels out", keeps=True),
+                invalid("TF106", message, "give one for each, or leave channels out", keeps=True),
             )
         near, far = _metres(data.get("near")), _metres(data.get("far"))
         if near is not None and far is not None and near >= far:
             message = f"near {near:g} m is not less than far {far:g} m"
-            yield ("near",), refused("TF106", message, "swap the two", keeps=True)
+            yield ("near",), invalid("TF106", message, "swap the two", keeps=True)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _NOTHING = Given()
 
 
-def composed(
+def compose(
     source: Source,
     profiles: Sequence[str] = (),
     overlays: Sequence[Source] = (),
@@ -67,17 +67,17 @@ def composed(
         unknown = (_unknown_profile(source, name, read) for name in missing)
         raise RejectedError([*source.found, *wrong, *unknown])
     base = replace(without(source, "profiles"), found=(*source.found, *wrong))
-    result = _laid_over_all(base, source, profiles, overlays)
+    result = _lay_over_all(base, source, profiles, overlays)
     if any(isinstance(profile, dict) and "when" in profile for profile in known.values()):
         holding, refused = _holding(source, result, given)
         profiles = [*(name for name in holding if name not in profiles), *profiles]
-        result = _laid_over_all(
+        result = _lay_over_all(
             replace(base, found=(*base.found, *refused)), source, profiles, overlays
         )
     return replace(result, is_variant=bool(profiles or overlays))
 
 
-def _laid_over_all(
+def _lay_over_all(
     base: Source, source: Source, profiles: Sequence[str], overlays: Sequence[Source]
 ) -> Source:
     for name in profiles:
@@ -255,7 +255,7 @@ class _Merger:
         """Remember what is replaced, and say so if that changes nothing."""
         self.remember(path, old_place)
         if self.is_overlay and type(old) is type(new) and old == new and path != ("tfcompose",):
-            message = f"{'.'.join(map(str, path))} is {_shown(new)} already"
+            message = f"{'.'.join(map(str, path))} is {_show_value(new)} already"
             self.found.append(_idle(message, place, old_place))
 
 
@@ -277,7 +277,7 @@ def _drop(key: str, *tables: dict[Any, Any]) -> None:
         table.pop(key, None)
 
 
-def _shown(value: Any) -> str:
+def _show_value(value: Any) -> str:
     return "that list" if isinstance(value, list) else str(value)
 
 
@@ -496,11 +496,11 @@ class _Includer:
             return load_named(self.read(file), file)
         except RejectedError as error:
             raise RejectedError(
-                [*source.found, *(_included(finding, at) for finding in error.findings)]
+                [*source.found, *(_with_include(finding, at) for finding in error.findings)]
             ) from None
 
 
-def _included(found: Finding, at: Span) -> Finding:
+def _with_include(found: Finding, at: Span) -> Finding:
     """Return the finding about an included file, with the place that includes it."""
     return replace(found, notes=(*found.notes, Note("included here", at)))
 

@@ -18,12 +18,12 @@ from tfcompose.foundation.geometry import (
     Quaternion,
     Vector,
     norm,
-    normalised,
+    normalise,
     quat_from_axis_angle,
     quat_from_matrix,
     quat_from_rpy,
 )
-from tfcompose.foundation.units import Angle, Length, Number, Rate, refused
+from tfcompose.foundation.units import Angle, Length, Number, Rate, invalid
 from tfcompose.spec.language.spec import Checked, Entry, Spec, key, several
 from tfcompose.spec.language.values import (
     Axis,
@@ -65,10 +65,10 @@ def has_unit_length(quat_xyzw: Quaternion) -> Quaternion:
     advice = "the order is x, y, z, w"
     if length:
         advice = (
-            f"normalised it is [{', '.join(f'{part:.6g}' for part in normalised(quat_xyzw))}];"
+            f"normalised it is [{', '.join(f'{part:.6g}' for part in normalise(quat_xyzw))}];"
             f" {advice}"
         )
-    raise refused("TF402", f"the quaternion has length {length:.6g}, not 1", advice)
+    raise invalid("TF402", f"the quaternion has length {length:.6g}, not 1", advice)
 
 
 def is_rotation(rows: Matrix) -> Matrix:
@@ -85,11 +85,11 @@ def is_rotation(rows: Matrix) -> Matrix:
         message = (
             f"the matrix is not a rotation: its rows are not orthonormal (off by {worst:.3g})"
         )
-        raise refused("TF403", message, "three rows; column i is the child's axis i in the parent")
+        raise invalid("TF403", message, "three rows; column i is the child's axis i in the parent")
     (a, b, c), (d, e, f), (g, h, i) = rows
     if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
         advice = "frames are right-handed; one axis is flipped"
-        raise refused("TF403", "the matrix mirrors: its determinant is -1", advice)
+        raise invalid("TF403", "the matrix mirrors: its determinant is -1", advice)
     return rows
 
 
@@ -197,7 +197,7 @@ class Rotated(Checked):
         if self.rpy is not None:
             return quat_from_rpy(*self.rpy)
         if self.quat_xyzw is not None:
-            return normalised(self.quat_xyzw)
+            return normalise(self.quat_xyzw)
         if self.axis_angle is not None:
             return quat_from_axis_angle(self.axis_angle.axis, self.axis_angle.angle)
         return quat_from_matrix(self.matrix) if self.matrix is not None else None
@@ -211,11 +211,11 @@ class Posed(Rotated):
 
 def _each_once(names: Texts) -> Texts:
     if not names:
-        raise refused("TF103", "an empty list names no parent", "name the parent frame")
+        raise invalid("TF103", "an empty list names no parent", "name the parent frame")
     twice = next((index for index, name in enumerate(names) if name in names[:index]), None)
     if twice is not None:
         raise several(
-            ((twice,), refused("TF106", f"{names[twice]} is in the list already", "remove it"))
+            ((twice,), invalid("TF106", f"{names[twice]} is in the list already", "remove it"))
         )
     return names
 
@@ -306,7 +306,7 @@ class MountKeys(EdgeKeys):
             and not cls.model_fields["parent"].is_required()
         ):
             message = f"{name} without a parent places nothing"
-            yield (name,), refused("TF102", message, cls.NEEDS_PARENT, on_key=True, keeps=True)
+            yield (name,), invalid("TF102", message, cls.NEEDS_PARENT, on_key=True, keeps=True)
 
 
 _OF_A_POSE = ROTATIONS | {"xyz", "relative_to", "calibration"}

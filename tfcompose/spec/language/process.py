@@ -26,7 +26,7 @@ from tfcompose.foundation.units import (
     Rate,
     Size,
     Truth,
-    refused,
+    invalid,
     shown,
 )
 from tfcompose.model.plan import (
@@ -57,7 +57,7 @@ from tfcompose.model.process_keys import (
     Seconds,
     Way,
 )
-from tfcompose.spec.language.expressions import inserted
+from tfcompose.spec.language.expressions import insertable_text
 from tfcompose.spec.language.node_preset import ClaimSpec
 from tfcompose.spec.language.pose import Posed
 from tfcompose.spec.language.spec import Checked, Entry, Spec, fields_of, key, more_of, several
@@ -78,14 +78,14 @@ from tfcompose.spec.language.values import (
 from tfcompose.spec.load import Path
 
 
-def _inserted(value: Any) -> Any:
+def _insert(value: Any) -> Any:
     computed = isinstance(value, (Quantity, Truth))
     value = value.value if isinstance(value, Truth) else value
-    return inserted(value) if computed else value
+    return insertable_text(value) if computed else value
 
 
 #: A string; a computed number is written as one.
-Word = Annotated[Text, BeforeValidator(_inserted)]
+Word = Annotated[Text, BeforeValidator(_insert)]
 Words = tuple[Word, ...]
 
 
@@ -94,7 +94,7 @@ def _split(value: Any) -> Any:
     try:
         return shlex.split(value) if isinstance(value, str) else value
     except ValueError as error:
-        raise refused(
+        raise invalid(
             "TF106", f"{shown(value)} cannot be split into words: {error}", "a list of words"
         ) from None
 
@@ -113,7 +113,7 @@ def _arguments(value: Any) -> Any:
             *(
                 (
                     (name,),
-                    refused("TF103", f"expected a string or a number, got {shown(value[name])}"),
+                    invalid("TF103", f"expected a string or a number, got {shown(value[name])}"),
                 )
                 for name in wrong
             )
@@ -167,7 +167,7 @@ class Run(Checked):
             advice = f"a launch file is run: {{launch: {data.get('package', 'PACKAGE')}/{file}}}"
             yield (
                 ("executable",),
-                refused("TF106", f"{file} is a launch file, not an executable", advice),
+                invalid("TF106", f"{file} is a launch file, not an executable", advice),
             )
 
     @property
@@ -273,12 +273,12 @@ class ScheduleSpec(Checked):
             message = f"the policy {policy} has no priority"
             yield (
                 ("priority",),
-                refused("TF107", message, "policy: fifo, or rr", on_key=True, other="policy"),
+                invalid("TF107", message, "policy: fifo, or rr", on_key=True, other="policy"),
             )
         elif not is_given and policy in {"fifo", "rr"}:
             yield (
                 (),
-                refused(
+                invalid(
                     "TF102",
                     f"the policy {policy} needs a priority",
                     "for example priority: 80",
@@ -305,7 +305,7 @@ def _is_regular(value: str) -> str:
     try:
         re.compile(value)
     except (re.error, RecursionError, OverflowError) as error:
-        raise refused("TF106", f"{shown(value)} is not a regular expression: {error}") from None
+        raise invalid("TF106", f"{shown(value)} is not a regular expression: {error}") from None
     return value
 
 
@@ -348,7 +348,7 @@ class ReadySpec(Checked):
         yield from super().check(data)
         if not READY_WAYS & data.keys():
             advice = f"one of: {', '.join(sorted(READY_WAYS))}"
-            yield (), refused("TF102", "ready does not say what to wait for", advice, on_key=True)
+            yield (), invalid("TF102", "ready does not say what to wait for", advice, on_key=True)
 
 
 Ready = TypeAliasType(
@@ -544,13 +544,13 @@ class StartedSpec(Supervised):
             )
             yield (
                 ("run",),
-                refused("TF103", "the command is one string, which only a shell reads", advice),
+                invalid("TF103", "the command is one string, which only a shell reads", advice),
             )
         elif shell and run is not None and not isinstance(run, str):
             advice = "run: one string, for example 'zcat log.gz | player'"
             yield (
                 ("shell",),
-                refused(
+                invalid(
                     "TF107",
                     "shell: true, but run is not a string",
                     advice,
@@ -561,7 +561,7 @@ class StartedSpec(Supervised):
         if "component" in data and "container" not in data:
             yield (
                 ("component",),
-                refused(
+                invalid(
                     "TF102", "a component without a container", "container: NAME", on_key=True
                 ),
             )
@@ -570,7 +570,7 @@ class StartedSpec(Supervised):
                 advice = "component: PACKAGE/CLASS"
                 yield (
                     (name,),
-                    refused(
+                    invalid(
                         "TF102", f"{name} without a component", advice, on_key=True, keeps=True
                     ),
                 )

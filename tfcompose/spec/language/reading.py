@@ -58,7 +58,7 @@ class SpecRefusal:
         notes = [Note("the other one", source.at_key(self.other))] if self.other else []
         edits = [Edit(span, self.instead)] if self.instead is not None else []
         replacement = (
-            _laid_over_nothing(source, self.path)
+            _overlay_advice(source, self.path)
             if self.code == "TF102" and source.is_variant
             else ""
         )
@@ -73,7 +73,7 @@ class SpecRefusal:
         return finding(self.code, self.message, span, help=self.help, notes=notes, edits=edits)
 
 
-def _laid_over_nothing(source: Source, path: Path) -> str:
+def _overlay_advice(source: Source, path: Path) -> str:
     """Return advice for an overlay's new entry that probably means an existing one."""
     around = source.places.get(path[:-1])
     names = list(around.keys) if around else []
@@ -169,7 +169,7 @@ def _without(data: Any, paths: Iterable[Path], gone: set[Path]) -> Any:
                 break
         else:
             node[steps[-1]] = _ALL
-    return _pruned(data, tree) if tree else data
+    return _prune(data, tree) if tree else data
 
 
 #: Marks what goes as a whole.
@@ -191,15 +191,15 @@ def _existing(data: Any, path: Path) -> Path:
     return path[:end]
 
 
-def _pruned(data: Any, tree: dict[Any, Any]) -> Any:
+def _prune(data: Any, tree: dict[Any, Any]) -> Any:
     if isinstance(data, list):
         items = list(data)
         for index in tree.keys() & set(range(len(items))):
-            items[index] = _pruned(items[index], tree[index])
+            items[index] = _prune(items[index], tree[index])
         return items
     kept = {name: item for name, item in data.items() if tree.get(name) is not _ALL}
     for name in tree.keys() & kept.keys():
-        kept[name] = _pruned(kept[name], tree[name])
+        kept[name] = _prune(kept[name], tree[name])
     return kept
 
 
@@ -249,7 +249,7 @@ def _unknown_key(
         (absent(name, "key") if len(path) == 1 else "")
         or usual
         or (f"did you mean {slip}?" if slip else "")
-        or _indented_too_little(path, around, known)
+        or _indentation_advice(path, around, known)
     )
     if not advice:
         listing = f"known here: {', '.join(known)}"
@@ -274,7 +274,7 @@ def _is_a_section(model: type[Spec], path: Path) -> bool:
     return len(path) == 3 and path[1] in fields_of(model) and path[0] != "profiles"  # noqa: PLR2004 (section, entry, key)
 
 
-def _indented_too_little(path: Path, around: dict[str, Any], known: list[str]) -> str:
+def _indentation_advice(path: Path, around: dict[str, Any], known: list[str]) -> str:
     """Return the help for a key that follows a known one without a value.
 
     It probably belongs to that.

@@ -14,12 +14,12 @@ from tfcompose.foundation.units import Measure
 from tfcompose.foundation.yaml_text import flow
 from tfcompose.spec.language.json_schema import model_of
 from tfcompose.spec.language.spec import (
-    described,
+    describe_key,
     examples_of,
     fields_of,
     is_mapping,
     measure_of,
-    unnamed,
+    unwrap_named_type,
     walk,
 )
 from tfcompose.spec.language.values import InARow
@@ -79,12 +79,14 @@ def key_page(path: str) -> str | None:
         field = fields_of(kind).get(steps[-1])
         if field is not None:
             default, example = _default(field), _examples(field)
-            lines = [described(field), "", f"- type: {_type(field.rebuild_annotation())}"]
+            lines = [describe_key(field), "", f"- type: {_type(field.rebuild_annotation())}"]
             lines += [f"- default: {default}"] * bool(default) + [f"- example: {example}"] * bool(
                 example
             )
             found.setdefault(tuple(lines), []).append(_place((*at, steps[-1])))
-    lines = [line for about, at in found.items() for line in (f"## {_listed(at)}", "", *about, "")]
+    lines = [
+        line for about, at in found.items() for line in (f"## {_list_places(at)}", "", *about, "")
+    ]
     sections = [(at, kind) for at, kind in places if at[-1] != "*" and _is_at(at, steps)]
     sections += [(at, kind) for at, kind in places if at[-1] == "*" and _is_at(at[:-1], steps)]
     sections = sections or [(at, kind) for at, kind in places if steps == (_title(kind).lower(),)]
@@ -127,7 +129,7 @@ def _place(pattern: Pattern) -> str:
     return ".".join(pattern).replace("*", "NAME")
 
 
-def _listed(places: list[str]) -> str:
+def _list_places(places: list[str]) -> str:
     more = [f"{len(places) - _MOST_PLACES} more places"] if len(places) > _MOST_PLACES else []
     return ", ".join([*places[:_MOST_PLACES], *more])
 
@@ -154,7 +156,7 @@ _MOST_PLACES = 6
 def _places(places: list[str]) -> list[str]:
     """Return where a mapping stands; the whole file needs no word."""
     named = [f"`{place}`" for place in places if place]
-    return [f"At {_listed(named)}.", ""] if named else []
+    return [f"At {_list_places(named)}.", ""] if named else []
 
 
 def _row(name: str, field: FieldInfo) -> str:
@@ -162,7 +164,7 @@ def _row(name: str, field: FieldInfo) -> str:
         f"`{name}`",
         _type(field.rebuild_annotation()),
         _default(field),
-        described(field),
+        describe_key(field),
         _examples(field),
     )
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
@@ -187,10 +189,10 @@ def _default(field: FieldInfo) -> str:
 
 def _type(annotation: Any) -> str:
     """Return a type in words: what it is called, of what it is a list, or its choices."""
-    annotation = unnamed(annotation)
+    annotation = unwrap_named_type(annotation)
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _annotated(inner[0], inner[1:])
+        return _annotate(inner[0], inner[1:])
     if origin in {Union, types.UnionType}:
         return " or ".join(dict.fromkeys(_type(kind) for kind in inner if kind is not type(None)))
     if origin is Literal:
@@ -210,13 +212,13 @@ def _type(annotation: Any) -> str:
     }[annotation]
 
 
-def _annotated(inner: Any, metadata: tuple[Any, ...]) -> str:
+def _annotate(inner: Any, metadata: tuple[Any, ...]) -> str:
     for annotation in metadata:
         if isinstance(annotation, Measure):
             return "number" if not annotation.unit else "quantity"
         if isinstance(annotation, InARow):
             return f"list of {annotation.count} {_plural(_type(get_args(inner)[0]))}"
-        other = unnamed(getattr(annotation, "json_schema_input_type", None))
+        other = unwrap_named_type(getattr(annotation, "json_schema_input_type", None))
         if get_origin(other) in {Union, types.UnionType, Literal}:
             return _type(other)
     return _type(inner)

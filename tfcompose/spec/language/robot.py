@@ -21,8 +21,8 @@ from tfcompose.foundation.units import (
     Truth,
     UnitError,
     example,
+    invalid,
     quantity,
-    refused,
     shown,
     with_article,
 )
@@ -75,7 +75,7 @@ class FrameSpec(MountKeys):
             )
             yield (
                 ("owner",),
-                refused(
+                invalid(
                     "TF102", "owner without a parent: a root has no edge", advice, on_key=True
                 ),
             )
@@ -97,7 +97,7 @@ class Mimic(Spec):
 
 def _only_one(value: Any) -> Any:
     if isinstance(value, list):
-        raise refused("TF103", f"expected a string, got {shown(value)}", "a joint has one parent")
+        raise invalid("TF103", f"expected a string, got {shown(value)}", "a joint has one parent")
     return [value]
 
 
@@ -169,14 +169,14 @@ def _wrong_unit(
         moves = "slides" if _SLIDES[kind] else "turns"
         what = value if isinstance(value, str) else with_article(other)
         message = f"a {kind} joint {moves}: {path[-1]} cannot be {what}"
-        yield path, refused("TF104", message, f"for example {example(wanted)}", keeps=True)
+        yield path, invalid("TF104", message, f"for example {example(wanted)}", keeps=True)
 
 
 def _scalar(value: Any) -> str:
     """Return the string that stands in XML: a parameter has no type there."""
     if isinstance(value, Quantity):
         if value.dimension != NUMBER:
-            raise refused("TF104", f"{shown(value)} has a unit, and a parameter has none")
+            raise invalid("TF104", f"{shown(value)} has a unit, and a parameter has none")
         value = value.value
     value = value.value if isinstance(value, Truth) else value
     if isinstance(value, bool):
@@ -185,7 +185,7 @@ def _scalar(value: Any) -> str:
         return str(value)
     if isinstance(value, float):
         return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)  # noqa: PLR2004 (exact)
-    raise refused("TF103", f"expected a string, a number, true or false, got {shown(value)}")
+    raise invalid("TF103", f"expected a string, a number, true or false, got {shown(value)}")
 
 
 #: A parameter in XML, as the string that stands there.
@@ -199,7 +199,7 @@ def _by_name(value: Any) -> Any:
     wrong = [index for index, name in enumerate(value) if not isinstance(name, str)]
     if wrong:
         got = {index: f"expected a string, got {shown(value[index])}" for index in wrong}
-        raise several(*(((index,), refused("TF103", message)) for index, message in got.items()))
+        raise several(*(((index,), invalid("TF103", message)) for index, message in got.items()))
     return {name: {} for name in value}
 
 
@@ -249,7 +249,7 @@ class HardwareSpec(Entry):
             message = f"an actuator has one joint, and this one has {len(joints)}"
             yield (
                 (),
-                refused(
+                invalid(
                     "TF106", message, "type: system takes any number", on_key=True, keeps=True
                 ),
             )
@@ -265,7 +265,7 @@ class HardwareSpec(Entry):
                     )
                     yield (
                         (section, name, "command"),
-                        refused("TF106", "a sensor takes no commands", advice, keeps=True),
+                        invalid("TF106", "a sensor takes no commands", advice, keeps=True),
                     )
 
 
@@ -429,7 +429,7 @@ class PartSpec(MountKeys):
                 advice = "give spec, urdf or xacro"
                 yield (
                     (),
-                    refused("TF102", "a part without a robot", advice, on_key=True, keeps=True),
+                    invalid("TF102", "a part without a robot", advice, on_key=True, keeps=True),
                 )
             return
         for name in dict.fromkeys(
@@ -438,12 +438,12 @@ class PartSpec(MountKeys):
             others = [other for other, names in PART_KINDS.items() if name in names]
             if kind not in others:
                 message = f"{name} goes with {' and '.join(others)}, not with {kind}"
-                yield (name,), refused("TF107", message, on_key=True, keeps=True)
+                yield (name,), invalid("TF107", message, on_key=True, keeps=True)
         for name in _MACRO_KEYS:
             if name in data and "macro" not in data:
                 yield (
                     (name,),
-                    refused(
+                    invalid(
                         "TF102", f"{name} without a macro", "macro: NAME", on_key=True, keeps=True
                     ),
                 )
@@ -456,7 +456,7 @@ class PartSpec(MountKeys):
             what = "a robot file" if suffix_kind == "spec" else f"a {ending[1:]} file"
             yield (
                 (kind,),
-                refused("TF106", f"{file} is {what}", f"{suffix_kind}: instead of {kind}:"),
+                invalid("TF106", f"{file} is {what}", f"{suffix_kind}: instead of {kind}:"),
             )
 
 

@@ -9,8 +9,8 @@ from tfcompose.foundation.units import (
     Number,
     Quantity,
     UnitError,
+    invalid,
     quantity,
-    refused,
     shown,
 )
 from tfcompose.spec.language.spec import Spec, key
@@ -26,7 +26,7 @@ def _percent(value: Any) -> Any:
         try:
             return Quantity(quantity(number).value / 100, NUMBER)
         except UnitError as error:
-            raise refused("TF103", f"{shown(value)} is not a percentage", error.advice) from None
+            raise invalid("TF103", f"{shown(value)} is not a percentage", error.advice) from None
     return value
 
 
@@ -37,15 +37,15 @@ def _limit(value: Any) -> Quantity:
         try:
             value = quantity(value)
         except UnitError as error:
-            raise refused("TF104" if error.unit else "TF103", str(error), error.advice) from None
+            raise invalid("TF104" if error.unit else "TF103", str(error), error.advice) from None
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         value = Quantity(float(value))
     if not isinstance(value, Quantity):
-        raise refused(
+        raise invalid(
             "TF103", f"{shown(value)} is not a limit", "for example 30 %, 45 deg or 5 cm"
         )
     if value.value < 0:
-        raise refused("TF106", "a limit is not less than 0")
+        raise invalid("TF106", "a limit is not less than 0")
     return value
 
 
@@ -53,7 +53,7 @@ def _part(value: Any) -> Any:
     value = _percent(value)
     number = value.value if isinstance(value, Quantity) else value
     if isinstance(number, (int, float)) and not 0 <= number <= 1:
-        raise refused(
+        raise invalid(
             "TF106", f"{shown(value)} is not a part of the zone", "for example 90 %, or 0.9"
         )
     return value

@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from tfcompose.foundation.units import Measure, refused
+from tfcompose.foundation.units import Measure, invalid
 from tfcompose.spec.language.values import Condition, Loops
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Checked(Spec):
                     message = f"{name} and {first} exclude each other"
                     yield (
                         (name,),
-                        refused("TF107", message, advice, on_key=True, other=first, keeps=True),
+                        invalid("TF107", message, advice, on_key=True, other=first, keeps=True),
                     )
 
     @model_validator(mode="wrap")
@@ -124,7 +124,7 @@ def several(
     ]
     for problem in also.errors(include_url=False) if also else ():
         kind, context = problem["type"], problem.get("ctx", {})
-        error = refused(kind, **context) if kind.startswith("TF") else kind
+        error = invalid(kind, **context) if kind.startswith("TF") else kind
         lines.append(
             {"type": error, "loc": problem["loc"], "input": problem["input"], "ctx": context}
         )
@@ -161,7 +161,7 @@ def inherited(of: type, name: str) -> Any:
     )
 
 
-def unnamed(annotation: Any) -> Any:
+def unwrap_named_type(annotation: Any) -> Any:
     """Return what a named type stands for.
 
     Pydantic makes its schema once, whichever models share it.
@@ -171,7 +171,7 @@ def unnamed(annotation: Any) -> Any:
 
 def kinds_of(annotation: Any) -> Iterator[Any]:
     """Yield the types that an annotation allows, without ``None``, ``Annotated`` and unions."""
-    annotation = unnamed(annotation)
+    annotation = unwrap_named_type(annotation)
     origin = get_origin(annotation)
     if origin is Annotated:
         yield from kinds_of(get_args(annotation)[0])
@@ -224,7 +224,7 @@ def below(annotation: Any, step: str | int) -> Any:
 
 def measure_of(annotation: Any) -> Measure | None:
     """Return the measure of the number or numbers that an annotation allows, or None."""
-    annotation = unnamed(annotation)
+    annotation = unwrap_named_type(annotation)
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
         return next(
@@ -269,7 +269,7 @@ def walk(annotation: Any, pattern: Pattern = ()) -> Iterator[tuple[Pattern, Any]
             yield from walk(get_args(kind)[0], pattern)
 
 
-def described(field: FieldInfo) -> str:
+def describe_key(field: FieldInfo) -> str:
     """Return what a key means, with its unit."""
     measure = measure_of(field.rebuild_annotation())
     unit = f" ({measure.about})" if measure and measure.unit else ""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Finding, RejectedError, without_duplicates
 from tfcompose.spec.language.args import Given
-from tfcompose.spec.language.conditions import unfolded
+from tfcompose.spec.language.conditions import unfold
 from tfcompose.spec.language.overlay import is_for_later
 from tfcompose.spec.language.preset import PresetSpec, wrong_names
 from tfcompose.spec.language.reading import SpecRefusal, read
@@ -89,7 +89,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     """
     variables = Variables(source, given)
     idle = unused(source.data, aside)
-    done = unfolded(source, variables)
+    done = unfold(source, variables)
     source = done.source
     nulls = _nulls(source)
     data = variables.compute(source.data, done.scopes)

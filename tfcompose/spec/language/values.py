@@ -24,7 +24,7 @@ from tfcompose.foundation.units import (
     Quantity,
     Size,
     Truth,
-    refused,
+    invalid,
     shown,
 )
 
@@ -52,7 +52,7 @@ class Matches:
         """
         if re.fullmatch(self.pattern, value):
             return value
-        raise refused("TF106", f"{shown(value)} is not {self.means}")
+        raise invalid("TF106", f"{shown(value)} is not {self.means}")
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: Callable[[Any], CoreSchema]
@@ -108,7 +108,7 @@ class InARow:
         """
         if isinstance(value, list) and len(value) == self.count:
             return value
-        raise refused(
+        raise invalid(
             "TF103", f"expected a list of {self.count}, got {shown(value)}", self._advice(value)
         )
 
@@ -184,7 +184,7 @@ def _is_true(value: Any) -> bool:
     if _truth(value) is True:
         return True
     is_meant = isinstance(value, str) and value.lower() in {"yes", "on"}
-    raise refused(
+    raise invalid(
         "TF106",
         f"expected true, got {shown(value)}",
         "write true" if is_meant else "write true, or remove the key",
@@ -193,7 +193,7 @@ def _is_true(value: Any) -> bool:
 
 def _names_a_variable(name: str) -> str:
     if not name or "=" in name:
-        raise refused("TF106", f"{name!r} cannot name a variable")
+        raise invalid("TF106", f"{name!r} cannot name a variable")
     return name
 
 
@@ -204,7 +204,7 @@ def _with_opacity(value: Any) -> Any:
             advice = did_you_mean(
                 value, COLOURS, f"[0.2, 0.4, 0.8], or one of: {', '.join(COLOURS)}"
             )
-            raise refused("TF106", f"{shown(value)} is not a colour", advice)
+            raise invalid("TF106", f"{shown(value)} is not a colour", advice)
         return [*COLOURS[value], 1.0]
     return [*value, 1.0] if isinstance(value, list) and len(value) == len(_AXES) else value
 
@@ -212,7 +212,7 @@ def _with_opacity(value: Any) -> Any:
 def _colour_part(value: float) -> float:
     if 0 <= value <= 1:
         return value
-    raise refused(
+    raise invalid(
         "TF106",
         f"{shown(value)} is not a colour component: 0 to 1",
         "divide values up to 255 by 255",
@@ -223,7 +223,7 @@ def _has_direction(axis: Vector) -> Vector:
     length = norm(axis)
     if length > SMALLEST:
         return axis
-    raise refused(
+    raise invalid(
         "TF106", f"an axis of length {length:g} has no direction", "for example [0, 0, 1]"
     )
 
@@ -231,7 +231,7 @@ def _has_direction(axis: Vector) -> Vector:
 def _is_visible(factors: Vector) -> Vector:
     if all(abs(factor) > SMALLEST for factor in factors):
         return factors
-    raise refused("TF106", "a scale of 0 leaves nothing of the mesh", "for example 0.001")
+    raise invalid("TF106", "a scale of 0 leaves nothing of the mesh", "for example 0.001")
 
 
 #: Colours that have names, in red, green and blue: those of HTML 4 and three that robots often

@@ -59,7 +59,7 @@ def _names(value: Any) -> Iterator[str]:
             yield from _names(item)
 
 
-def _filled(value: Any, path: Path, variables: Variables) -> Any:
+def _fill_value(value: Any, path: Path, variables: Variables) -> Any:
     """Return the value with expressions computed.
 
     The same object where it holds none, so that aliases stay one.
@@ -72,7 +72,7 @@ def _filled(value: Any, path: Path, variables: Variables) -> Any:
     for step, item in value.items() if isinstance(value, dict) else enumerate(value):
         kind = type(item)
         if kind is not float and (kind is dict or kind is list or (kind is str and "${" in item)):
-            new = _filled(item, (*path, step), variables)
+            new = _fill_value(item, (*path, step), variables)
             if new is not item:
                 filled[step] = new
     if not filled:
@@ -155,7 +155,7 @@ class Variables:
         """
         self.scopes = scopes
         filled = {
-            key: _filled(value, (key,), self) for key, value in data.items() if key != "vars"
+            key: _fill_value(value, (key,), self) for key, value in data.items() if key != "vars"
         }
         return filled | ({"vars": data["vars"]} if "vars" in data else {})
 

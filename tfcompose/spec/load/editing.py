@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.foundation.findings import Edit, Span, edited, line_starts
+from tfcompose.foundation.findings import Edit, Span, apply_edits, line_starts
 from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
@@ -136,15 +136,15 @@ def with_value(text: str, file: str, path: Path, values: Mapping[str, str | None
         first = place.keys[keys.own[0]].span
         at = Span(file, first.line, 1, first.line, 1)
         if depth == 0:
-            return _ended(text) + _block(path, shown, 0)
+            return _with_newline(text) + _block(path, shown, 0)
         edits.append(Edit(at, _block(path[depth:], shown, indent)))
     elif rest:
         edits.append(keys.insertion(rest))
-    result = edited(text, edits)
+    result = apply_edits(text, edits)
     return text if result is None else result
 
 
-def _ended(text: str) -> str:
+def _with_newline(text: str) -> str:
     return text if not text or text.endswith("\n") else f"{text}\n"
 
 

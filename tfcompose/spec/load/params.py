@@ -121,7 +121,7 @@ class _ParamsReader:
 
     def _nodes(self, mapping: yaml.MappingNode, above: str) -> None:
         for key, value in mapping.value:
-            self._bound(key)
+            self._bound_depth(key)
             if not isinstance(key, yaml.ScalarNode) or not isinstance(value, yaml.MappingNode):
                 at, advice = _span(self.file, key), f"/NODE: {{{PARAMETERS}: {{…}}}}"
                 self.result.found.append(
@@ -141,7 +141,7 @@ class _ParamsReader:
         return {str(key.value): self._value(value) for key, value in node.value}
 
     def _value(self, node: yaml.Node) -> Any:
-        self._bound(node)
+        self._bound_depth(node)
         with self._reading(node):
             if isinstance(node, yaml.MappingNode):
                 return self._mapping(node)
@@ -158,7 +158,7 @@ class _ParamsReader:
         yield
         self._open.discard(id(node))
 
-    def _bound(self, node: yaml.Node) -> None:
+    def _bound_depth(self, node: yaml.Node) -> None:
         self.count += 1
         if self.count > MOST_VALUES:
             at = _span(self.file, node)

@@ -83,14 +83,14 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
 def _number(tag: str, text: str) -> int | float:
     if tag == INT and text[:2] in {"0o", "0x"}:
         number = int(text, 0)  # Python bounds the digits of decimal numbers only
-        return number if len(text) < _MOST_DIGITS else _finite(_rounded(number), text)
+        return number if len(text) < _MOST_DIGITS else _finite(_to_float(number), text)
     if tag == INT and len(text) < _MOST_DIGITS:
         return int(text)
     value = NOT_FINITE.get(text.lower())
     return _finite(float(text) if value is None else value, text)
 
 
-def _rounded(number: int) -> float:
+def _to_float(number: int) -> float:
     """Return the number as a float, infinity where no float is that large."""
     try:
         return float(number)

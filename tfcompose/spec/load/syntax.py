@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from tfcompose.foundation.findings import Edit, Finding, Note, Span, finding
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -275,7 +275,7 @@ def _below_a_value(fault: _Fault) -> _Diagnosis | None:
     if not _PAIR.match(fault.line(above)) or indent <= left:
         return None
     message = (
-        f"indented by {counted(indent, 'space')}, below a line with a value that is indented by"
+        f"indented by {plural(indent, 'space')}, below a line with a value that is indented by"
         f" {left}"
     )
     return _Diagnosis(
@@ -294,7 +294,7 @@ def _between_levels(fault: _Fault) -> _Diagnosis | None:
     line, left = fault.began
     if fault.at[1] == left:
         return None
-    message = f"indented by {counted(fault.at[1], 'space')}, and what it belongs to by {left}"
+    message = f"indented by {plural(fault.at[1], 'space')}, and what it belongs to by {left}"
     advice = f"begin it in column {left + 1}, as line {line + 1} does"
     return _Diagnosis(fault.at, message, advice, has_beginning=True)
 

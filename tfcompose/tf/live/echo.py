@@ -88,7 +88,7 @@ class _Listened:
     def take(self, decoder: Decoder, data: TFData) -> None:
         self.messages += 1
         try:
-            rows = self.bounds.kept(decoder.rows(data.received.data), data.received.gid)
+            rows = self.bounds.keep_rows(decoder.rows(data.received.data), data.received.gid)
             rejected = self.buffer.insert(rows, static=data.static)
         except ValueError:
             return

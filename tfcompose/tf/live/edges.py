@@ -12,7 +12,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.geometry import Pose, norm
-from tfcompose.foundation.tree import below, children_of, drawn, loops, trees
+from tfcompose.foundation.tree import below, children_of, draw_tree, loops, trees
 from tfcompose.tf.live.arrivals import Arrivals, Timing
 from tfcompose.tf.live.flood import MOST_EDGES, MOST_OF_ONE
 from tfcompose.tf.live.publishers import Publisher, Publishers
@@ -486,7 +486,10 @@ def forest(
 
     grown = [
         Tree(
-            (branch(root), *(branch(frame, lines) for lines, frame in drawn(children, root, str)))
+            (
+                branch(root),
+                *(branch(frame, lines) for lines, frame in draw_tree(children, root, str)),
+            )
         )
         for root in trees(zip(parents.values(), parents, strict=True))
     ]

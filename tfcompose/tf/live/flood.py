@@ -70,7 +70,7 @@ class EdgeBounds:
         """Return whether the publisher has sent more edges than are kept."""
         return gid in self.beyond
 
-    def kept(self, rows: Iterable[Row], gid: bytes | None) -> Iterator[Row]:
+    def keep_rows(self, rows: Iterable[Row], gid: bytes | None) -> Iterator[Row]:
         """Yield the rows of a message whose edges are kept."""
         known = self._known.setdefault(gid, set())
         is_full = gid is not None and len(known) >= MOST_OF_ONE

@@ -92,7 +92,7 @@ def writers(node: Node, topic: str) -> list[GraphPublisher]:
             )
             for endpoint in found
         ]
-    return _sorted(node.get_publishers_info_by_topic(topic))
+    return _sort_publishers(node.get_publishers_info_by_topic(topic))
 
 
 def publishing_nodes(node: Node, topic: str) -> list[str]:
@@ -105,10 +105,10 @@ def writers_unmapped(node: Node, topic: str) -> list[GraphPublisher]:
 
     It is asked for by its DDS name, ``rt/…``; an rmw without DDS shows nobody.
     """
-    return _sorted(node.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True))
+    return _sort_publishers(node.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True))
 
 
-def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[GraphPublisher]:
+def _sort_publishers(infos: Iterable[TopicEndpointInfo]) -> list[GraphPublisher]:
     return sorted(map(_writer, infos), key=lambda writer: (writer.node, writer.gid))
 
 

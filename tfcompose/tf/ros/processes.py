@@ -13,7 +13,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation import procfs
-from tfcompose.foundation.text import masked
+from tfcompose.foundation.text import mask_invisible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -34,7 +34,10 @@ def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
         try:
             if not procfs.has_loaded(pid, _LIBRARY):
                 continue
-            variables, command = ros_variables(procfs.environ(pid)), _shown(procfs.argv(pid))
+            variables, command = (
+                ros_variables(procfs.environ(pid)),
+                _show_command(procfs.argv(pid)),
+            )
         except OSError:  # another user's, or it has just ended
             continue
         yield pid, command, variables
@@ -142,7 +145,7 @@ def _parent(pid: int) -> int:
 
 def _command(pid: int) -> str:
     """Return the process's command line as it is shown, empty where there is none."""
-    return _shown(words_of(pid))
+    return _show_command(words_of(pid))
 
 
 def words_of(pid: int) -> list[str]:
@@ -153,6 +156,6 @@ def words_of(pid: int) -> list[str]:
         return []
 
 
-def _shown(argv: list[str]) -> str:
-    line = masked(" ".join(" ".join(argv).split()), "?")
+def _show_command(argv: list[str]) -> str:
+    line = mask_invisible(" ".join(" ".join(argv).split()), "?")
     return line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…"

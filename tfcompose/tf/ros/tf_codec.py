@@ -352,7 +352,7 @@ class Decoder:
             rows = layout.rows(data)
             if rows is not None:
                 return rows
-        return self._remembered(key, data).rows(data) or ()
+        return self._remember(key, data).rows(data) or ()
 
     def stamps(self, data: bytes) -> tuple[MessageLayout, Sequence[int]]:
         """Return a TFMessage's layout with its names, and its stamps in nanoseconds.
@@ -365,10 +365,10 @@ class Decoder:
             stamps = layout.stamps(data)
             if stamps is not None:
                 return layout, stamps
-        layout = self._remembered(key, data)
+        layout = self._remember(key, data)
         return layout, layout.stamps(data) or ()
 
-    def _remembered(self, key: tuple[int, bytes, bytes], data: bytes) -> MessageLayout:
+    def _remember(self, key: tuple[int, bytes, bytes], data: bytes) -> MessageLayout:
         layout = MessageLayout(data)
         self.read_anew += 1
         if len(data) > _MOST_BYTES:

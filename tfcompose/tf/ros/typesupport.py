@@ -244,7 +244,7 @@ def own_type() -> Any:
 
 def _build() -> tuple[TypeSupport, list[Any]]:
     """Return the type support and all that it points to, which must live as long."""
-    stamped = _stamped()
+    stamped = _stamped_typesupport()
     fast, introspection = _other(stamped, _FASTRTPS), _other(stamped, _INTROSPECTION)
     callbacks, members = _callbacks(fast), _members(introspection)
     description, described = _description(description_of(fast, ctypes.addressof(fast)))
@@ -308,7 +308,7 @@ def _getter(structure: ctypes.Structure) -> Any:
     return Getter(lambda _: where)
 
 
-def _stamped() -> int:
+def _stamped_typesupport() -> int:
     """Return the address of TransformStamped's type support, after a layout check.
 
     It is taken as ``geometry_msgs.msg`` takes it, but without that, which imports numpy for its

@@ -254,7 +254,7 @@ def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
     return sine * angles, cosine
 
 
-def moved_points(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
+def transform_points_array(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
     """Return points in the parent's frame from points in the child's.
 
     ``points`` has the shape (…, 3), in metres; the result has it too. float32 and float64 stay
@@ -283,7 +283,7 @@ def rotation_and_translation(pose: PoseTuple) -> tuple[NDArray[np.float64], NDAr
     return np.array(matrix_from_quat((qx, qy, qz, qw))).T.copy(), np.array((x, y, z))
 
 
-def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
+def transform_cloud(cloud: Any, pose: PoseTuple) -> Any:
     """Return a copy of the cloud with x, y and z moved; its header is the cloud's own.
 
     Raises:

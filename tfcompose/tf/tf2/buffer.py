@@ -326,10 +326,10 @@ class Buffer(BufferCore, BufferInterface):
             ImportError: if there is no numpy.
         """
         require_numpy()
-        from tfcompose.tf.tf2.arrays import moved_points  # noqa: PLC0415 (numpy is optional)
+        from tfcompose.tf.tf2.arrays import transform_points_array  # noqa: PLC0415 (numpy is optional)
 
         pose, _ = self._pose(target, source, nanoseconds(stamp))
-        return moved_points(cloud, pose)
+        return transform_points_array(cloud, pose)
 
     def lookup_many(
         self,

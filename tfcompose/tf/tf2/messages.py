@@ -221,7 +221,7 @@ def _by_fields() -> Maker:
 
 def do_transform_point(point: Any, transform: Any) -> Any:
     """Return a PointStamped in the transform's frame."""
-    moved = _headed(point, transform)
+    moved = _with_header_of(point, transform)
     to = moved.point
     to.x, to.y, to.z = product(pose_of(transform), (to.x, to.y, to.z, 0.0, 0.0, 0.0, 1.0))[:3]
     return moved
@@ -229,7 +229,7 @@ def do_transform_point(point: Any, transform: Any) -> Any:
 
 def do_transform_vector3(vector: Any, transform: Any) -> Any:
     """Return a Vector3Stamped in the transform's frame: turned, and not moved."""
-    moved = _headed(vector, transform)
+    moved = _with_header_of(vector, transform)
     to, rotation = moved.vector, (0.0, 0.0, 0.0, *pose_of(transform)[3:])
     to.x, to.y, to.z = product(rotation, (to.x, to.y, to.z, 0.0, 0.0, 0.0, 1.0))[:3]
     return moved
@@ -257,7 +257,7 @@ def do_transform_pose(pose: Any, transform: Any) -> Any:
 
 def do_transform_pose_stamped(pose: Any, transform: Any) -> Any:
     """Return a PoseStamped in the transform's frame."""
-    moved = _headed(pose, transform)
+    moved = _with_header_of(pose, transform)
     moved.pose = do_transform_pose(pose.pose, transform)
     return moved
 
@@ -267,7 +267,7 @@ def do_transform_pose_with_covariance_stamped(pose: Any, transform: Any) -> Any:
 
     The covariances' axes are turned along.
     """
-    moved = _headed(pose, transform)
+    moved = _with_header_of(pose, transform)
     moved.pose.pose = do_transform_pose(pose.pose.pose, transform)
     moved.pose.covariance = transform_covariance(pose.pose.covariance, transform)
     return moved
@@ -304,14 +304,14 @@ def transform_points(point_cloud: ArrayLike, transform: Any) -> NDArray[Any]:
         ImportError: if there is no numpy.
     """
     require_numpy()
-    from tfcompose.tf.tf2.arrays import moved_points  # noqa: PLC0415 (numpy is optional)
+    from tfcompose.tf.tf2.arrays import transform_points_array  # noqa: PLC0415 (numpy is optional)
 
-    return moved_points(point_cloud, pose_of(transform))
+    return transform_points_array(point_cloud, pose_of(transform))
 
 
 def do_transform_polygon_stamped(polygon: Any, transform: Any) -> Any:
     """Return a PolygonStamped in the transform's frame."""
-    moved, pose = _headed(polygon, transform), pose_of(transform)
+    moved, pose = _with_header_of(polygon, transform), pose_of(transform)
     for corner in moved.polygon.points:
         corner.x, corner.y, corner.z = product(
             pose, (corner.x, corner.y, corner.z, 0.0, 0.0, 0.0, 1.0)
@@ -332,9 +332,9 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
             cloud claims to have.
     """
     require_numpy()
-    from tfcompose.tf.tf2.arrays import moved_cloud  # noqa: PLC0415 (numpy is optional)
+    from tfcompose.tf.tf2.arrays import transform_cloud  # noqa: PLC0415 (numpy is optional)
 
-    moved = moved_cloud(cloud, pose_of(transform))
+    moved = transform_cloud(cloud, pose_of(transform))
     moved.header = _copied_with_header(cloud.header, cloud.header.stamp)
     moved.header.frame_id = getattr(transform, "header", cloud.header).frame_id
     return moved
@@ -379,7 +379,7 @@ def _copied_with_header(headed: Any, stamp: Any) -> Any:
     return deepcopy(headed, {} if hasattr(stamp, "sec") else {id(stamp): stamp})
 
 
-def _headed(message: Any, transform: Any) -> Any:
+def _with_header_of(message: Any, transform: Any) -> Any:
     """Return a copy of the message with the frame and the time of the transform."""
     copied = _copied_with_header(message, message.header.stamp)
     copied.header.frame_id, stamp_ns = (

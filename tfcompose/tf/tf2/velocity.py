@@ -62,7 +62,7 @@ def mean_velocity(
     ]
     carried = _cross(angular, (arm[0], arm[1], arm[2]))
     linear = [(b - a) / seconds + c for a, b, c in zip(first[:3], last[:3], carried, strict=True)]
-    return Velocity(_rotated(axes, (linear[0], linear[1], linear[2])), _rotated(axes, angular))
+    return Velocity(_rotate(axes, (linear[0], linear[1], linear[2])), _rotate(axes, angular))
 
 
 def _angular_velocity(first: PoseTuple, last: PoseTuple, seconds: float) -> Three:
@@ -76,7 +76,7 @@ def _angular_velocity(first: PoseTuple, last: PoseTuple, seconds: float) -> Thre
     return x * rate, y * rate, z * rate
 
 
-def _rotated(pose: PoseTuple, vector: Three) -> Three:
+def _rotate(pose: PoseTuple, vector: Three) -> Three:
     return product((0.0, 0.0, 0.0, *pose[3:]), (*vector, 0.0, 0.0, 0.0, 1.0))[:3]
 
 

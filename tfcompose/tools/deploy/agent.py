@@ -150,7 +150,7 @@ class Agent:
         release.
         """
         release = self._release("current")
-        shown = self._shown()
+        shown = self._show_unit()
         self.restarts = _restarts(shown)
         status = self._status(shown)
         launcher = status["robot"]["launcher"] if status["robot"] else None
@@ -249,7 +249,7 @@ class Agent:
 
     def stop(self) -> None:
         """End what runs."""
-        shown = self._shown()
+        shown = self._show_unit()
         self.trial = {"active": shown.get("ActiveState") in {"active", "activating", "reloading"}}
         if shown.get("LoadState") == "loaded":
             self._must("stop", self.unit)
@@ -282,13 +282,13 @@ class Agent:
             f"# its launcher follows release {release}\n",
         )
         try:
-            return self._followed(release, host)
+            return self._follow(release, host)
         except HostError as error:
             self.stop()
             self.start(release)
             return f"started anew: {error}"
 
-    def _followed(self, release: str, host: str) -> str:
+    def _follow(self, release: str, host: str) -> str:
         """Let the launcher follow a release.
 
         Files that are not built are the same, and where they were.
@@ -319,7 +319,7 @@ class Agent:
         end = time.monotonic() + seconds
         while not self.gone.is_set():
             left = end - time.monotonic()
-            shown = self._shown()
+            shown = self._show_unit()
             if left <= 0 or shown.get("ActiveState") == "inactive" or self._has_failed(shown):
                 break
             argv = ["wait", "--ready", "--timeout", f"{left:.1f}", "--robot", self.name]
@@ -327,7 +327,7 @@ class Agent:
             if self._tfcompose(argv, left + PROGRAM_S).returncode == 0:
                 break
             self.gone.wait(min(0.3, max(left, 0)) if time.monotonic() - begun < left else 0)
-        return self._status(self._shown())
+        return self._status(self._show_unit())
 
     def _status(self, shown: dict[str, str]) -> dict[str, Any]:
         """Return the launcher's answer, or None and a failed unit's last lines."""
@@ -398,7 +398,7 @@ class Agent:
         """Run the current release again; a ``host`` whose launcher followed another goes on."""
         if host is not None:
             with contextlib.suppress(HostError):
-                self._followed(release, host)
+                self._follow(release, host)
                 self.running = None
                 return
             self.running = None
@@ -503,7 +503,7 @@ class Agent:
                 f"systemctl {' '.join(argv)}: {_last_line(done.stderr) or done.returncode}"
             )
 
-    def _shown(self) -> dict[str, str]:
+    def _show_unit(self) -> dict[str, str]:
         argv = ("LoadState", "ActiveState", "UnitFileState", "MainPID", "NRestarts")
         lines = self._systemctl(
             "show", self.unit, f"--property={','.join(argv)}"
@@ -545,7 +545,7 @@ class Agent:
 
         It is given files below it.
         """
-        pid = self._shown().get("MainPID") or "0"
+        pid = self._show_unit().get("MainPID") or "0"
         try:
             argv = Path("/proc", pid, "cmdline").read_bytes().split(b"\0")
         except OSError:

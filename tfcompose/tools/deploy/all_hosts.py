@@ -89,20 +89,20 @@ async def _run(plan: Plan, commands: Mapping[str, list[str]], printer: _HostPrin
 
 
 async def _run_on(plan: Plan, name: str, argv: list[str], printer: _HostPrinter) -> int:
-    from tfcompose.tools.deploy.connection import ConnectedHost, connected, settings_of
+    from tfcompose.tools.deploy.connection import ConnectedHost, connect_host, settings_of
 
     host = plan.hosts[name]
-    there = await connected(name, host, settings_of(plan.robot, name, host), None)
+    there = await connect_host(name, host, settings_of(plan.robot, name, host), None)
     if not isinstance(there, ConnectedHost):
         print_findings([there], sys.stderr)
         return FAILED
     try:
-        return await _printed(there, argv, printer)
+        return await _print_output(there, argv, printer)
     finally:
         await there.close()
 
 
-async def _printed(host: ConnectedHost, argv: list[str], printer: _HostPrinter) -> int:
+async def _print_output(host: ConnectedHost, argv: list[str], printer: _HostPrinter) -> int:
     process = await host.execute(argv)
 
     async def errors() -> None:

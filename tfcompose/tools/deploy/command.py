@@ -96,7 +96,7 @@ def run(arguments: Namespace) -> int:
     robot, _ = compiled_without_errors(arguments.file, arguments)
     import asyncio
 
-    from tfcompose.tools.deploy.release import packed
+    from tfcompose.tools.deploy.release import pack_release
     from tfcompose.tools.deploy.rollout import target_of
 
     try:
@@ -110,16 +110,16 @@ def run(arguments: Namespace) -> int:
             timeout_s=arguments.timeout,
             waits=arguments.wait,
         )
-        release = None if arguments.rollback else packed(robot, wheels)
+        release = None if arguments.rollback else pack_release(robot, wheels)
         return asyncio.run(_deploy(target, release, arguments))
     except RejectedError as error:
         reject(error.findings)
 
 
 async def _deploy(target: DeployTarget, release: Release | None, arguments: Namespace) -> int:
-    from tfcompose.tools.deploy.rollout import reached
+    from tfcompose.tools.deploy.rollout import reach_hosts
 
-    async with reached(
+    async with reach_hosts(
         target, has_wheels=bool(release and release.has_wheels), report=_report
     ) as rollout:
         if found := await rollout.examine():
@@ -139,7 +139,7 @@ async def _deploy(target: DeployTarget, release: Release | None, arguments: Name
                 print(printable(line))
         changes = rollout.changes()
         if not changes:
-            return _unchanged(rollout)
+            return _report_unchanged(rollout)
         if arguments.check:
             print(
                 "\n".join(f"{name}: {line}" for name, lines in changes.items() for line in lines)
@@ -155,7 +155,7 @@ def _report(line: str) -> None:
     print(printable(line), flush=True)
 
 
-def _unchanged(rollout: Rollout) -> int:
+def _report_unchanged(rollout: Rollout) -> int:
     """Say that the hosts have the release already, and what is not live there.
 
     Exit code 1 in that case.

@@ -165,7 +165,7 @@ class ConnectedHost:
         await self._connection.wait_closed()
 
 
-async def connected(
+async def connect_host(
     name: str, host: PlanHost, settings: Settings, at: Span | None
 ) -> ConnectedHost | Finding:
     """Return the host, with its agent, or why it cannot be reached."""

@@ -107,9 +107,9 @@ class Release:
         with tarfile.open(fileobj=buffer, mode="w", format=tarfile.PAX_FORMAT) as tar:
             for path, text in self.texts.items():
                 data = text.encode()
-                yield from _added(tar, buffer, path, data, executable=False)
+                yield from _add(tar, buffer, path, data, executable=False)
             for path, file in self.copies.items():
-                yield from _added(
+                yield from _add(
                     tar, buffer, path, file.read_bytes(), executable=os.access(file, os.X_OK)
                 )
         yield buffer.getvalue()
@@ -120,7 +120,7 @@ def name_of(manifest: Mapping[str, str]) -> str:
     return digest_of(repr(sorted(manifest.items())).encode())[:NAME_LENGTH]
 
 
-def _added(
+def _add(
     tar: tarfile.TarFile, buffer: io.BytesIO, path: str, data: bytes, *, executable: bool
 ) -> Iterator[bytes]:
     entry = tarfile.TarInfo(path)
@@ -131,7 +131,7 @@ def _added(
     buffer.truncate()
 
 
-def packed(robot: Robot, wheels: Path | None = None) -> Release:
+def pack_release(robot: Robot, wheels: Path | None = None) -> Release:
     """Return the release of a right robot, whose relative paths begin in this folder.
 
     Files keep their places to each other, so that a map finds its picture, and a mesh its
@@ -181,7 +181,7 @@ def _with_named(named: Mapping[str, str]) -> list[str]:
         elif is_file(path):
             found[path.as_posix()] = None
             size += path.stat().st_size
-            waiting += _named_in(path)
+            waiting += _files_named_in(path)
         else:
             raise RejectedError([finding("TF912", f"{path} is named, and does not exist", None)])
         if len(found) + len(waiting) > MOST_FILES or size > MOST_BYTES:
@@ -197,7 +197,7 @@ def _is_hidden(path: Path) -> bool:
     return any(part.startswith(".") or part == "__pycache__" for part in path.parts)
 
 
-def _named_in(path: Path) -> list[str]:
+def _files_named_in(path: Path) -> list[str]:
     """Return the files that a file names by paths that begin in its own folder."""
     if path.suffix.lower() not in _NAMING or path.stat().st_size > _MOST_NAMING_BYTES:
         return []

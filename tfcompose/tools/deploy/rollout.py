@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.foundation.text import counted, duration, listed
+from tfcompose.foundation.text import duration, listed, plural
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.hosts import hosts_of, share_of, without_computer
 from tfcompose.tools.deploy.agent import UNIT
@@ -27,7 +27,7 @@ from tfcompose.tools.deploy.connection import (
     ConnectedHost,
     LostError,
     RefusedError,
-    connected,
+    connect_host,
     settings_of,
 )
 from tfcompose.tools.deploy.following import can_follow, same_files
@@ -309,7 +309,7 @@ class Rollout:
         await self._ask(
             share, "unpack", timeout_s=1200.0, release=release.name, wheels=release.has_wheels
         )
-        files = counted(len(release.manifest), "file")
+        files = plural(len(release.manifest), "file")
         self.report(
             f"{share.name}: release {release.name}, {files}, {(size + len(rest)) / 1e6:.1f} MB"
         )
@@ -376,7 +376,7 @@ class Rollout:
             ]
             if not missing:
                 hosts = listed([share.name for share in self.shares], NAMED_AT_MOST)
-                return f"{counted(len(self._edges()), 'edge')} live on {hosts}"
+                return f"{plural(len(self._edges()), 'edge')} live on {hosts}"
             if left <= seconds or any(state["failed"] for state in states):
                 raise RejectedError(missing)
 
@@ -525,7 +525,7 @@ class Rollout:
         return {share.name: answer for share, answer in zip(self.shares, answers, strict=True)}
 
 
-async def _probed(host: ConnectedHost) -> dict[str, Any]:
+async def _probe(host: ConnectedHost) -> dict[str, Any]:
     try:
         probe: dict[str, Any] = await host.ask("probe")
     except (LostError, RefusedError) as error:
@@ -634,7 +634,7 @@ def _settings_apart(shares: Sequence[Share], target: DeployTarget) -> Iterable[F
 
 
 @asynccontextmanager
-async def reached(
+async def reach_hosts(
     target: DeployTarget,
     has_wheels: bool,  # noqa: FBT001
     report: Callable[[str], None],
@@ -648,7 +648,7 @@ async def reached(
     connecting = []
     for name, host in target.hosts.items():
         settings = settings_of(plan.robot, name, host, system=target.system)
-        connecting.append(connected(name, host, settings, target.places.get(name)))
+        connecting.append(connect_host(name, host, settings, target.places.get(name)))
     done = await asyncio.gather(*connecting)
     hosts = [result for result in done if isinstance(result, ConnectedHost)]
     try:
@@ -656,7 +656,7 @@ async def reached(
             raise RejectedError(found)
         rollout = Rollout(target, [], report)
         for there, probe in zip(
-            hosts, await asyncio.gather(*(_probed(host) for host in hosts)), strict=True
+            hosts, await asyncio.gather(*(_probe(host) for host in hosts)), strict=True
         ):
             unit = Unit(
                 f"{plan.robot}.{there.name}",

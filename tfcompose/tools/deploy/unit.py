@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tfcompose.launcher.program import anywhere
-from tfcompose.model.systemd import quoted, sourced
+from tfcompose.model.systemd import quote, source_then_run
 
 #: How long everything on a host has to end: the launcher ends processes one after the other.
 STOP_S = 90
@@ -52,11 +52,7 @@ class Unit:
                 "Type=exec",
                 *([f"RuntimeDirectory={run}", "RuntimeDirectoryMode=0700"] if self.system else []),
                 *([f"Environment=XDG_RUNTIME_DIR=/run/{run}"] if self.system else []),
-                *(
-                    [f"Environment={quoted(f'ROS_LOG_DIR={self.base}/log')}"]
-                    if self.system
-                    else []
-                ),
+                *([f"Environment={quote(f'ROS_LOG_DIR={self.base}/log')}"] if self.system else []),
                 f"ExecStart={self._command()}",
                 "Restart=on-failure",
                 "RestartSec=2",
@@ -80,5 +76,5 @@ class Unit:
             "--no-live",
         ]
         return " ".join(
-            quoted(argument).replace("$", "$$") for argument in sourced(self.setup, argv)
+            quote(argument).replace("$", "$$") for argument in source_then_run(self.setup, argv)
         )

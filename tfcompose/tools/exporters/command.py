@@ -112,10 +112,10 @@ def run(arguments: Namespace) -> int:
     """Write the export; exit code as for ``build``."""
     from tfcompose.cli.plans import (
         PLAN,
-        built_plan,
         host_share,
         in_folder,
         is_plan,
+        read_built_plan,
         refuse_variant,
     )
     from tfcompose.launcher.fence import not_remapped
@@ -132,7 +132,7 @@ def run(arguments: Namespace) -> int:
         from tfcompose.cli.writing import build
 
         file = build(arguments)[0] / PLAN
-    plan = built_plan(file)
+    plan = read_built_plan(file)
     if arguments.host is not None:
         plan = host_share(plan, arguments.host or None, "")
     if plan.guard.mode == "strict" and arguments.kind == "launch":

@@ -12,7 +12,7 @@ import re
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.compiling import disk_of, given_by, library, overlays_of
+from tfcompose.cli.compiling import disk_of, inputs_of, library, overlays_of
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import destination
 from tfcompose.compiler.compile import Compiled, compile_robot
@@ -20,7 +20,7 @@ from tfcompose.compiler.emit import emit
 from tfcompose.foundation.findings import Span
 from tfcompose.model.plan.file import read_plan
 from tfcompose.model.plan.stock import OWN_KINDS
-from tfcompose.spec.language import Given, GivenArg, composed, profiles_in, validate, with_includes
+from tfcompose.spec.language import Given, GivenArg, compose, profiles_in, validate, with_includes
 from tfcompose.spec.language.args import as_given
 from tfcompose.spec.language.argument_uses import HOLE, names_of, uses_of
 from tfcompose.spec.language.arguments import values_that_satisfy
@@ -55,14 +55,14 @@ def collect_launch_values(
 
     ``plan`` is the built one. The robot file has no errors.
     """
-    source = composed(
+    source = compose(
         with_includes(load(read_text(arguments.file), arguments.file), read_text),
         arguments.profiles,
         overlays_of(arguments),
-        given_by(arguments),
+        inputs_of(arguments),
     )
     uses = uses_of(source)
-    validated = validate(source, profiles_in(source), given_by(arguments))
+    validated = validate(source, profiles_in(source), inputs_of(arguments))
     specs, values = validated.spec.args, validated.args
     kinds = {name: spec.kind for name, spec in specs.items()}
     _fix_conditions(uses, kinds)

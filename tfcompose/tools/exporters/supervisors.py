@@ -19,7 +19,7 @@ from tfcompose.launcher.program import anywhere
 from tfcompose.model.files import File
 from tfcompose.model.plan.middleware import middleware_variables
 from tfcompose.model.process_keys import PROCESS_KEYS, Exported
-from tfcompose.model.systemd import quoted, sourced, without_specifiers
+from tfcompose.model.systemd import quote, source_then_run, without_specifiers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
@@ -305,7 +305,7 @@ def _unit_text(plan: Plan, exported: Exported, machine: Machine, names: Mapping[
         *(["NotifyAccess=all"] if kind == "notify" else []),
         *([f"TimeoutStartSec={60 + settling_s:g}"] if kind == "notify" or settling_s else []),
         *(
-            f"Environment={quoted(f'{name}={value}')}"
+            f"Environment={quote(f'{name}={value}')}"
             for name, value in sorted(machine.env.items())
         ),
         *_logs(plan, machine),
@@ -330,10 +330,10 @@ def _logs(plan: Plan, machine: Machine) -> list[str]:
 
 
 def _exec(process: PlanProcess, machine: Machine) -> str:
-    words = sourced(
+    words = source_then_run(
         machine.setup, command_of(process, machine.python, f"{machine.folder}/plan.json")
     )
-    return " ".join(quoted(word).replace("$", "$$") for word in words)
+    return " ".join(quote(word).replace("$", "$$") for word in words)
 
 
 #: Where the plan's folder is inside a container.

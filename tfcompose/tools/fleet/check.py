@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 def check_fleet(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
     """Yield the findings of a fleet that could be read."""
-    yield from _shared_twice(fleet, source)
+    yield from _check_shared_twice(fleet, source)
     yield from _apart(fleet, source)
 
 
-def _shared_twice(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
+def _check_shared_twice(fleet: FleetSpec, source: Source) -> Iterator[Finding]:
     """Yield a finding for each frame that two edges give a parent.
 
     Lookups would jump between them.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tfcompose.foundation.findings import Finding, finding
 from tfcompose.tf.ros.tf_codec import Decoder
 from tfcompose.tf.tf2.pose_buffer import PoseBuffer
-from tfcompose.tools.fleet.session import connected
+from tfcompose.tools.fleet.session import connect_router
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -224,7 +224,7 @@ class FleetObserver:
         """Connect to a router once it is there, and listen to the robots on it."""
         while not self._ended.is_set():
             try:
-                session = connected(router)
+                session = connect_router(router)
             except ConnectionError:
                 self._ended.wait(_RETRY_S)
                 continue

@@ -11,7 +11,7 @@ import zenoh
 _CONNECT_MS = 1000
 
 
-def connected(router: str) -> Any:
+def connect_router(router: str) -> Any:
     """Return a client's session with the router.
 
     It connects again by itself, and has to be closed.

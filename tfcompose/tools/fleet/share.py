@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.tf.ros.tf_codec import Decoder, SentTransform, encode
-from tfcompose.tools.fleet.session import connected
+from tfcompose.tools.fleet.session import connect_router
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -56,7 +56,7 @@ class SharedEdges:
             return None
         found = {
             edge: row
-            for row in self._renamed(self._decoder.rows(data), due)
+            for row in self._rename_rows(self._decoder.rows(data), due)
             for edge in [(row.parent, row.child)]
         }
         if static:
@@ -72,7 +72,9 @@ class SharedEdges:
     def _is_due(self, edge: tuple[str, str], now_ns: int) -> bool:
         return self._period_of.get(edge) != now_ns // self._periods_ns[edge]
 
-    def _renamed(self, rows: Iterable[Row], due: list[tuple[str, str]]) -> Iterable[SentTransform]:
+    def _rename_rows(
+        self, rows: Iterable[Row], due: list[tuple[str, str]]
+    ) -> Iterable[SentTransform]:
         for parent, child, sec, nsec, *numbers in rows:
             edge = (parent.removeprefix("/"), child.removeprefix("/"))
             if edge in due:
@@ -116,7 +118,7 @@ class EdgeSender:
         """Connect where there is no session yet, and send the fixed edges."""
         if self._session is None:
             try:
-                self._session = connected(self._router)
+                self._session = connect_router(self._router)
             except ConnectionError as error:
                 if not self._refused:
                     self._refused = True

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.foundation.findings import Finding, Span, finding
-from tfcompose.foundation.geometry import norm, normalised
+from tfcompose.foundation.geometry import norm, normalise
 from tfcompose.foundation.reach import Reach
 from tfcompose.foundation.yaml_text import comment, entry, flow, section
 from tfcompose.model.robot import BUILT_IN
@@ -249,7 +249,7 @@ def pose_keys(
     if rpy is not None:
         angles = [angle(value) for value in rpy]
         return keys | ({"rpy": angles} if any(angles) else {})
-    unit = normalised(pose.quat_xyzw)
+    unit = normalise(pose.quat_xyzw)
     turned = rotation(unit)
     if turned is None or not any(turned):
         return keys

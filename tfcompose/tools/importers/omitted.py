@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.compiler.urdf.blocks import read_block, unknown_references
 from tfcompose.compiler.urdf.schema import OPAQUE
-from tfcompose.foundation.geometry import normalised, quat_from_rpy
+from tfcompose.foundation.geometry import normalise, quat_from_rpy
 from tfcompose.model.robot import BOUNDED, materials
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def angles(root: Element) -> dict[Quaternion, Vector]:
             except ValueError:
                 continue
             if max(map(abs, (roll, pitch, yaw))) < 1e9:  # noqa: PLR2004 (as where poses are read)
-                rpy.setdefault(normalised(quat_from_rpy(roll, pitch, yaw)), (roll, pitch, yaw))
+                rpy.setdefault(normalise(quat_from_rpy(roll, pitch, yaw)), (roll, pitch, yaw))
     return rpy
 
 

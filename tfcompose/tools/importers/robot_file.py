@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.urdf.blocks import with_hardware
-from tfcompose.foundation.yaml_text import comment, dedented, entry, section
+from tfcompose.foundation.yaml_text import comment, dedent_block, entry, section
 from tfcompose.tools.importers.draft import robot_name
 from tfcompose.tools.importers.omitted import (
     angles,
@@ -100,7 +100,7 @@ class _Writer:
             "links": links,
             "joints": joints,
             "ros2_control": {one.name: _hardware(one) for one in robot.hardware},
-            "xml": {block.name: dedented(block.text) for block in robot.blocks},
+            "xml": {block.name: dedent_block(block.text) for block in robot.blocks},
             "frames": {
                 child: self._mount(edge)
                 for child, edge in self.fixed.items()

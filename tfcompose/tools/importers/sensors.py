@@ -19,7 +19,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, get_args
 
 from tfcompose.compiler.resolve.poses import rotation_of
-from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE, filled, holds
+from tfcompose.compiler.resolve.presets import DRIVER, TFCOMPOSE, fill_name, holds
 from tfcompose.foundation.findings import RejectedError
 from tfcompose.foundation.geometry import Pose, angle_between
 from tfcompose.foundation.text import listed
@@ -295,7 +295,7 @@ class _Search:
     ) -> Iterator[_Fit]:
         if not preset.frames:
             return
-        pattern = re.escape(filled(preset.mount, "\0", preset.words)).replace(
+        pattern = re.escape(fill_name(preset.mount, "\0", preset.words)).replace(
             re.escape("\0"), "(.+?)"
         )
         for child, mount in self.edges.items():
@@ -317,7 +317,7 @@ class _Search:
         *,
         has_own_names: bool = False,
     ) -> Iterator[_Fit]:
-        own_mount = filled(preset.mount, sensor, preset.words)
+        own_mount = fill_name(preset.mount, sensor, preset.words)
         for options in _options(preset):
             every = dict(choices) | options
             wanted = {
@@ -335,7 +335,7 @@ class _Search:
             given = {
                 key: value for key, value in every.items() if value != preset.options[key].default
             }
-            body = filled(preset.body.frame, sensor, preset.words) if preset.body else ""
+            body = fill_name(preset.body.frame, sensor, preset.words) if preset.body else ""
             yield _Fit(
                 Recognised(
                     sensor,
@@ -391,8 +391,8 @@ class _Search:
             for key in ready or list(waiting):
                 frame = waiting.pop(key)
                 own, parent = (
-                    filled(key, sensor, preset.words),
-                    filled(frame.parent, sensor, preset.words),
+                    fill_name(key, sensor, preset.words),
+                    fill_name(frame.parent, sensor, preset.words),
                 )
                 edges = [self.edges[own]] if own in self.edges else []
                 if has_own_names:

@@ -163,7 +163,7 @@ def _serve(session: Session, files: WatchedFiles, arguments: Namespace) -> int:
     try:
         windows = Windows(server, session, files, source)
         with (
-            _announced(_address(arguments.host, server.get_port(), token), arguments),
+            _announce(_address(arguments.host, server.get_port(), token), arguments),
             Watcher(files) as watcher,
         ):
             return source.run(windows, watcher.changed)
@@ -298,7 +298,7 @@ def _seconds(text: str) -> float:
 
 
 @contextmanager
-def _announced(address: str, arguments: Namespace) -> Iterator[None]:
+def _announce(address: str, arguments: Namespace) -> Iterator[None]:
     """Say where the view is, and open the browser where that is wanted.
 
     What starts a browser is among the arguments of a process, which every user of the machine can

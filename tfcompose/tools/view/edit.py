@@ -192,11 +192,11 @@ class _MountEditor:
             return MountEdits(())
         try:
             self._refuse_other_files()
-            edits = self._moved(old, new) if moves else []
-            edits += self._rotated(old.quat_xyzw, new.quat_xyzw) if rotates else []
+            edits = self._move_edits(old, new) if moves else []
+            edits += self._rotate_edits(old.quat_xyzw, new.quat_xyzw) if rotates else []
         except _ElsewhereError as error:
             return self._elsewhere(error, new, moves=moves, rotates=rotates)
-        return MountEdits(tuple(_joined(edits)))
+        return MountEdits(tuple(_join_edits(edits)))
 
     def _elsewhere(
         self, error: _ElsewhereError, new: Pose, *, moves: bool, rotates: bool
@@ -232,18 +232,20 @@ class _MountEditor:
         if not self.mount.data:
             raise _ElsewhereError(f"the pose is that of the preset of {edge.sensor}", edge.at)
 
-    def _moved(self, old: Pose, new: Pose) -> list[Edit]:
+    def _move_edits(self, old: Pose, new: Pose) -> list[Edit]:
         if "xyz" not in self.mount.data:
-            return [self._inserted({"xyz": self._xyz(new)}, ("parent",))]
+            return [self._insert_keys({"xyz": self._xyz(new)}, ("parent",))]
         before: Numbers = {(index,): value for index, value in enumerate(old.xyz)}
         after: Numbers = {(index,): value for index, value in enumerate(new.xyz)}
         return self._or_inserted("xyz", self._xyz(new), before, after)
 
-    def _rotated(self, old: Quaternion, new: Quaternion) -> list[Edit]:
+    def _rotate_edits(self, old: Quaternion, new: Quaternion) -> list[Edit]:
         key = next((name for name in FORMS if name in self.mount.data), None)
         if key is None:
             return [
-                self._inserted({"rpy": self._rpy(new)}, ("parent", "xyz", "place", "relative_to"))
+                self._insert_keys(
+                    {"rpy": self._rpy(new)}, ("parent", "xyz", "place", "relative_to")
+                )
             ]
         if key == "look" and self.mount.is_optical:
             x, y, z, w = OPTICAL_XYZW
@@ -262,12 +264,12 @@ class _MountEditor:
         Where the entry has the key through ``<<``, it gets one of its own.
         """
         try:
-            return list(self._renumbered(key, before, after))
+            return list(self._renumber(key, before, after))
         except _SharedError:
             entry = self._place_in_text(self.mount.entry)
             if complete is None or key in MappingKeys(self.texts[entry.span.file], entry).own:
                 raise
-            return [self._inserted({key: complete}, ("parent", "xyz"))]
+            return [self._insert_keys({key: complete}, ("parent", "xyz"))]
 
     def _complete(self, key: str, rotation: Quaternion, numbers: Numbers) -> str | None:
         """Return the YAML of a rotation under its own key, or None without a short form."""
@@ -310,11 +312,11 @@ class _MountEditor:
         if unknown:
             path = (key, *unknown[0])
             raise _ElsewhereError(
-                f"{_dotted(path)} is computed", self.source.at((*self.mount.entry, *path))
+                f"{_dotted_path(path)} is computed", self.source.at((*self.mount.entry, *path))
             )
         return found
 
-    def _renumbered(self, key: str, before: Numbers, after: Numbers) -> Iterator[Edit]:
+    def _renumber(self, key: str, before: Numbers, after: Numbers) -> Iterator[Edit]:
         """Yield an edit for each number that changes, and one for those that are not there yet."""
         missing = {
             str(path[0]): self._new_angle(value)
@@ -333,10 +335,10 @@ class _MountEditor:
         span = self._own(path)
         scalar = text_at(self.texts[span.file], span).strip("\"'")
         if "${" in scalar:
-            raise _ElsewhereError(f"{_dotted(path)} is computed: {scalar}", span)
+            raise _ElsewhereError(f"{_dotted_path(path)} is computed: {scalar}", span)
         found = _NUMBER.fullmatch(scalar)
         if found is None or _value(scalar) is None:
-            raise _ElsewhereError(f"{_dotted(path)} is {scalar}", span)
+            raise _ElsewhereError(f"{_dotted_path(path)} is {scalar}", span)
         return Edit(span, self._short(value, found[3] or "", found[2]))
 
     def _own(self, path: Path) -> Span:
@@ -347,13 +349,15 @@ class _MountEditor:
         at = (*self.mount.entry, *path)
         span = self.source.exactly_at(at)
         if span is None:
-            raise _ElsewhereError(f"{_dotted(path)} is not there", self.source.at(at))
+            raise _ElsewhereError(f"{_dotted_path(path)} is not there", self.source.at(at))
         if span.file not in self.texts:
-            raise _ElsewhereError(f"{_dotted(path) or 'the pose'} is given in {span.file}", span)
+            raise _ElsewhereError(
+                f"{_dotted_path(path) or 'the pose'} is given in {span.file}", span
+            )
         sharing = [other for other, place in self._places(span.file).walk() if place.span == span]
         if len(sharing) > 1:
             other = next(other for other in sharing if other != at)
-            raise _SharedError(str(path[0]) if path else "the entry", _dotted(other), span)
+            raise _SharedError(str(path[0]) if path else "the entry", _dotted_path(other), span)
         found = _PROPERTIES.match(text_at(self.texts[span.file], span))
         return (
             span._replace(column=span.column + found.end())
@@ -371,7 +375,7 @@ class _MountEditor:
         span = self.source.at(path)
         return next(place for _, place in self._places(span.file).walk() if place.span == span)
 
-    def _inserted(self, values: Mapping[str, str], after: tuple[str, ...]) -> Edit:
+    def _insert_keys(self, values: Mapping[str, str], after: tuple[str, ...]) -> Edit:
         """Return the edit that writes keys into the entry."""
         self._own(())
         place = self._place_in_text(self.mount.entry)
@@ -418,11 +422,11 @@ def _list(values: Iterable[str]) -> str:
     return f"[{', '.join(values)}]"
 
 
-def _dotted(path: Path) -> str:
+def _dotted_path(path: Path) -> str:
     return ".".join(map(str, path))
 
 
-def _joined(edits: list[Edit]) -> Iterator[Edit]:
+def _join_edits(edits: list[Edit]) -> Iterator[Edit]:
     """Yield the edits, those that insert at the same point as one."""
     texts: dict[Span, str] = {}
     for edit in edits:

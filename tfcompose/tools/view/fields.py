@@ -150,7 +150,7 @@ def streams(robot: Robot) -> Iterator[tuple[MountedSensor, Optics]]:
                 yield sensor, optics
 
 
-def drawn_reach(scale: float) -> float:
+def reach_at_scale(scale: float) -> float:
     """Return how far fields of view are drawn at a scale, in metres."""
     return round(_REACH_M * scale, 2)
 
@@ -179,7 +179,7 @@ class FieldsOfView:
                     f"/fields/{index}", show_axes=False, visible=self.shown[sensor.name]
                 )
             )
-        self.draw(drawn_reach(scale))
+        self.draw(reach_at_scale(scale))
 
     def draw(self, reach: float) -> None:
         """Draw the fields of view as far as that, in metres."""

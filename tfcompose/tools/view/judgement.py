@@ -9,7 +9,7 @@ from tfcompose.foundation.geometry import offset_of
 from tfcompose.foundation.text import listed
 from tfcompose.guard.verdict.publishers import flooded
 from tfcompose.guard.verdict.tree import rejected_transforms
-from tfcompose.guard.verdict.verify import differences, group_finding, grouped
+from tfcompose.guard.verdict.verify import differences, group_differences, group_finding
 from tfcompose.model.plan.topics import parts_of
 
 if TYPE_CHECKING:
@@ -98,7 +98,8 @@ class PlanJudge:
                 for rejected in rejected_transforms(edge)
             ]
             about += [
-                (list(_children(group)), self._finding(group, state)) for group in grouped(kept)
+                (list(_children(group)), self._finding(group, state))
+                for group in group_differences(kept)
             ]
             about += [([], finding) for finding in flooded(state)]
             for children, finding in about:

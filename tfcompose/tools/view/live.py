@@ -95,7 +95,7 @@ class LiveTree(ShownTree):
         A line for each publisher, then what is wrong.
         """
         edges = self._pictures.edges
-        lines = [line for state in self._states.get(frame, ()) for line in _published(state)]
+        lines = [line for state in self._states.get(frame, ()) for line in _published_lines(state)]
         if not lines and frame in edges:
             lines = [f"nothing came from {edges[frame].owner} yet"]
         return lines + self.judgement.about(frame)
@@ -115,7 +115,7 @@ def _counts(difference: Difference, listened_s: float) -> bool:
     return listened_s >= FOUND_S or difference.code not in _MISSING
 
 
-def _published(edge: EdgeState) -> Iterator[str]:
+def _published_lines(edge: EdgeState) -> Iterator[str]:
     """Yield who publishes an edge, in which parent, how often, and how old the newest pose is."""
     kind = (
         "fixed"

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tfcompose.foundation.geometry import Pose
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.tools.view.camera import VIEWS, Bounds
 from tfcompose.tools.view.facts import facts_of
-from tfcompose.tools.view.fields import FIELD_COLOURS, drawn_reach, outline, streams, surface
+from tfcompose.tools.view.fields import FIELD_COLOURS, outline, reach_at_scale, streams, surface
 from tfcompose.tools.view.frame_tree import FrameTree
 from tfcompose.tools.view.joints import first_positions, slider_range
 from tfcompose.tools.view.kinematics import poses_in_roots
@@ -53,7 +53,7 @@ def page_of(robot: Robot, sources: Sequence[Source]) -> str:
     scene = json.dumps(_scene(robot, tree), separators=(",", ":"))
     filled = {
         "scene": base64.b64encode(zlib.compress(scene.encode(), 9)).decode(),
-        "count": counted(len(tree.frames), "frame"),
+        "count": plural(len(tree.frames), "frame"),
         "owners": "".join(f"{_swatch(rgb)}{escape(owner)} " for owner, rgb in colours.items()),
         "title": escape(robot.name),
         "frames": "".join(rows),
@@ -76,9 +76,9 @@ def _scene(robot: Robot, tree: FrameTree) -> dict[str, Any]:
     scale = scale_of(float(side) for box in sides for side in box)
     fields = list(_fields(robot, scale))
     standing = [np.array([pose.xyz for pose in poses.values()])]
-    standing += [_moved(poses[frame], points) for frame, _, points, _ in bodies]
+    standing += [_move_points(poses[frame], points) for frame, _, points, _ in bodies]
     visible = [
-        _moved(poses[field["frame"]], field["ends"]) for field in fields if field["isShown"]
+        _move_points(poses[field["frame"]], field["ends"]) for field in fields if field["isShown"]
     ]
     bounds = Bounds.around(np.concatenate((*standing, *visible)), AXES_M * scale)
     joints = [edge.joint for edge in robot.edges if edge.joint]
@@ -96,11 +96,11 @@ def _scene(robot: Robot, tree: FrameTree) -> dict[str, Any]:
             for frame, colour, points, faces in bodies
         ],
         "fields": [
-            field | {"frame": index[field["frame"]], "ends": _rounded(field["ends"])}
+            field | {"frame": index[field["frame"]], "ends": _round(field["ends"])}
             for field in fields
         ],
         "views": VIEWS,
-        "middle": _rounded(bounds.middle),
+        "middle": _round(bounds.middle),
         "radius": bounds.radius,
         "ground": float(np.concatenate(standing)[:, 2].min()),
         "axes": AXES_M * scale,
@@ -149,11 +149,11 @@ def _bodies(robot: Robot) -> Iterator[tuple[str, tuple[int, int, int], Any, Any]
         for shape in shapes if frame in robot.frames else ():
             mesh = mesh_of(shape)
             if mesh is not None and not mesh.is_empty:
-                yield frame, colour_of(shape), _moved(shape.pose, mesh.vertices), mesh.faces
+                yield frame, colour_of(shape), _move_points(shape.pose, mesh.vertices), mesh.faces
 
 
 def _fields(robot: Robot, scale: float) -> Iterator[dict[str, Any]]:
-    reach = drawn_reach(scale)
+    reach = reach_at_scale(scale)
     for sensor, optics in streams(robot):
         yield {
             "frame": optics.frame,
@@ -164,7 +164,7 @@ def _fields(robot: Robot, scale: float) -> Iterator[dict[str, Any]]:
         } | _triangles(*surface(optics, reach))
 
 
-def _moved(pose: Pose, points: Any) -> Any:
+def _move_points(pose: Pose, points: Any) -> Any:
     """Return points (n, 3) of a frame with this pose in the frame above."""
     rotation = Pose(quat_xyzw=pose.quat_xyzw)
     axes = [(rotation @ Pose(axis)).xyz for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
@@ -172,8 +172,8 @@ def _moved(pose: Pose, points: Any) -> Any:
 
 
 def _triangles(points: Any, faces: Any) -> dict[str, Any]:
-    return {"vertices": _rounded(points.reshape(-1)), "faces": faces.reshape(-1).tolist()}
+    return {"vertices": _round(points.reshape(-1)), "faces": faces.reshape(-1).tolist()}
 
 
-def _rounded(values: Any) -> Any:
+def _round(values: Any) -> Any:
     return np.asarray(values, float).round(_DECIMALS).tolist()

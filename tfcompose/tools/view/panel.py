@@ -70,7 +70,7 @@ class Window:
     conflicts: set[str] = field(default_factory=set)
 
 
-def _snapped(pose: Pose, before: Pose) -> Pose:
+def _snap(pose: Pose, before: Pose) -> Pose:
     """Return a pose in whole mm and degrees.
 
     A number that is less than half of one off keeps the value before.
@@ -430,7 +430,7 @@ class Panel:
         px, py, pz = (float(value) for value in self.gizmo.position)
         base = self.poses()[mount.relative_to]
         pose = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
-        self.move(_snapped(pose, mount.given(mount.edge.pose)) if self.choices.snaps else pose)
+        self.move(_snap(pose, mount.given(mount.edge.pose)) if self.choices.snaps else pose)
         self._show_selected()
 
     def move(self, pose: Pose) -> None:

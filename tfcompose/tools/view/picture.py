@@ -124,14 +124,16 @@ class Pictures:
         placed_local = self._local.copy()
         for child in off:
             row = self._forest.index[child]
-            placed_local[row] = row_of(self._meant(child, pose_of(self._local[row].tolist())))
+            placed_local[row] = row_of(
+                self._planned_pose(child, pose_of(self._local[row].tolist()))
+            )
         placed = self._in_fixed(in_roots, self._forest.in_roots(placed_local))
         frames = self._forest.below(set(off))
         return {
             frame: pose_of(placed[self._forest.index[frame]].tolist()) for frame in sorted(frames)
         }
 
-    def _meant(self, child: str, live: Pose) -> Pose:
+    def _planned_pose(self, child: str, live: Pose) -> Pose:
         """Return where the robot has the frame in its parent.
 
         What a joint moves is where it was published.

@@ -55,7 +55,7 @@ class WatchedFiles:
 
     def look_at(self, meshes: Iterable[str]) -> None:
         """Know of these mesh files, and no others, and when they were changed."""
-        self._meshes = {file: _changed_ns(file) for file in meshes}
+        self._meshes = {file: _mtime_ns(file) for file in meshes}
 
     @property
     def folders(self) -> set[Path]:
@@ -68,7 +68,7 @@ class WatchedFiles:
     def differ(self) -> bool:
         """Return whether a file has another text than when it was read, or a mesh was changed."""
         return any(self._now(file) != text for file, text in self._texts.items()) or any(
-            _changed_ns(file) != before for file, before in self._meshes.items()
+            _mtime_ns(file) != before for file, before in self._meshes.items()
         )
 
     def _now(self, file: str) -> str:
@@ -78,7 +78,7 @@ class WatchedFiles:
             return ""
 
 
-def _changed_ns(file: str) -> int:
+def _mtime_ns(file: str) -> int:
     try:
         return Path(file).stat().st_mtime_ns
     except OSError:

@@ -15,7 +15,7 @@ from tfcompose.foundation.geometry import (
     angle_between,
     matrix_from_quat,
     norm,
-    normalised,
+    normalise,
     quat_from_rpy,
     rpy_from_quat,
 )
@@ -97,7 +97,7 @@ def axis_angle_numbers(rotation: Quaternion, old: Numbers, _tolerance: float) ->
     """Return the numbers of ``axis_angle``: only another angle, if the axis is the same."""
     old_axis = (old["axis", 0], old["axis", 1], old["axis", 2])
     length = norm(old_axis)
-    x, y, z, w = normalised(rotation)
+    x, y, z, w = normalise(rotation)
     half = norm((x, y, z))
     angle, axis = (
         2 * math.atan2(half, w),

@@ -11,7 +11,7 @@ from difflib import unified_diff
 from typing import TYPE_CHECKING
 
 from tfcompose.compiler.compile import Compiled
-from tfcompose.foundation.findings import RejectedError, edited
+from tfcompose.foundation.findings import RejectedError, apply_edits
 from tfcompose.tools.view.edit import Elsewhere, MountEdits, change_of, mount_of
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class Session:
 def _with(texts: Mapping[str, str], change: MountEdits) -> dict[str, str]:
     files = {edit.span.file for edit in change.edits}
     new = {
-        file: edited(texts[file], [edit for edit in change.edits if edit.span.file == file])
+        file: apply_edits(texts[file], [edit for edit in change.edits if edit.span.file == file])
         for file in files
     }
     return {file: text for file, text in new.items() if text is not None}

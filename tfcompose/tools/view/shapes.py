@@ -36,13 +36,13 @@ def mesh_of(shape: Shape) -> Any:
         return trimesh.creation.capsule(radius=size[0], height=size[1], count=[24, 24])
     path = shape.mesh.path if shape.mesh else ""
     try:
-        return _decimated(path, (size[0], size[1], size[2]), Path(path).stat().st_mtime_ns)
+        return _decimate(path, (size[0], size[1], size[2]), Path(path).stat().st_mtime_ns)
     except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
         return None
 
 
 @lru_cache(maxsize=256)
-def _decimated(path: str, scale: Vector, _changed_ns: int) -> Any:
+def _decimate(path: str, scale: Vector, _changed_ns: int) -> Any:
     mesh = read_mesh(path, scale)
     if len(mesh.faces) > MOST_TRIANGLES:
         mesh.merge_vertices()  # an STL file has each corner of each triangle by itself

@@ -14,7 +14,7 @@ import threading
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.foundation.text import counted
+from tfcompose.foundation.text import plural
 from tfcompose.tools.view.frame_tree import FrameTree
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ class TreePanel:
             self._row(row, terms, is_hidden=row.frame in hidden)
             for row in self.tree.rows(choices.is_open, choices.search)
         )
-        count = counted(len(self.tree.frames), "frame")
+        count = plural(len(self.tree.frames), "frame")
         if choices.search.strip():
             count = f"{len(self.tree.matches(choices.search))} of {count}"
         does = ("open all", "close all", "show all") if hidden else ("open all", "close all")
@@ -272,11 +272,11 @@ class TreePanel:
             f' style="{row.style}"><i>{opens}</i><input type="checkbox"'
             f' data-does="show"{"" if is_hidden else " checked"} style="accent-color:'
             f' rgb{self._colours[frame]}" title="show it and what is below"><button'
-            f' data-does="select" title="{title}">{_marked(frame, terms)}{moved}</button></div>'
+            f' data-does="select" title="{title}">{_mark(frame, terms)}{moved}</button></div>'
         )
 
 
-def _marked(name: str, terms: re.Pattern[str]) -> str:
+def _mark(name: str, terms: re.Pattern[str]) -> str:
     """Return a name as HTML with the words marked that are searched for."""
     parts, at = [], 0
     for match in terms.finditer(name):

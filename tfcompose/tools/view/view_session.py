@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import disk_of, given_by, library, overlays_of
+from tfcompose.cli.compiling import disk_of, inputs_of, library, overlays_of
 from tfcompose.cli.fixing import rewrite
 from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
 from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, reject
@@ -62,7 +62,7 @@ def _robot_session(file: str, arguments: Namespace, files: WatchedFiles) -> Sess
             overlays=overlays,
             read=read,
             disk=packages,
-            given=given_by(arguments),
+            given=inputs_of(arguments),
         )
 
     def write(name: str, old: str, new: str) -> None:

@@ -21,8 +21,8 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the frames; exit code 0."""
-    from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.cli.compiling import compile_or_exit
 
-    section = compiled_robot(arguments.file, arguments).sections["acme"]
+    section = compile_or_exit(arguments.file, arguments).sections["acme"]
     print(section.value.frame)
     return 0

@@ -17,9 +17,9 @@ def run(command: str, arguments: Namespace) -> int | None:
     """Print the frame; None without the option."""
     if not arguments.beeper:
         return None
-    from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.cli.compiling import compile_or_exit
     from tfcompose.cli.options import DEFAULT_FILE
 
-    robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments)
+    robot = compile_or_exit(arguments.file or DEFAULT_FILE, arguments)
     print(f"{command}: {robot.sections['acme'].value.frame}")
     return 0

@@ -22,7 +22,6 @@ from tfcompose.foundation.signals import take_interrupt
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterable
-    from types import TracebackType
 
     from typing_extensions import Self
 
@@ -56,12 +55,7 @@ class BuildProcess:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._pid:
             self._interrupt()
 

@@ -16,7 +16,6 @@ from tfcompose.cli.terminal import CLEAR, CLEAR_LINE, plain, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from types import TracebackType
     from typing import TextIO
 
     from typing_extensions import Self
@@ -113,12 +112,7 @@ class Screen:
         self.enter()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.leave()
 
     def enter(self) -> None:

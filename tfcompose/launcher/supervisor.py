@@ -59,7 +59,7 @@ from tfcompose.tf.ros.environment import child_environment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
-    from types import FrameType, TracebackType
+    from types import FrameType
 
     from tfcompose.foundation.findings import Finding
     from tfcompose.launcher.answers import Answer
@@ -409,12 +409,7 @@ class Signals:
             os.write(write_fd, b"\0")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
 
     def _append(self, number: int, _frame: FrameType | None) -> None:

@@ -159,10 +159,16 @@ def test_each_message_is_given_the_node_that_sent_it(peers: Peers) -> None:
         def have_come() -> bool:
             peers.slam.send("/tf", tf("map odom"))
             peers.rogue.send("/tf", tf("odom base_link"))
-            for message in data.take():
+            messages = data.take()
+            nodes = {
+                publisher.gid: publisher.node
+                for topic in ("/tf", "/tf_static")
+                for publisher in graph.publishers(topic)
+            }
+            for message in messages:
                 assert message.attachment is not None
                 senders.setdefault(message.attachment.gid, set()).add(
-                    graph.node_of(message.attachment.gid)
+                    nodes.get(message.attachment.gid)
                 )
             return len(senders) == 3
 

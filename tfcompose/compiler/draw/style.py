@@ -84,26 +84,6 @@ STYLES: dict[str, Style] = {
 }
 
 
-def style_of(names: str) -> Style:
-    """Return the style of one or two names.
-
-    Width and dash of the second count, where it has them.
-    """
-    first, _, second = names.partition(" ")
-    style = STYLES[first]
-    if not second:
-        return style
-    over = STYLES[second]
-    return Style(
-        style.fill,
-        style.stroke,
-        over.width or style.width,
-        dash=over.dash,
-        size=style.size,
-        bold=style.bold,
-    )
-
-
 #: Widths of Helvetica, which Arial, Liberation Sans and Nimbus Sans share, in thousandths of the
 #: font's size, from the space to the tilde (Adobe's metrics).
 _ASCII = (

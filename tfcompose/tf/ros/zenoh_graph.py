@@ -182,22 +182,6 @@ class ZenohGraph:
             ]
         return sorted(found, key=lambda publisher: (publisher.node, publisher.gid))
 
-    def node_of(self, gid: bytes) -> str | None:
-        """Return the full name of the node whose publisher has this id.
-
-        None while it is not known.
-        """
-        with self._lock:
-            self._take()
-            return next(
-                (
-                    publisher.node
-                    for publisher in self._publishers.values()
-                    if publisher.gid == gid
-                ),
-                None,
-            )
-
     def close(self) -> None:
         """End the subscription."""
         self._subscriber.undeclare()

@@ -45,32 +45,29 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """A stretch of a file and the text that belongs there. An empty stretch inserts.
-
-    ``text`` is a scalar's value, which keeps the quotes that stand there, or YAML that is written
-    as it is.
-    """
+    """A stretch of a file and its replacement. An empty stretch inserts."""
 
     span: Span
+    #: A scalar's value, which keeps its quotes, or YAML to write as it is.
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One finding.
-
-    ``message`` is one line with the names and values involved and holds no advice; advice is
-    ``help``; the other place of a conflict is a note. ``span`` is None for what was seen on a live
-    tree. ``edits`` together are the one safe answer, where there is one.
-    """
+    """A fault in a file or a running tree, complete where it is made."""
 
     code: str
     name: str
     severity: Severity
+    #: One line with the names and values involved, without advice.
     message: str
+    #: None for an observation of a live tree.
     span: Span | None = None
+    #: Other places of a conflict, and further facts.
     notes: tuple[Note, ...] = ()
+    #: The advice.
     help: str = ""
+    #: Together the one safe fix, where there is one.
     edits: tuple[Edit, ...] = ()
 
     @property
@@ -87,13 +84,14 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Allow:
-    """A comment that allows findings with these codes from ``line`` to ``last``, and why."""
+    """A comment that allows findings with these codes, and why."""
 
     codes: tuple[str, ...]
     line: int
     reason: str
     at: Span
-    last: int = 0  # 0: the same line
+    #: The last line that it covers; 0: ``line`` alone.
+    last: int = 0
 
 
 class RejectedError(Exception):

@@ -1,9 +1,7 @@
-"""When a process may start and when it is ready.
+"""Start conditions and readiness of processes, and reports of those that are late.
 
-What it waits for, and what is reported of one that is late.
-
-A process waits for others, as the plan's ``after`` says, before it is started; and for its own
-gate to open before it counts as ready.
+The launcher starts a process once the processes in the plan's ``after`` are in the state that it
+names. The process counts as ready when its own gate opens.
 """
 
 from __future__ import annotations

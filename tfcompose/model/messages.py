@@ -60,12 +60,10 @@ class Live(_Event, frozen=True):
 
 
 class Silent(_Event, frozen=True):
-    """Edges, named by their children, that were live come no more.
-
-    Or, if that is ``over``, come again.
-    """
+    """Live edges, named by their children, stopped arriving, or arrive again."""
 
     children: tuple[str, ...]
+    #: Whether they arrive again.
     over: bool
 
 
@@ -76,22 +74,18 @@ class OwnerReady(_Event, frozen=True):
 
 
 class TreeComplete(_Event, frozen=True):
-    """Every edge of the plan is live: a notice too.
-
-    ``seconds`` is how long after the start; the guard, which does not know it, leaves it at 0.
-    """
+    """Every edge of the plan is live: a notice too."""
 
     edges: int
+    #: Since the start; 0 from the guard, which does not know it.
     seconds: float = 0.0
 
 
 class FindingShown(_Event, frozen=True, omit_defaults=True):
-    """Something is wrong: a notice too, as it goes on to people.
-
-    ``process`` is the plan's process that did it, where it can be stopped for it.
-    """
+    """Something is wrong: a notice too, as users see it."""
 
     found: Finding
+    #: The plan's process that caused it, if stopping that one would help.
     process: str = ""
 
 
@@ -102,44 +96,33 @@ class CurrentFindings(_Event, frozen=True):
 
 
 class RecoveredShown(_Event, frozen=True):
-    """A case that was reported is over; the text says which. A notice too.
-
-    ``seconds`` is how long after the start, as in ``TreeComplete``.
-    """
+    """A reported fault is over; the text says which. A notice too."""
 
     text: str
+    #: Since the start.
     seconds: float = 0.0
 
 
 class Unfenced(_Event, frozen=True):
-    """A process of a strict plan sends past the fence.
-
-    It must be stopped, whatever else is only reported.
-
-    Where its environment was cleared, ``pid`` says which process it is instead of ``process``.
-    """
+    """A process of a strict plan bypasses the fence, and must be stopped."""
 
     found: Finding
     process: str
+    #: Identifies it instead of ``process`` where its environment was cleared.
     pid: int = 0
 
 
 class GateState(_Event, frozen=True):
-    """A process's gate, looked at: whether what it waits for is there.
-
-    ``seen`` says what is there, or what is there instead.
-    """
+    """The state of a process's gate: whether what it waits for is there."""
 
     process: str
+    #: What is there, or what is there instead.
     seen: str
     is_open: bool
 
 
 class Remember(_Event, frozen=True):
-    """What the next guard must know, should this one die.
-
-    The launcher keeps it by key and does not look into it.
-    """
+    """State for the next guard, should this one die. The launcher stores it by key, unread."""
 
     changed: dict[str, Any]
 
@@ -148,22 +131,24 @@ LoadState = Literal["loaded", "not loaded", "unloaded"]
 
 
 class ComponentState(_Event, frozen=True):
-    """What has become of a component; ``number`` is that of the order that is answered.
+    """The state of a component, in answer to an order.
 
-    It is unloaded, too, where its container has it no more or does not answer. ``why`` says why it
-    is not loaded.
+    A component counts as unloaded, too, if its container lost it or does not answer.
     """
 
     process: str
+    #: The number of the order that this answers.
     number: int
     state: LoadState
+    #: The reason that it is not loaded.
     why: str = ""
 
 
 class DescriptionState(_Event, frozen=True):
-    """A node took the robot's description; ``why`` says why it did not."""
+    """The answer of a node that was given the robot's description."""
 
     process: str
+    #: The reason that it refused it; empty: it took it.
     why: str = ""
 
 
@@ -208,32 +193,32 @@ class Present(_Order, frozen=True):
 
 
 class Gate(_Order, frozen=True):
-    """Say when this is there: a topic with a publisher, a service, or nodes in lifecycle states.
+    """Report when this is there: a topic with a publisher, a service, or lifecycle states.
 
-    ``topic`` and ``service`` are full names, or empty. ``nodes`` holds the lifecycle states that
-    are waited for; ``drive`` says that the guard brings them there. ``writers`` are topics whose
-    publishers are named while others look at what comes there. A gate at which nothing is to be
-    seen replaces the process's, and is not looked at.
+    An empty gate replaces the process's gate, and is not watched.
     """
 
     process: str
+    #: A full name, or empty.
     topic: str = ""
+    #: A full name, or empty.
     service: str = ""
+    #: The lifecycle states to wait for.
     nodes: dict[str, LifecycleState] = {}
+    #: Whether the guard brings the nodes to these states.
     drive: bool = False
+    #: Topics whose publishers are named while others look at what comes there.
     writers: tuple[str, ...] = ()
 
 
 class ComponentOrder(_Order, frozen=True):
-    """Have a container load or unload a component, as the file says.
-
-    A ``ComponentState`` with the order's ``number`` answers it. ``again`` says that a guard before
-    this one may have had it loaded.
-    """
+    """Have a container load or unload a component; a ``ComponentState`` answers."""
 
     process: str
+    #: Returned in the answer.
     number: int
     do: Literal["load", "unload"]
+    #: Whether an earlier guard may have loaded it already.
     again: bool = False
     file: str = ""
 
@@ -343,25 +328,24 @@ class AllReady(_Event, frozen=True):
 
 
 class Replanned(_Event, frozen=True):
-    """A changed plan is followed from now on.
-
-    The names of processes, and the frames that listeners will still hold. ``described`` are given
-    a new description while they run.
-    """
+    """The launcher follows a changed plan from now on. Processes are given by name."""
 
     changed: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
+    #: Frames that listeners still hold.
     held: tuple[str, ...] = ()
+    #: Processes that get a new description while they run.
     described: tuple[str, ...] = ()
 
 
 class Missing(ProcessMessage, frozen=True):
-    """The unpublished edges of one owner, in the plan's order, of ``owned`` ones."""
+    """The unpublished edges of one owner, in the plan's order."""
 
     owner: str
     node: str
     edges: tuple[str, ...]
+    #: The number of edges that it owns.
     owned: int
 
 
@@ -372,12 +356,11 @@ class Waiting(_Event, frozen=True):
 
 
 class FilesRestored(_Event, frozen=True):
-    """The files of the run were removed.
+    """The files of the run were removed, and restored where possible."""
 
-    They are in ``folder`` again, or nowhere, for the reason ``why``.
-    """
-
+    #: The folder that they are in again; empty: they are in none.
     folder: str
+    #: The reason that they could not be restored.
     why: str = ""
 
 
@@ -388,12 +371,10 @@ class Stopping(_Event, frozen=True):
 
 
 class Ended(_Event, frozen=True):
-    """Nothing runs any more: the last notice.
-
-    ``because`` is the failure that came first, and what was said last.
-    """
+    """Nothing runs any more: the last notice."""
 
     exit_code: int
+    #: The message and notes of the first failure.
     because: tuple[str, ...] = ()
 
 
@@ -485,68 +466,70 @@ class Refusal(ProcessMessage, frozen=True):
 
 
 class Done(ProcessMessage, frozen=True):
-    """It is being done; ``waits`` says what a process that is started waits for first."""
+    """The request is being carried out."""
 
     ok: Literal[True] = True
+    #: What a process that is started waits for first.
     waits: str = ""
 
 
 class PlanChange(ProcessMessage, frozen=True):
-    """What another plan changes.
+    """The changes that another plan brings.
 
-    The processes that are different, new, and no more, and the fixed edges that vanish.
-    ``described`` are given a new description while they run. ``differs`` says that the plan is
-    another one at all, if only in its places in the robot file.
-
-    tf2 never forgets a fixed edge, so listeners hold those that vanish until they start anew.
+    tf2 never forgets a fixed edge, so listeners hold those that vanish until they restart.
     """
 
+    #: Processes that differ.
     changed: tuple[str, ...]
+    #: New processes.
     added: tuple[str, ...]
+    #: Processes that are gone.
     removed: tuple[str, ...]
+    #: Fixed edges that vanish.
     held: tuple[str, ...]
     ok: Literal[True] = True
+    #: Processes that get a new description while they run.
     described: tuple[str, ...] = ()
+    #: Whether the plan is another one at all, if only in its lines of the robot file.
     differs: bool = False
 
 
 class ProcessStatus(ProcessMessage, frozen=True):
-    """One process.
-
-    ``detail`` says why it is in its state, ``waits`` what it is without, ``seen`` what is there
-    instead. ``uptime`` is in seconds; ``edges`` counts those that it owns, ``live`` those of them
-    that are received.
-    """
+    """The status of one process."""
 
     name: str
     kind: ProcessKind
     host: str | None
     state: StateName
+    #: The reason for its state.
     detail: str
     required: bool | None
     failed: bool
     ready: bool
+    #: What it waits for.
     waits: str
+    #: What is there instead.
     seen: str
     pid: int | None
+    #: In seconds.
     uptime: float | None
     restarts: int
+    #: The number of edges that it owns.
     edges: int
+    #: The number of these that the guard receives.
     live: int
     nodes: tuple[str, ...]
 
 
 class RobotStatus(ProcessMessage, frozen=True):
-    """All that is known of a run.
-
-    ``plan`` is the digest of what it was made from, ``uptime`` is in seconds, ``findings`` are
-    what the guard sees wrong now, worst first.
-    """
+    """The status of a run."""
 
     robot: str
     host: str | None
     launcher: int
+    #: The digest of the robot file that the plan was built from.
     plan: str
+    #: In seconds.
     uptime: float
     complete: bool
     ready: bool
@@ -554,4 +537,5 @@ class RobotStatus(ProcessMessage, frozen=True):
     missing: tuple[str, ...]
     silent: tuple[str, ...]
     processes: tuple[ProcessStatus, ...]
+    #: What the guard sees wrong now, worst first.
     findings: tuple[Finding, ...] = ()

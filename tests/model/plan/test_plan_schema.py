@@ -11,7 +11,8 @@ import msgspec
 import pytest
 
 from tfcompose.cli.schemas import schema_text
-from tfcompose.model.plan import VERSION, Plan
+from tfcompose.model.plan import VERSION, Plan, PlanEdge, Ready
+from tfcompose.model.plan.schema import field_comments
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 PLANS = sorted(GOLDEN.glob("*/plan.json"))
@@ -79,3 +80,12 @@ def test_what_the_reader_refuses_for_its_kind_the_schema_refuses_too() -> None:
                 mistaken += [(path, wrong)] if is_read(plan) else []
     assert observed > 200
     assert not mistaken
+
+
+def test_a_comment_of_a_field_describes_its_key() -> None:
+    edge = json.loads(schema_text("plan"))["$defs"]["PlanEdge"]["properties"]
+    assert "description" not in edge["child"]
+    assert edge["node"]["description"] == field_comments(PlanEdge)["node"]
+    wrapped = field_comments(Ready)["text"]
+    assert "#" not in wrapped
+    assert wrapped.endswith("its output.")

@@ -111,39 +111,39 @@ class EdgePattern:
 
 @dataclass(frozen=True, slots=True)
 class PlanJoint:
-    """A moving joint: the edge's ``pose`` followed by motion along ``axis`` gives the pose.
-
-    ``axis`` is a unit vector in the child's frame at q = 0. With ``mimic`` the position is
-    ``multiplier`` · q(mimic) + ``offset``. Positions are radians, or metres for a prismatic joint.
-    """
+    """A moving joint: motion along an axis, on top of the edge's pose."""
 
     name: str
     type: JointType
+    #: A unit vector in the child's frame at q = 0.
     axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    #: The joint that it follows: its position is ``multiplier`` · q(mimic) + ``offset``.
     mimic: str | None = None
     multiplier: float = 1.0
+    #: In radians; in metres for a prismatic joint.
     offset: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PlanEdge:
-    """One TF edge and the process that publishes it. ``node`` is the publishing node's full name.
+    """One TF edge and the process that publishes it."""
 
-    ``switched`` holds the further parents between which the owner may change the child; ``parent``
-    is the nominal one. ``pose_known`` is False where only the owner knows where the child is;
-    ``pose`` is the identity then.
-    """
-
+    #: The nominal parent of a child that changes parents.
     parent: str
     child: str
     kind: EdgeKind
     owner: str
+    #: The full name of the publishing node.
     node: str
+    #: The identity where ``pose_known`` is False.
     pose: Pose
+    #: In hertz; None: the plan does not say.
     rate: float | None
     source: SourceLine
     joint: PlanJoint | None = None
+    #: The other parents that the owner may attach the child to.
     switched: tuple[str, ...] = ()
+    #: False where only the owner knows the child's pose.
     pose_known: bool = True
 
     @property
@@ -181,14 +181,11 @@ _AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """How a simulated joint moves.
+    """Motion of a simulated joint: between two positions, or without them in full turns."""
 
-    To and fro between two positions (rad or m) once in ``period_s``.
-
-    Without them it turns round and round, once in that time.
-    """
-
+    #: The time there and back, or of a full turn.
     period_s: AboveZero
+    #: In radians, or metres for a prismatic joint.
     lower: float | None = None
     upper: float | None = None
 
@@ -199,15 +196,14 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A stand-in for an owner: a body on a circle, one that stays, or joint states.
-
-    ``joints`` are where joints begin (rad or m), and stay unless ``sweep`` says how they move.
-    """
+    """A stand-in for an owner: a body on a circle, one at rest, or joint states."""
 
     kind: SimulationKind
+    #: In hertz.
     rate: AboveZero
     radius: float = 0.0
     speed: float = 0.0
+    #: Initial positions (rad or m); joints without a ``sweep`` stay there.
     joints: dict[str, float] = field(default_factory=dict)
     sweep: dict[str, Sweep] = field(default_factory=dict)
     pose: Pose = field(default_factory=Pose)
@@ -215,44 +211,38 @@ class Simulation:
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """When a process counts as ready.
-
-    ``text`` is the full name of the topic or the service, the lifecycle state of the process's
-    nodes, or the regular expression that a line of the output holds; ``number`` the exit code, or
-    the seconds after the start. Without ``timeout_s`` the launcher's own time holds.
-    """
+    """The condition under which a process counts as ready."""
 
     kind: ReadyKind
+    #: The full name of a topic or service, the lifecycle state of the process's nodes, or a
+    #: regular expression for a line of its output.
     text: str = ""
+    #: The exit code, or the seconds after the start.
     number: float = 0.0
+    #: None: the launcher's default.
     timeout_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class StopRule:
-    """How a process is ended: the first signal, and the time until a firmer one.
-
-    None: the launcher's own.
-
-    ``kill_timeout_s`` is the time between SIGTERM and SIGKILL; None: ``timeout_s``.
-    """
+    """The signals that end a process, and the time between them."""
 
     signal: StopSignal = "SIGINT"
+    #: From a signal to the next one; None: the launcher's default.
     timeout_s: float | None = None
+    #: From SIGTERM to SIGKILL; None: ``timeout_s``.
     kill_timeout_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """How the kernel schedules a process.
+    """Kernel scheduling of a process."""
 
-    On which processors (empty: any), and by which policy (sched(7)).
-
-    ``priority`` is that of the real-time policies, 1 to 99, and 0 for the others.
-    """
-
+    #: The processors that it may run on; empty: any.
     cpus: tuple[int, ...] = ()
+    #: A policy of sched(7).
     policy: SchedulingPolicy = "other"
+    #: 1 to 99 with a real-time policy, else 0.
     priority: int = 0
 
 
@@ -262,58 +252,38 @@ ParameterValue = str | int | float | bool
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """A sensor that a process drives.
-
-    ``publishes`` says that the frames inside the sensor are the driver's.
-
-    ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not
-    its own. ``frames`` says of the frames that the driver publishes inside the sensor whether
-    their poses are exact, nominal or unknown.
-    """
+    """A sensor that a process drives."""
 
     sensor: str
     preset: str
+    #: Whether the driver owns the frames inside the sensor.
     publishes: bool
+    #: Parameters or arguments that keep the driver from publishing edges it does not own.
     switch: dict[str, ParameterValue] = field(default_factory=dict)
+    #: Whether the pose of each frame that the driver publishes inside the sensor is exact, nominal
+    #: or unknown.
     frames: dict[str, PoseKnowledge] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """A node that a container loads: it has no operating system's process of its own.
+    """A node that a container loads; it has no process of its own in the operating system."""
 
-    ``container`` is the process that loads it, ``plugin`` the class, of ``package``. ``params``
-    are by their full names, with dots; a value is true or false, a number, a text, or a list of
-    one kind, as ``components.json_value`` has them. ``extra_arguments`` are for the container:
-    ``use_intra_process_comms``.
-    """
-
+    #: The process that loads it.
     container: str
     package: str
+    #: A class of ``package``.
     plugin: str
+    #: By full names, with dots. A value is a boolean, a number, a text or a list of one kind, as
+    #: ``components.json_value`` has them.
     params: dict[str, Any] = field(default_factory=dict)
+    #: Options for the container, such as ``use_intra_process_comms``.
     extra_arguments: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class PlanProcess:
-    """What is started, or, with kind ``external``, expected to run.
-
-    Of kind ``component``, what a container loads.
-
-    ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought
-    after the start. ``required`` says what ends the plan: True, this process's end; None, its
-    failure; False, neither. ``max_restarts`` None is the default, as is ``ready`` None: the edges
-    that the process owns, or that it was started. ``drives`` are the sensors that it is the driver
-    of, by their presets. ``switches`` holds, by the full names of its nodes, the parameters that
-    were written for them and decide what they publish. ``description`` is the file beside the plan
-    that a publisher sends as ``robot_description``; None: the plan's. ``namespace`` is that of its
-    nodes, without a leading slash; None: the plan's. ``restart_delay`` is how long after its end
-    it is started again, in seconds; None: longer each time. ``prefix`` are the words before its
-    command, a program that runs it. ``emulate_tty`` says that it writes to a pseudo-terminal.
-    ``oom_score_adj`` is as in proc_pid_oom_score_adj(5), ``open_files`` the soft and the hard
-    RLIMIT_NOFILE of getrlimit(2); None: the launcher's own.
-    """
+    """A process to start, an ``external`` one to expect, or a ``component`` to load."""
 
     name: str
     kind: ProcessKind
@@ -322,29 +292,43 @@ class PlanProcess:
     cwd: str | None = None
     params_file: str | None = None
     remap: dict[str, str] = field(default_factory=dict)
+    #: Full names.
     nodes: tuple[str, ...] = ()
     restart: RestartPolicy = "no"
+    #: None: the launcher's default.
     max_restarts: int | None = None
+    #: True: the plan ends with the process; None: when it fails; False: neither.
     required: bool | None = None
     stop: StopRule = field(default_factory=StopRule)
     log_level: LogLevel | None = None
+    #: The state that the guard brings a node to after the start.
     lifecycle: dict[str, LifecycleState] = field(default_factory=dict)
     after: dict[str, StartCondition] = field(default_factory=dict)
+    #: None: when the edges that it owns are live, or, without any, when it was started.
     ready: Ready | None = None
     host: str | None = None
     owns: tuple[tuple[str, str], ...] = ()
+    #: The file beside the plan that it sends as ``robot_description``; None: the plan's.
     description: str | None = None
+    #: The sensors that it is the driver of, by their presets.
     drives: tuple[Driven, ...] = ()
+    #: By full name of a node: its parameters that decide which TF it publishes.
     switches: dict[str, dict[str, ParameterValue]] = field(default_factory=dict)
+    #: The namespace of its nodes, without a leading slash; None: the plan's.
     namespace: str | None = None
     simulate: Simulation | None = None
+    #: In seconds from its end; None: longer each time.
     restart_delay: float | None = None
+    #: A wrapper command, such as gdb, valgrind or nice.
     prefix: tuple[str, ...] = ()
     schedule: Schedule | None = None
     component: Component | None = None
     output: OutputPlace = "both"
+    #: Whether it writes to a pseudo-terminal.
     emulate_tty: bool = False
+    #: As in proc_pid_oom_score_adj(5); None: the launcher's.
     oom_score_adj: int | None = None
+    #: Soft and hard RLIMIT_NOFILE of getrlimit(2), None: the launcher's.
     open_files: int | None = None
 
     @property
@@ -416,17 +400,16 @@ class RosSettings:
 
 @dataclass(frozen=True, slots=True)
 class PlanHost:
-    """A computer that processes run on: how ssh reaches it, and what runs tfcompose there.
+    """A computer that processes run on, and the way to reach it."""
 
-    ``ssh`` is user@address, or a name that ssh knows; ``python`` is a program or its path,
-    ``setup`` are files that are sourced before it. ``node_selector`` are the labels of its node in
-    Kubernetes; empty: its host name is the host's.
-    """
-
+    #: user@address, or a name in the ssh configuration.
     ssh: str
     port: int | None = None
+    #: The interpreter that runs tfcompose there: a program or its path.
     python: str | None = None
+    #: Files to source before it.
     setup: tuple[str, ...] = ()
+    #: Labels of its Kubernetes node; empty: its host name is the host's.
     node_selector: dict[str, str] = field(default_factory=dict)
 
 
@@ -459,14 +442,12 @@ class GuardPolicy:
 
 @dataclass(frozen=True, slots=True)
 class PlanClaim:
-    """An edge that a node publishes by default and another process owns.
-
-    ``switch`` stops it, empty: nothing does.
-    """
+    """An edge that a node publishes by default and another process owns."""
 
     node: str
     parent: str
     child: str
+    #: The setting that stops it; empty: there is none.
     switch: str
 
 
@@ -491,30 +472,28 @@ _NO_NAME = re.compile(r"\W")
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Everything that ``tfcompose up`` needs, and nothing that it has to compile.
-
-    ``host`` is the machine whose share of the processes this is: it starts those that are not
-    ``external``. None is the whole plan, and empty the share of the machine that the plan does not
-    name. ``args`` are the values of the robot file's arguments that it was built with,
-    ``environment`` those of the variables that the file names. ``hosts`` are the computers that
-    processes may name; empty: the file does not say how they are reached. ``sections`` are
-    those of tools, by the names of their keys.
-    """
+    """Everything that ``tfcompose up`` needs, with nothing left to compile."""
 
     version: Literal[3] = field(default=VERSION, kw_only=True)
     robot: str
     spec_digest: str
     description: str = field(default=DESCRIPTION, kw_only=True)
     base: str | None
+    #: The machine that starts its share of the processes, those that are not ``external``. None:
+    #: the whole plan; empty: the share of the machine that the plan does not name.
     host: str | None = field(default=None, kw_only=True)
     ros: RosSettings
     edges: tuple[PlanEdge, ...]
     processes: tuple[PlanProcess, ...]
     claims: tuple[PlanClaim, ...] = field(default=(), kw_only=True)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
+    #: The robot file's arguments, as the plan was built with them.
     args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True)
+    #: The variables that the robot file names, as they were at the build.
     environment: dict[str, str] = field(default_factory=dict, kw_only=True)
+    #: The computers that processes may name; empty: the file does not say how to reach them.
     hosts: dict[str, PlanHost] = field(default_factory=dict, kw_only=True)
+    #: Sections of tools, by their keys.
     sections: dict[str, Any] = field(default_factory=dict, kw_only=True)
 
     def process(self, name: str) -> PlanProcess:

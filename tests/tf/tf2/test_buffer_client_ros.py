@@ -27,8 +27,6 @@ from tfcompose.tf.tf2 import (
 )
 from tfcompose.tf.tf2.messages import nanoseconds
 
-pytestmark = pytest.mark.ros
-
 S = 1_000_000_000
 _Future: Any = task.Future  # rclpy does not say its types
 CODES: dict[type[Exception], int] = {

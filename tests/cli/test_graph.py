@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "robots" / "two_rovers.yaml"
@@ -20,10 +21,11 @@ BEGIN = {
 
 
 def graph(*words: object, cwd: Path, without: str = "") -> subprocess.CompletedProcess[str]:
-    """Run the command, ``without`` a package."""
-    hide = f"import sys; sys.modules[{without!r}] = None; " if without else ""
+    """Run the command, ``without`` a package in a process of its own."""
+    if not without:
+        return tfcompose_in(cwd, "graph", *words)
     program = (
-        f"{hide}from tfcompose.cli import main; raise"
+        f"import sys; sys.modules[{without!r}] = None; from tfcompose.cli import main; raise"
         f" SystemExit(main({['graph', *map(str, words)]!r}))"
     )
     return processes.run([sys.executable, "-c", program], cwd=cwd)

@@ -7,16 +7,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import psutil
 import pytest
 
 from tests.support import processes
 from tests.support.robots import EXTERNAL, ROVER
-from tests.support.waiting import TIMEOUT_S, gone, until
+from tests.support.running_robot import RunningRobot
+from tests.support.waiting import gone, until
 
 pytestmark = pytest.mark.ros
 
@@ -63,58 +62,24 @@ def first_on_the_path(folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join([str(folder), *([before] if before else [])])}
 
 
-@dataclass
-class Up:
-    """A launcher that runs, and what it has printed so far."""
-
-    popen: subprocess.Popen[str]
-    output: Path
-
-    @property
-    def text(self) -> str:
-        return self.output.read_text(
-            encoding="utf-8", errors="replace"
-        )  # its end may be half a character yet
-
-    def says(self, words: str) -> None:
-        assert until(lambda: words in self.text or self.popen.poll() is not None), self.text
-        assert words in self.text, self.text
-
-    def below(self) -> list[psutil.Process]:
-        return psutil.Process(self.popen.pid).children(recursive=True)
-
-    def child(self, name: str) -> psutil.Process:
-        return next(process for process in self.below() if name in process.cmdline()[-1:])
-
-    def ends(self, after: str = "") -> int:
-        """Return the exit code; of a clean end, once it has said these words."""
-        if after:
-            self.says(after)
-            self.popen.send_signal(signal.SIGINT)
-        return self.popen.wait(TIMEOUT_S)
-
-
 @pytest.fixture
 def up(
     domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[..., Up]]:
+) -> Iterator[Callable[..., RunningRobot]]:
     """Run ``tfcompose up`` on this text, or on these words, in a folder of the test's own."""
     assert domain
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runtime").mkdir(mode=0o700)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
-    running: list[Up] = []
+    running: list[RunningRobot] = []
 
-    def run(text: str | None, *words: str, **environment: str) -> Up:
+    def run(text: str | None, *words: str, **environment: str) -> RunningRobot:
         if text is not None:
             (tmp_path / "rover.yaml").write_text(text, encoding="utf-8")
             words = ("rover.yaml", *words)
-        output = tmp_path / f"output{len(running)}.txt"
-        command = [sys.executable, "-m", "tfcompose", "up", *words]
-        with output.open("wb") as out:
-            popen = processes.start(command, stdout=out, stderr=out, env=os.environ | environment)
-        running.append(Up(popen, output))
+        output = f"output{len(running)}.txt"
+        running.append(RunningRobot(tmp_path, *words, env=environment, output=output))
         return running[-1]
 
     yield run
@@ -150,7 +115,7 @@ def rogue(domain: object) -> Iterator[Callable[[], subprocess.Popen[str]]]:
 
 @pytest.mark.parametrize("seconds", [0.0, 0.2, 0.5, 1.2])
 def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
-    up: Callable[..., Up], seconds: float
+    up: Callable[..., RunningRobot], seconds: float
 ) -> None:
     """0 is a clean stop; 130 before anything was started."""
     robot = up(ROVER)
@@ -158,19 +123,19 @@ def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
     time.sleep(seconds)
     below, has_started = robot.below(), "| started " in robot.text
     robot.popen.send_signal(signal.SIGINT)
-    assert robot.ends() in ((0,) if has_started else (0, 130))
+    assert robot.wait() in ((0,) if has_started else (0, 130))
     assert until(lambda: all(map(gone, below)))
     assert "Traceback" not in robot.text
 
 
 def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_once(
-    up: Callable[..., Up], rogue: Callable[[], object]
+    up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:
     robot = up(ROVER + "guard: {on_violation: stop}\n")
     robot.says("tree complete")
     below = robot.below()
     rogue()
-    assert robot.ends() == 1
+    assert robot.wait() == 1
     assert [process for process in below if not gone(process)] == []
     (found,) = [line for line in robot.text.splitlines() if "error[TF801]" in line]
     assert all(name in found for name in ("odom → base_link", "/strange/rogue;", "drive (/drive)"))
@@ -178,22 +143,22 @@ def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_o
 
 
 def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
-    up: Callable[..., Up], rogue: Callable[[], object]
+    up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:
     rogue()
     robot = up(ROVER, "--settle", "40")  # what is found sooner is said at once
-    assert robot.ends() == 1
+    assert robot.wait() == 1
     assert re.search(r"error\[TF807\] odom → base_link\b.* /strange/rogue\b", robot.text)
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
 
 
 def test_the_same_edges_by_another_name_are_refused_and_a_signal_ends_the_first_with_0(
-    up: Callable[..., Up],
+    up: Callable[..., RunningRobot],
 ) -> None:
     first = up(ROVER)
     first.says("tree complete: 2 edges live after ")
     second = up(ROVER.replace("robot: rover", "robot: other"), "--settle", "40")
-    assert second.ends() == 1
+    assert second.wait() == 1
     assert f"rover (pid {first.popen.pid}, since " in second.text
     assert second.text.index("isolate: topics") < second.text.index("started guard")
     assert re.search(
@@ -205,20 +170,20 @@ def test_the_same_edges_by_another_name_are_refused_and_a_signal_ends_the_first_
     below = first.below()
     assert {"guard", "static", "drive"} <= {process.cmdline()[-1] for process in below}
     first.popen.send_signal(signal.SIGTERM)
-    assert first.ends() == 0
+    assert first.wait() == 0
     assert [process for process in below if not gone(process)] == []
     assert first.text.splitlines()[-1].endswith("| ended")
     assert "SIGTERM" not in first.text.split("stopping: ", 1)[1].split("\n", 1)[1]
 
 
 def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreported(
-    up: Callable[..., Up], tmp_path: Path
+    up: Callable[..., RunningRobot], tmp_path: Path
 ) -> None:
     """Each says it, or the later of the two, which has ended then."""
     (tmp_path / "other.yaml").write_text(ROVER.replace("robot: rover", "robot: other"))
     both = [up(ROVER), up(None, "other.yaml")]
 
-    def ended() -> list[Up]:
+    def ended() -> list[RunningRobot]:
         return [one for one in both if one.popen.poll() is not None]
 
     def know() -> bool:
@@ -229,18 +194,18 @@ def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreport
 
 
 def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at_the_end(
-    up: Callable[..., Up],
+    up: Callable[..., RunningRobot],
 ) -> None:
     robot = up(EXTERNAL, "--for", "6")
     robot.says("waiting for drive (/diff_drive): odom → base_link")
     robot.says("live  static (/tfcompose_static): base_link → lidar  ")
     assert "expecting drive (/diff_drive)" in robot.text
-    assert robot.ends() == 1
+    assert robot.wait() == 1
     assert re.search(r"error\[TF811\] drive\b.* odom → base_link", robot.text)
 
 
 def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
-    up: Callable[..., Up], tmp_path: Path
+    up: Callable[..., RunningRobot], tmp_path: Path
 ) -> None:
     (tmp_path / "rover.yaml").write_text(ROVER, encoding="utf-8")
     processes.run([sys.executable, "-m", "tfcompose", "build", "rover.yaml"], check=True)
@@ -248,18 +213,20 @@ def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
     stubs.mkdir()
     (stubs / "sitecustomize.py").write_text(WITHOUT_COMPILER)
     without = first_on_the_path(stubs)
-    assert up(ROVER, **without).ends() != 0
-    assert up(None, "build/rover/plan.json", **without).ends(after="tree complete") == 0
+    assert up(ROVER, **without).wait() != 0
+    robot = up(None, "build/rover/plan.json", **without)
+    robot.says("tree complete")
+    assert robot.end() == 0
 
 
 def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
-    up: Callable[..., Up], tmp_path: Path
+    up: Callable[..., RunningRobot], tmp_path: Path
 ) -> None:
     stubs = tmp_path / "stubs"
     stubs.mkdir()
     (stubs / "sitecustomize.py").write_text(WITHOUT_ROS)
     robot = up(ROVER, **first_on_the_path(stubs))
-    assert robot.ends() == 2
+    assert robot.wait() == 2
     assert [line.split()[0] for line in robot.text.splitlines()] == ["error[TF901]", "help:"]
     assert not any((tmp_path / "runtime").iterdir())
     assert sorted(path.name for path in tmp_path.iterdir()) == [
@@ -271,36 +238,36 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
 
 
 def test_without_a_guard_edges_are_still_reported_to_be_live_and_nobody_is_judged(
-    up: Callable[..., Up], rogue: Callable[[], object]
+    up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:
     rogue()
     robot = up(ROVER, "--guard", "off", "--for", "5")  # it would be judged by then
-    assert robot.ends() == 0
+    assert robot.wait() == 0
     assert "tree complete" in robot.text
     assert "TF80" not in robot.text
 
 
 def test_observing_before_the_start_takes_nothing_from_the_time_that_was_requested(
-    up: Callable[..., Up],
+    up: Callable[..., RunningRobot],
 ) -> None:
     begun = time.monotonic()
     robot = up(ROVER, "--settle", "3", "--for", "4")
     late = {"TF804", "TF805"}  # a busy machine is, in truth
-    code, found = robot.ends(), set(re.findall(r"\[(TF\d+)\]", robot.text))
+    code, found = robot.wait(), set(re.findall(r"\[(TF\d+)\]", robot.text))
     assert code == bool(found & late), robot.text
     assert not found - late, robot.text
     assert time.monotonic() - begun >= 7
     assert "tree complete" in robot.text
 
 
-def test_settle_without_a_guard_is_wrong_use(up: Callable[..., Up]) -> None:
+def test_settle_without_a_guard_is_wrong_use(up: Callable[..., RunningRobot]) -> None:
     robot = up(ROVER, "--guard", "off", "--settle", "1")
-    assert robot.ends() == 2
+    assert robot.wait() == 2
     assert "--settle" in robot.text
 
 
 def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(
-    up: Callable[..., Up],
+    up: Callable[..., RunningRobot],
 ) -> None:
     simulated = "drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}"
     missing = "drive: {run: [no_drive], node: drive}\n  more: {run: [no_more]}"
@@ -309,7 +276,7 @@ def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(
         " {}}\n"
     )
     robot = up(ROVER.replace(simulated, missing) + demo)
-    assert robot.ends() == 1
+    assert robot.wait() == 1
     assert robot.text.count("error[TF810]") == 1
     assert all(
         name in robot.text.splitlines()[0] for name in ("no_drive of drive", "no_more of more")

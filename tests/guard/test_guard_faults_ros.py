@@ -20,7 +20,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from tests.support import processes
 from tests.support.domains import entered_domain
-from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, until
+from tests.support.running_robot import RunningRobot, command_of
+from tests.support.waiting import TIMEOUT_S, in_one_of_a_few, until
 
 pytestmark = pytest.mark.ros
 
@@ -69,15 +70,12 @@ with open_node(name, namespace) as node:
 """  # noqa: E501 (a text as its reader has it)
 
 
-class Running:
-    """A robot under ``up``, and the nodes that a test lets join."""
+class Running(RunningRobot):
+    """A robot, and the nodes that a test lets join."""
 
     def __init__(self, folder: Path, text: str) -> None:
         (folder / "robot.yaml").write_text(text, encoding="utf-8")
-        self.output = folder / "output.txt"
-        with self.output.open("wb") as out:
-            command = [sys.executable, "-m", "tfcompose", "up"]
-            self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out)
+        super().__init__(folder)
         self.nodes: list[subprocess.Popen[str]] = []
 
     def joins(
@@ -103,45 +101,9 @@ class Running:
                 node.stdout.close()
         self.nodes.clear()
 
-    def says(self, *words: str, notes: tuple[str, ...] = ()) -> None:
-        """Wait for a line with all the words, and for these notes in the lines behind it."""
-
-        def reports() -> bool:
-            lines = complete_lines(self.output)
-            found = (
-                "\n".join(lines[at : at + 8])
-                for at, line in enumerate(lines)
-                if all(w in line for w in words)
-            )
-            return any(all(note in block for note in notes) for block in found)
-
-        assert until(reports), f"{words} {notes} not in\n{self.output.read_text('utf-8')}"
-
-    def child(self, name: str) -> psutil.Process:
-        """Return one of the robot's processes."""
-        return next(
-            p for p in psutil.Process(self.popen.pid).children() if name in command_of(p)[-1:]
-        )
-
-    def count(self, *words: str) -> int:
-        """Return how many lines hold all the words."""
-        return sum(all(word in line for word in words) for line in complete_lines(self.output))
-
     def end(self) -> int:
         self.leaves()
-        self.popen.send_signal(signal.SIGINT)
-        try:
-            return self.popen.wait(TIMEOUT_S)
-        finally:
-            self.popen.kill()
-
-
-def command_of(process: psutil.Process) -> list[str]:
-    """Return the words of a process's command; none if it has ended."""
-    try:
-        return process.cmdline()
-    except psutil.NoSuchProcess:
-        return []
+        return super().end()
 
 
 @pytest.fixture
@@ -239,7 +201,7 @@ def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(faulty: Running) -
     faulty.says("warning[TF822]", "map → person_1", "/tracker_a", "/tracker_b")
     faulty.leaves()
     faulty.says("over", "base_link → map", "/strange/loop")
-    assert "TF803" not in faulty.output.read_text(encoding="utf-8")
+    assert "TF803" not in faulty.text
 
 
 @of_one_robot
@@ -255,11 +217,11 @@ def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twic
     faulty.says("TF801", "/second")
     faulty.leaves()
     faulty.says("over", "map → odom", "/first")
-    assert faulty.count("TF801", "/first;") == 1
+    assert len(faulty.lines("TF801", "/first;")) == 1
     assert (
-        faulty.count("| live "),
-        faulty.count("complete"),
-        faulty.count("watching 2 edges again"),
+        len(faulty.lines("| live ")),
+        len(faulty.lines("complete")),
+        len(faulty.lines("watching 2 edges again")),
     ) == (2, 1, 1)
 
 
@@ -295,7 +257,7 @@ def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(
     robot.starts(LATCHES)
     guard.send_signal(signal.SIGCONT)
     robot.says("warning[TF850]", "/mounts", "/tf_static", "base_link → camera")
-    assert robot.count("TF850") == 1
+    assert len(robot.lines("TF850")) == 1
 
 
 #: A child that owns an edge, and once there is a file "lie" sends that of another, too.
@@ -323,11 +285,11 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
         "error[TF801]", "map → odom", "/traitor;", "slam (/slam)", notes=("traitor is stopped",)
     )
     robot.says("over", "map → odom", "/traitor")
-    assert robot.count("traitor is stopped") == 1
+    assert len(robot.lines("traitor is stopped")) == 1
     assert robot.popen.poll() is None
 
     def children() -> list[list[str]]:
-        return [command_of(process) for process in psutil.Process(robot.popen.pid).children()]
+        return [command_of(process) for process in robot.below(recursive=False)]
 
     assert until(lambda: not any("traitor.py" in words for words in children()))
     assert {"guard", "slam"} <= {words[-1] for words in children() if words}
@@ -388,7 +350,7 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_p
     robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
     robot.joins("/drive", "odom base_link")
     robot.says("complete")
-    silent = robot.count("fell silent")
+    silent = len(robot.lines("fell silent"))
     robot.starts(FLOOD)
     robot.says("error[TF801]", "map → odom", "/rogue;", "slam (/slam)")
     both = [robot.child("guard"), psutil.Process(robot.starts(LISTENER))]
@@ -409,11 +371,11 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_p
         )
         assert guard_s < 2 * listener_s
         assert both[0].memory_info().rss < 1.1 * before_bytes
-        before, silent = silent, robot.count("fell silent")
+        before, silent = silent, len(robot.lines("fell silent"))
         return silent == before
 
     assert in_one_of_a_few(attempt)
-    assert robot.count("TF801") == 1
+    assert len(robot.lines("TF801")) == 1
     robot.leaves()
     robot.says("over", "map → odom", "/rogue")
 

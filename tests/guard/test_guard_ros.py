@@ -4,15 +4,14 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
-import psutil
 import pytest
 
 from tests.support import processes
 from tests.support.domains import Domain, entered_domain
-from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, offences, until
+from tests.support.running_robot import RunningRobot
+from tests.support.waiting import TIMEOUT_S, in_one_of_a_few, offences, until
 
 pytestmark = [pytest.mark.ros, pytest.mark.xdist_group("one robot for all of these")]
 
@@ -50,31 +49,6 @@ with open_node(name, "/strange") as node:
 """  # noqa: E501 (a text as its reader has it)
 
 
-@dataclass
-class Robot:
-    """A robot that runs, and what it has printed so far."""
-
-    popen: subprocess.Popen[str]
-    output: Path
-
-    def lines(self, *words: str) -> list[str]:
-        """Return the lines that hold all the words."""
-        return [
-            line for line in complete_lines(self.output) if all(word in line for word in words)
-        ]
-
-    def says(self, *words: str, times: int = 1) -> None:
-        """Wait for such a line, or so many."""
-        there = until(lambda: len(self.lines(*words)) >= times)
-        assert there, (words, self.output.read_text(encoding="utf-8"))
-
-    def child(self, name: str) -> psutil.Process:
-        """Return one of the robot's processes."""
-        return next(
-            p for p in psutil.Process(self.popen.pid).children() if name in p.cmdline()[-1:]
-        )
-
-
 @pytest.fixture(scope="module")
 def domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Domain]:
     """A domain as conftest's, for all tests of this module."""
@@ -82,31 +56,16 @@ def domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Domain]:
         yield entered
 
 
-def start(folder: Path, *words: str) -> Robot:
-    output = folder / "output.txt"
-    command = [sys.executable, "-m", "tfcompose", "up", *words]
-    with output.open("wb") as out:
-        return Robot(processes.start(command, cwd=folder, stdout=out, stderr=out), output)
-
-
-def end(robot: Robot) -> int:
-    robot.popen.send_signal(signal.SIGINT)
-    try:
-        return robot.popen.wait(TIMEOUT_S)
-    finally:
-        robot.popen.kill()
-
-
 @pytest.fixture(scope="module")
-def robot(domain: Domain, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+def robot(domain: Domain, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
     """The demo robot, complete."""
     assert domain
-    running = start(tmp_path_factory.mktemp("robot"), str(ROBOT), "--profile", "demo")
+    running = RunningRobot(tmp_path_factory.mktemp("robot"), str(ROBOT), "--profile", "demo")
     try:
         running.says("tree complete")
         yield running
     finally:
-        code = end(running)
+        code = running.end()
     assert code == 0
 
 
@@ -140,7 +99,7 @@ def stranger(domain: Domain) -> Iterator[Stranger]:
     one.leaves()
 
 
-def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: Robot) -> None:
+def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: RunningRobot) -> None:
     live = robot.lines("| live ")
     owners = [
         "static (/tfcompose_static)",
@@ -155,7 +114,9 @@ def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: Robo
     assert offences("".join(robot.lines("TF8"))) == []
 
 
-def test_a_stranger_on_an_owned_edge_is_named_once(robot: Robot, stranger: Stranger) -> None:
+def test_a_stranger_on_an_owned_edge_is_named_once(
+    robot: RunningRobot, stranger: Stranger
+) -> None:
     named = ("error[TF801]", "odom → base_link", "/strange/rogue_odom", "base_drive")
     stranger("rogue_odom", "moving", "odom base_link")
     robot.says(*named)
@@ -165,7 +126,7 @@ def test_a_stranger_on_an_owned_edge_is_named_once(robot: Robot, stranger: Stran
 
 
 def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(
-    robot: Robot, stranger: Stranger
+    robot: RunningRobot, stranger: Stranger
 ) -> None:
     # A message that is sent before anybody is discovered reaches nobody; a latched one waits for
     # its readers.
@@ -211,13 +172,13 @@ def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(
     ],
 )
 def test_what_a_stranger_does_is_named(
-    robot: Robot, stranger: Stranger, kind: str, edge: str, finding: tuple[str, ...]
+    robot: RunningRobot, stranger: Stranger, kind: str, edge: str, finding: tuple[str, ...]
 ) -> None:
     stranger("rogue", kind, edge)
     robot.says(*finding)
 
 
-def test_an_owner_that_falls_silent_is_named_and_when_it_is_back(robot: Robot) -> None:
+def test_an_owner_that_falls_silent_is_named_and_when_it_is_back(robot: RunningRobot) -> None:
     drive = robot.child("base_drive")
     silent = ("TF804", "base_drive (/diff_drive_controller)", "odom → base_link")
     back = ("over", "odom → base_link", "back")
@@ -230,7 +191,7 @@ def test_an_owner_that_falls_silent_is_named_and_when_it_is_back(robot: Robot) -
     robot.says(*back, times=over + 1)
 
 
-def test_a_guard_that_hangs_is_replaced(robot: Robot) -> None:
+def test_a_guard_that_hangs_is_replaced(robot: RunningRobot) -> None:
     guard = robot.child("guard")
     guard.send_signal(signal.SIGSTOP)
     robot.says("TF808", "guard")

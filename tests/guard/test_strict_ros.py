@@ -4,22 +4,20 @@ Children that send what is not theirs, late joiners, and a guard that is killed.
 """
 
 import json
-import os
 import re
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 
 from tests.support import processes
 from tests.support.domains import entered_domain
 from tests.support.guard_without_ids import guard_without_ids
 from tests.support.processes import Started
-from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
+from tests.support.running_robot import RunningRobot
+from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.ros.graph import writers
 from tfcompose.tf.ros.node import Received, TFPublisher, TFSubscription, open_node, wait
@@ -91,7 +89,7 @@ def child(name: str, fixed: list[str], moving: list[str], folder: Path) -> str:
     return json.dumps({"run": argv, "node": f"/{name}"})
 
 
-class Fenced:
+class Fenced(RunningRobot):
     """A robot under a strict guard."""
 
     def __init__(self, folder: Path, fence: str, env: dict[str, str]) -> None:
@@ -105,40 +103,7 @@ class Fenced:
             ),
         )
         (folder / "robot.yaml").write_text(text, encoding="utf-8")
-        self.output = folder / "output.txt"
-        with self.output.open("wb") as out:
-            command = [sys.executable, "-m", "tfcompose", "up"]
-            self.popen = processes.start(
-                command, cwd=folder, stdout=out, stderr=out, env=os.environ | env
-            )
-
-    def lines(self, word: str) -> list[str]:
-        return [line for line in complete_lines(self.output) if word in line]
-
-    @property
-    def text(self) -> str:
-        return self.output.read_text(encoding="utf-8")
-
-    def says(self, *words: str) -> None:
-        there = until(
-            lambda: any(
-                all(word in line for word in words) for line in complete_lines(self.output)
-            ),
-            60,
-        )
-        assert there, (words, self.text)
-
-    def guard(self) -> psutil.Process:
-        return next(
-            p for p in psutil.Process(self.popen.pid).children() if "guard" in p.cmdline()[-1:]
-        )
-
-    def end(self) -> int:
-        self.popen.send_signal(signal.SIGINT)
-        try:
-            return self.popen.wait(TIMEOUT_S)
-        finally:
-            self.popen.kill()
+        super().__init__(folder, env=env)
 
 
 FENCES = [
@@ -253,7 +218,7 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
             lambda: sum(1 + int(more.findall(line)[0] or 0) for line in reported(robot)) == 3
         ), robot.text
         before = reported(robot)
-        dead = robot.guard()
+        dead = robot.child("guard")
         dead.kill()
         assert until(lambda: gone(dead))
         died_ns = time.time_ns()
@@ -264,7 +229,7 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
             return robot.text.count("started guard") == 2
 
         assert until(is_back), robot.text  # it waits a second, and then needs some time to listen
-        began_ns = robot.guard().create_time() * 1e9
+        began_ns = robot.child("guard").create_time() * 1e9
         assert [one for one in meanwhile if died_ns < one.source_ns < began_ns] == []
         joined = Listener(other)
         robot.says("warning[TF808]", "guard", "SIGKILL", "/tf")
@@ -280,7 +245,7 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
 
 def test_at_its_end_it_prints_what_it_held_back(robot: Fenced) -> None:
     robot.end()
-    robot.says("held back: ", " × map → odom from /rogue", " × tool → cup from /rogue")
+    assert robot.lines("held back: ", " × map → odom from /rogue", " × tool → cup from /rogue")
     assert "tool → hand from" not in robot.text
 
 

@@ -10,7 +10,6 @@ import json
 import os
 import re
 import shlex
-import signal
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +17,8 @@ from typing import TYPE_CHECKING
 
 from tests.support import processes
 from tests.support.domains import entered_domain
-from tests.support.waiting import TIMEOUT_S, complete_lines, until
+from tests.support.running_robot import RunningRobot
+from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.foundation.signals import Stop
 from tfcompose.tf.ros.node import TFSubscription, open_node, wait
 from tfcompose.tf.ros.tf_codec import decode
@@ -101,15 +101,14 @@ class Child:
     frames: Sequence[str] = ()
 
 
-class Robot:
+class Robot(RunningRobot):
     """A running robot with owners of map → odom and odom → base_link, and more children."""
 
     def __init__(
         self, folder: Path, guard: str, children: Mapping[str, Child], env: Mapping[str, str]
     ) -> None:
         (folder / "node.py").write_text(NODE, encoding="utf-8")
-        self.folder, self.env, self.output = folder, dict(env), folder / "output.txt"
-        self.guard = guard
+        self.env, self.guard = dict(env), guard
         lines = [
             *(
                 "tfcompose: 1",
@@ -136,32 +135,11 @@ class Robot:
             more = {"run": one.command, "node": f"/{name}", "required": False, "restart": "no"}
             lines.append(f"  {name}: {json.dumps(more)}")
         (folder / "robot.yaml").write_text("\n".join(lines), encoding="utf-8")
-        with self.output.open("wb") as out:
-            command = [sys.executable, "-m", "tfcompose", "up"]
-            self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out, env=self.env)
-
-    @property
-    def text(self) -> str:
-        """What it has said until now."""
-        return "\n".join(complete_lines(self.output))
+        super().__init__(folder, env=self.env)
 
     def output_after(self, lines: int) -> str:
         """Return what it has said behind so many lines."""
-        return "\n".join(complete_lines(self.output)[lines:])
-
-    def says(self, *words: str, after: int = 0) -> str:
-        """Wait for a line with all these words behind so many lines, and return it."""
-
-        def found() -> list[str]:
-            return [
-                line
-                for line in complete_lines(self.output)[after:]
-                if all(word in line for word in words)
-            ]
-
-        until(lambda: found() or self.popen.poll() is not None)
-        assert found(), (words, self.text)
-        return found()[0]
+        return "\n".join(self.lines(after=lines))
 
     def pid_of(self, process: str) -> int:
         """Return the process number of one of its own."""
@@ -185,18 +163,6 @@ class Robot:
             started.wait(TIMEOUT_S)
         finally:
             processes.end(started)
-
-    def lines(self) -> int:
-        """Return how many lines it has said."""
-        return len(complete_lines(self.output))
-
-    def end(self) -> int:
-        """Interrupt it and return its exit code."""
-        self.popen.send_signal(signal.SIGINT)
-        try:
-            return self.popen.wait(TIMEOUT_S)
-        finally:
-            processes.end(self.popen)
 
 
 @contextmanager
@@ -238,7 +204,7 @@ class PlainListener:
 
 def holds_back(robot: Robot, inside: Mapping[str, str], **foreign_inside: str) -> None:
     """Let a node, and a program of another DDS, join what only the robot's processes are in."""
-    after = robot.lines()
+    after = len(robot.lines())
     started = [robot.start(node("inside", OTHER_X, "map odom"), **inside)]
     try:
         robot.says("error[TF801]", "map → odom", "/inside", after=after)

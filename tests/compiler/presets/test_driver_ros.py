@@ -1,19 +1,15 @@
 """A driver that publishes as realsense2_camera does, started by its preset, and guarded."""
 
 import os
-import re
-import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 import pytest
 
-from tests.support import processes
-from tests.support.waiting import TIMEOUT_S, until
+from tests.support.running_robot import RunningRobot
+from tests.support.waiting import TIMEOUT_S
 
 pytestmark = pytest.mark.ros
 
@@ -90,72 +86,29 @@ sensors:
 EVERYTHING = 'streams: [depth, color, infra1, infra2], imu: true, serial: "0042"'
 
 
-@dataclass
-class Up:
-    """A launcher that runs, and what it has printed so far."""
-
-    popen: subprocess.Popen[str]
-    output: Path
-
-    @property
-    def text(self) -> str:
-        return self.output.read_text(
-            encoding="utf-8", errors="replace"
-        )  # its end may be half a character yet
-
-    def says(self, *words: str) -> None:
-        """Wait until it has said all of that: the lines of a finding come one after the other."""
-        until(lambda: all(word in self.text for word in words) or self.popen.poll() is not None)
-        for word in words:
-            assert word in self.text, self.text
-
-    def ended(self) -> list[str]:
-        """Wait until it has ended, and return the codes of what was found."""
-        self.popen.wait(TIMEOUT_S)
-        return re.findall(r"\[(TF\d{3})\]", self.text)
-
-
 @pytest.fixture
-def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
+def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., RunningRobot]]:
     """Build and run this robot with the stand-in as its installed driver."""
     assert domain
     program = tmp_path / "ros" / "lib" / "realsense2_camera" / "realsense2_camera_node"
     program.parent.mkdir(parents=True)
     program.write_text(f"#!{sys.executable}\n{STAND_IN}", encoding="utf-8")
     program.chmod(0o755)
-    running: list[Up] = []
+    running: list[RunningRobot] = []
 
-    def run(text: str, *words: str, **environment: str) -> Up:
+    def run(text: str, *words: str, **environment: str) -> RunningRobot:
         (tmp_path / "rover.yaml").write_text(text, encoding="utf-8")
-        output = tmp_path / "output.txt"
         prefixes = os.pathsep.join(
             filter(None, [str(tmp_path / "ros"), os.environ.get("AMENT_PREFIX_PATH")])
         )
-        with output.open("wb") as out:
-            popen = processes.start(
-                [sys.executable, "-m", "tfcompose", "up", "rover.yaml", *words],
-                stdout=out,
-                stderr=out,
-                cwd=tmp_path,
-                env=os.environ | {"AMENT_PREFIX_PATH": prefixes} | environment,
-            )
-        running.append(Up(popen, output))
+        env = {"AMENT_PREFIX_PATH": prefixes} | environment
+        running.append(RunningRobot(tmp_path, "rover.yaml", *words, env=env))
         return running[-1]
 
     yield run
     for one in running:
-        below = (
-            psutil.Process(one.popen.pid).children(recursive=True)
-            if one.popen.poll() is None
-            else []
-        )
-        if one.popen.poll() is None:
-            one.popen.send_signal(2)
-            try:
-                one.popen.wait(TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                one.popen.kill()
-                one.popen.wait()
+        below = one.below() if one.popen.poll() is None else []
+        one.end()
         assert not psutil.wait_procs(below, TIMEOUT_S)[1]
 
 
@@ -169,10 +122,11 @@ def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
     ids=["all", "switched off", "answers nothing"],
 )
 def test_a_driver_that_does_as_its_preset_says_is_let_alone(
-    up: Callable[..., Up], options: str, environment: dict[str, str]
+    up: Callable[..., RunningRobot], options: str, environment: dict[str, str]
 ) -> None:
     robot = up(ROVER % options, "--for", "5", **environment)
-    assert robot.ended() == []
+    robot.wait()
+    assert robot.codes() == []
     assert "tree complete" in robot.text
     if "STAND_IN_SLEEPS" not in environment:
         assert f"stand-in: /front/front{' 0042' if 'serial' in options else ''}" in robot.text
@@ -210,14 +164,14 @@ def test_a_driver_that_does_as_its_preset_says_is_let_alone(
     ids=["ignores its switch", "another stream and a nominal frame", "forces"],
 )
 def test_a_driver_that_does_otherwise_is_named_once(
-    up: Callable[..., Up],
+    up: Callable[..., RunningRobot],
     options: str,
     environment: dict[str, str],
     expected: dict[str, tuple[str, ...]],
 ) -> None:
     robot = up(ROVER % options, **environment)
     for code, names in expected.items():
-        robot.says(code, "/front/front", *names)
-    robot.popen.send_signal(signal.SIGINT)
-    codes = robot.ended()
+        robot.says(code, notes=("/front/front", *names))
+    robot.end()
+    codes = robot.codes()
     assert all(codes.count(code) == 1 for code in expected), codes

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 import yaml
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tests.support.plans import built, compiled_plan
 from tests.support.robots import DRIVEN
 from tfcompose.model.plan.file import read_plan
@@ -20,7 +20,6 @@ from tfcompose.tools.exporters.kubernetes import Cluster, cluster_name, files_of
 
 ROBOTS = Path(__file__).parents[3] / "robots"
 VERSIONS = ("1.31", "1.37")
-TFCOMPOSE = (sys.executable, "-m", "tfcompose")
 
 HOSTED = """
 tfcompose: 1
@@ -274,21 +273,21 @@ def test_names_that_make_one_label_get_different_ones() -> None:
 
 def test_a_plan_that_a_config_map_cannot_hold_is_refused_with_a_way_out(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(DRIVEN)
-    done = processes.run([*TFCOMPOSE, "build", "robot.yaml", "-o", "built"], cwd=tmp_path)
+    done = tfcompose_in(tmp_path, "build", "robot.yaml", "-o", "built")
     assert done.returncode == 0, done.stderr
     plan = tmp_path / "built" / "plan.json"
     params = tmp_path / "built" / "params" / "drive.yaml"
     params.write_text(params.read_text("utf-8") + f"# {'x' * 1_000_001}\n")
     words = ["export", "k8s", str(plan), "--image", "robot:1"]
-    done = processes.run([*TFCOMPOSE, *words], cwd=tmp_path)
+    done = tfcompose_in(tmp_path, *words)
     assert (done.returncode, "--at" in done.stderr) == (2, True)
     assert not (tmp_path / "built" / "k8s").exists()
-    assert processes.run([*TFCOMPOSE, *words, "--at", "/opt/robot"], cwd=tmp_path).returncode == 0
+    assert tfcompose_in(tmp_path, *words, "--at", "/opt/robot").returncode == 0
     assert json.loads(plan.read_text("utf-8"))["robot"] == "rover"
 
 
 def test_without_an_image_nothing_is_built(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(DRIVEN)
-    done = processes.run([*TFCOMPOSE, "export", "k8s", "robot.yaml"], cwd=tmp_path)
+    done = tfcompose_in(tmp_path, "export", "k8s", "robot.yaml")
     assert (done.returncode, "--image" in done.stderr) == (2, True)
     assert not (tmp_path / "build").exists()

@@ -178,24 +178,6 @@ def _change(tfc: Callable[..., Any], tmp_path: Path) -> None:
     assert "base_link → lidar" in changed.stdout, "what running listeners keep"
 
 
-def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_searches_it(
-    tfc: Callable[..., Any], tmp_path: Path
-) -> None:
-    assert tfc("ps", "--fail-on", "absent").returncode == 1
-    code = """
-import sys
-from tfcompose.cli import main, starting
-def broken(*_, **__): raise ZeroDivisionError("of a launcher")
-starting.supervise = broken
-sys.exit(main(["up", "-d"]))
-"""
-    up = processes.run([sys.executable, "-c", code])
-    assert up.returncode == 1
-    (error_file,) = (tmp_path / "log").rglob("launcher.err")
-    assert str(error_file) in up.stderr
-    assert "ZeroDivisionError: of a launcher" in error_file.read_text()
-
-
 def test_events_are_reported_from_the_start_and_wait_returns_the_exit_code(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -241,22 +223,6 @@ def test_a_killed_launcher_ends_events_with_1_leaves_no_process_and_is_not_in_th
     assert tfc("ps", "--fail-on", "absent").returncode == 1
     assert "was killed" in tfc("logs").stdout or "tree complete" in tfc("logs").stdout
     assert tfc("up", "--wait").returncode == 0
-
-
-def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
-    tfc: Callable[..., Any], tmp_path: Path
-) -> None:
-    (tmp_path / "robot.yaml").write_text(f"{ROVER}  web: {{run: [serve], cwd: .}}\n")
-    first = tfc("up", "--dry-run")
-    assert first.returncode == 0
-    assert "folder   ${build_dir}/../.." in first.stdout
-    assert not (tmp_path / "build").exists()
-    assert str(tmp_path) not in first.stdout
-    assert [
-        word in first.stdout for word in ("${tfcompose}", "${plan}", "odom → base_link", "20 Hz")
-    ] == [True] * 4
-    tfc("build")
-    assert tfc("up", "build/rover/plan.json", "--dry-run").stdout == first.stdout
 
 
 def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(

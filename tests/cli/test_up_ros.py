@@ -42,18 +42,6 @@ class Blocker:
             raise ImportError(name + " is not there")
 sys.meta_path.insert(0, Blocker())
 """
-#: Takes rclpy from all that find modules.
-WITHOUT_ROS = """
-import sys
-class Hider:
-    def __init__(self, finder):
-        self.finder = finder
-    def find_spec(self, name, path=None, target=None):
-        return None if name.partition(".")[0] == "rclpy" else self.finder.find_spec(name, path, target)
-    def __getattr__(self, name):
-        return getattr(self.finder, name)
-sys.meta_path[:] = [Hider(finder) for finder in sys.meta_path]
-"""  # noqa: E501 (a text as its reader has it)
 
 
 def first_on_the_path(folder: Path) -> dict[str, str]:
@@ -219,24 +207,6 @@ def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
     assert robot.end() == 0
 
 
-def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
-    up: Callable[..., RunningRobot], tmp_path: Path
-) -> None:
-    stubs = tmp_path / "stubs"
-    stubs.mkdir()
-    (stubs / "sitecustomize.py").write_text(WITHOUT_ROS)
-    robot = up(ROVER, **first_on_the_path(stubs))
-    assert robot.wait() == 2
-    assert [line.split()[0] for line in robot.text.splitlines()] == ["error[TF901]", "help:"]
-    assert not any((tmp_path / "runtime").iterdir())
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "output0.txt",
-        "rover.yaml",
-        "runtime",
-        "stubs",
-    ]
-
-
 def test_without_a_guard_edges_are_still_reported_to_be_live_and_nobody_is_judged(
     up: Callable[..., RunningRobot], rogue: Callable[[], object]
 ) -> None:
@@ -258,27 +228,3 @@ def test_observing_before_the_start_takes_nothing_from_the_time_that_was_request
     assert not found - late, robot.text
     assert time.monotonic() - begun >= 7
     assert "tree complete" in robot.text
-
-
-def test_settle_without_a_guard_is_wrong_use(up: Callable[..., RunningRobot]) -> None:
-    robot = up(ROVER, "--guard", "off", "--settle", "1")
-    assert robot.wait() == 2
-    assert "--settle" in robot.text
-
-
-def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(
-    up: Callable[..., RunningRobot],
-) -> None:
-    simulated = "drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}"
-    missing = "drive: {run: [no_drive], node: drive}\n  more: {run: [no_more]}"
-    demo = (
-        f"profiles: {{demo: {{processes: {{{simulated}, more: {{run: ['true']}}}}}}, idle:"
-        " {}}\n"
-    )
-    robot = up(ROVER.replace(simulated, missing) + demo)
-    assert robot.wait() == 1
-    assert robot.text.count("error[TF810]") == 1
-    assert all(
-        name in robot.text.splitlines()[0] for name in ("no_drive of drive", "no_more of more")
-    )
-    assert robot.text.endswith(": tfcompose up rover.yaml --profile demo\n")

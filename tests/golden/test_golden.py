@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
-from tests.support.cli import tfcompose
+from tests.support.cli import tfcompose, tfcompose_in
 
 HERE = Path(__file__).parent
 ROBOTS = HERE.parents[1] / "robots"
@@ -48,7 +48,11 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("case", CASES)
 def test_build_writes_the_golden_files_byte_for_byte(case: str, tmp_path: Path) -> None:
     file, *options = CASES[case]
-    built = build((f"robots/{file}", *options), tmp_path / "out", HERE.parents[1])
+    done = tfcompose_in(
+        HERE.parents[1], "build", f"robots/{file}", *options, "-o", tmp_path / "out"
+    )
+    assert done.returncode == 0, done.stderr
+    built = contents(tmp_path / "out")
     golden = HERE / case
     if os.environ.get("TFCOMPOSE_UPDATE_GOLDEN"):
         shutil.rmtree(golden, ignore_errors=True)

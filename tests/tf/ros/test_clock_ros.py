@@ -10,8 +10,6 @@ from tests.support.waiting import until
 from tfcompose.tf.ros.clock import SimClock, read_clock
 from tfcompose.tf.ros.node import open_node
 
-pytestmark = pytest.mark.ros
-
 
 @given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 999_999_999))
 def test_what_ros_wrote_is_read(seconds: int, nanoseconds: int) -> None:
@@ -29,6 +27,7 @@ def test_any_bytes_are_a_time_or_none(data: bytes) -> None:
     assert found is None or abs(found) <= 2**31 * 1_000_000_000
 
 
+@pytest.mark.ros
 @pytest.mark.usefixtures("domain")
 def test_a_clock_goes_on_after_bytes_that_are_no_time() -> None:
     with open_node("simulator", "") as node:

@@ -1,11 +1,7 @@
 import subprocess
 import sys
 
-import pytest
-
 from tests.support import processes
-
-pytestmark = pytest.mark.ros
 
 #: Leaves ROS for 2 minutes, in C, with the interpreter's lock kept.
 STUCK = """

@@ -11,8 +11,6 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from tfcompose.tf.ros import graph
 from tfcompose.tf.ros.graph import BARE_DDS, UNKNOWN_NODE
 
-pytestmark = pytest.mark.ros
-
 QOS = SimpleNamespace(
     durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE
 )

@@ -35,7 +35,7 @@ class RunningRobot:
         command = [sys.executable, "-m", "tfcompose", "up", *words]
         with self.output.open("wb") as out:
             self.popen = processes.start(
-                command, cwd=folder, stdout=out, stderr=out, env=env and os.environ | env
+                command, cwd=folder, stdout=out, stderr=out, env={**os.environ, **(env or {})}
             )
 
     @property

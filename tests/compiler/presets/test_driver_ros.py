@@ -3,13 +3,14 @@
 import os
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import psutil
 import pytest
 
 from tests.support.running_robot import RunningRobot
-from tests.support.waiting import TIMEOUT_S
+from tests.support.waiting import TIMEOUT_S, until
 
 pytestmark = pytest.mark.ros
 
@@ -132,6 +133,10 @@ def test_a_driver_that_does_as_its_preset_says_is_let_alone(
         assert f"stand-in: /front/front{' 0042' if 'serial' in options else ''}" in robot.text
 
 
+def has_said(robot: RunningRobot, *words: str) -> bool:
+    return all(word in robot.text for word in words)
+
+
 @pytest.mark.parametrize(
     ("options", "environment", "expected"),
     [
@@ -171,7 +176,7 @@ def test_a_driver_that_does_otherwise_is_named_once(
 ) -> None:
     robot = up(ROVER % options, **environment)
     for code, names in expected.items():
-        robot.says(code, notes=("/front/front", *names))
+        assert until(partial(has_said, robot, code, "/front/front", *names)), robot.text
     robot.end()
     codes = robot.codes()
     assert all(codes.count(code) == 1 for code in expected), codes

@@ -67,7 +67,7 @@ def accusations(tries: int) -> dict[str, Counter[str]]:
 def _tried(robot: Robot, kind: str) -> str:
     """Start one of that kind, and return who was named."""
     command, name = KINDS[kind]
-    after = robot.lines()
+    after = len(robot.lines())
     one = robot.start(command)
 
     def text() -> str:

@@ -133,7 +133,7 @@ def test_a_driver_that_does_as_its_preset_says_is_let_alone(
         assert f"stand-in: /front/front{' 0042' if 'serial' in options else ''}" in robot.text
 
 
-def has_said(robot: RunningRobot, *words: str) -> bool:
+def has_printed(robot: RunningRobot, *words: str) -> bool:
     return all(word in robot.text for word in words)
 
 
@@ -176,7 +176,7 @@ def test_a_driver_that_does_otherwise_is_named_once(
 ) -> None:
     robot = up(ROVER % options, **environment)
     for code, names in expected.items():
-        assert until(partial(has_said, robot, code, "/front/front", *names)), robot.text
+        assert until(partial(has_printed, robot, code, "/front/front", *names)), robot.text
     robot.end()
     codes = robot.codes()
     assert all(codes.count(code) == 1 for code in expected), codes

@@ -138,15 +138,15 @@ def test_no_line_of_the_package_is_wider_than_a_page() -> None:
 
 #: How many statements each wing has at most. A commit that raises one says why.
 MOST_STATEMENTS = {
-    "foundation": 1_792,
-    "model": 1_904,
-    "spec": 4_825,
-    "compiler": 10_090,
-    "tf": 5_599,
-    "guard": 4_393,
-    "launcher": 3_834,
-    "cli": 5_474,
-    "tools": 11_519,
+    "foundation": 1_797,
+    "model": 1_948,
+    "spec": 4_913,
+    "compiler": 10_226,
+    "tf": 5_626,
+    "guard": 4_497,
+    "launcher": 3_880,
+    "cli": 5_482,
+    "tools": 11_744,
 }
 
 

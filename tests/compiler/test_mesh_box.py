@@ -74,6 +74,7 @@ def test_a_broken_mesh_has_no_box(ending: str, content: bytes, tmp_path: Path) -
         ("{uri: cube.obj, scale: 0.001}", "[1, 1, 1]"),
         ("small.obj", "[1000, 1000, 1000]"),
         ("cube.obj", None),
+        ("mark.obj", None),
         ("{uri: cube.obj, scale: [0.5, -1, 1]}", None),
     ],
 )
@@ -83,7 +84,9 @@ def test_a_mesh_in_another_unit_is_found_in_a_robot_file(
     monkeypatch.chdir(tmp_path)
     cube = CUBE.read_text("utf-8")
     Path("cube.obj").write_text(cube, "utf-8")
-    Path("small.obj").write_text(cube.replace("0.1", "0.0001"), "utf-8")
+    mark = cube.replace("0.1", "0.0001")  # of a frame: no body is a cube of this size
+    Path("mark.obj").write_text(mark, "utf-8")
+    Path("small.obj").write_text(mark.replace("v 0.0001", "v 0.0002"), "utf-8")
     text = f"""tfcompose: 1
 robot: r
 links:

@@ -29,7 +29,6 @@ READ_A_FILE = {
     "cli/untrusted.py",
     "compiler/provenance.py",
     "tools/view/edit.py",
-    "tools/exporters/launch_arguments.py",
     "tools/importers/command.py",
     "tools/importers/kits.py",
 }

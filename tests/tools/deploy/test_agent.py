@@ -99,7 +99,7 @@ def test_a_unit_that_was_restarted_long_ago_has_not_failed(
     agent: Agent, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shown = {"ActiveState": "active", "NRestarts": "3", "MainPID": "7"}
-    monkeypatch.setattr(agent, "_shown", lambda: shown)
+    monkeypatch.setattr(agent, "_show_unit", lambda: shown)
     monkeypatch.setattr(agent, "_journal", lambda: ["last words"])
     assert agent.state()["failed"] is False
     shown["NRestarts"] = "4"
@@ -111,7 +111,7 @@ def test_a_trial_that_nobody_ended_is_reported_and_the_release_of_a_launcher_is_
     agent: Agent, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shown = {"ActiveState": "active"}
-    monkeypatch.setattr(agent, "_shown", lambda: shown)
+    monkeypatch.setattr(agent, "_show_unit", lambda: shown)
     monkeypatch.setattr(agent, "_must", lambda *_: None)
     monkeypatch.setattr(
         agent, "_tfcompose", lambda words, _: subprocess.CompletedProcess(words, 0, "", "")

@@ -67,7 +67,7 @@ def test_the_rate_may_stand_behind_the_edge(text: str) -> None:
         ("map → odom", "map → odom at 5 m", [("TF104", 3)]),
         ("map → odom", "map → odom at", [("TF106", 3)]),
         ("map → odom", "{edge: map → odom at 5 Hz}", [("TF106", 3)]),
-        ("router:", "ruter:", [("TF101", 6), ("TF102", 6)]),
+        ("router:", "ruter:", [("TF101", 6)]),
         ("namespace: robot2", "prefix: r1/", [("TF880", 7)]),
         ("share: [map → base_link]", "share: []", [("TF881", 7)]),
         ("share: [map → base_link]", "share: [odom → base_link]", [("TF881", 7)]),

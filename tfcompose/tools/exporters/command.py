@@ -158,12 +158,12 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
         reject(error.findings, UNREADABLE)
     except OSError as error:
         fail(f"nothing was written to {folder}: {error.strerror}", UNREADABLE)
-    print(f"wrote {folder}: {', '.join(one.path for one in files)}")
+    print(f"wrote {folder}: {', '.join(written.path for written in files)}")
     if plan.host is None:
         differences += [
-            f"{one.name} runs on {one.host}, and is here too: --host"
-            for one in plan.started
-            if one.host
+            f"{process.name} runs on {process.host}, and is here too: --host"
+            for process in plan.started
+            if process.host
         ]
     for line in differences:
         print(f"differs from tfcompose up: {line}")

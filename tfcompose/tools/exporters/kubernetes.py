@@ -78,7 +78,7 @@ def files_of(plan: Plan, process: PlanProcess) -> tuple[str, ...]:
 
     The plan is first.
     """
-    files = {found for word in process.texts for found in _IN_FOLDER.findall(word)}
+    files = {found for argument in process.texts for found in _IN_FOLDER.findall(argument)}
     if process.params_file:
         files.add(process.params_file)
     if plan.describes(process):
@@ -224,17 +224,17 @@ def _pod(
         "volumeMounts": [{"name": "plan", "mountPath": INSIDE, "readOnly": True}],
     }
     waits = [
-        {"name": f"wait-{number}", **common, "command": words}
-        for number, words in enumerate(
+        {"name": f"wait-{number}", **common, "command": command_words}
+        for number, command_words in enumerate(
             _waiting_for(plan, *waited) for waited in after(plan, process).items()
         )
-        if words
+        if command_words
     ]
     command = command_of(process, "python3", f"{INSIDE}/{_PLAN}")
     container = {
         "name": "process",
         **common,
-        "args": [_kept(word) for word in command],
+        "args": [_kept(argument) for argument in command],
         **_probes(plan, process),
         **_settings(exported, "container"),
     }

@@ -203,11 +203,11 @@ def _text(
         lines.append("from ament_index_python.packages import get_package_share_directory")
     lines.append("from launch import LaunchDescription")
     for module, names in _IMPORTS.items():
-        several = [name for name in names if name in used]
-        imported = CodeBlock(f"from {module} import ", tuple(several), "")
+        used_names = [name for name in names if name in used]
+        imported = CodeBlock(f"from {module} import ", tuple(used_names), "")
         if len(str(imported)) > 100:  # noqa: PLR2004 (as long as lines of code are)
-            imported = CodeBlock(f"from {module} import (", tuple(several), ")")
-        lines += imported.lines() if several else []
+            imported = CodeBlock(f"from {module} import (", tuple(used_names), ")")
+        lines += imported.lines() if used_names else []
     for name in ("BUILD", "HERE"):
         if name in used:
             folder = f"Path(__file__).resolve().parent / {machine.folder!r}"
@@ -376,10 +376,10 @@ class _Export:
 
     def _texts_of(self, process: PlanProcess, place: str) -> dict[str, Text]:
         """Return the texts of a place (args, env, params, remap) that the launch file makes."""
-        several = self.values.texts.get(process.name, {})
+        texts = self.values.texts.get(process.name, {})
         return {
             key.removeprefix(f"{place}."): text
-            for key, text in several.items()
+            for key, text in texts.items()
             if key.startswith(f"{place}.")
         }
 
@@ -394,7 +394,7 @@ class _Export:
     def _unlike(self, process: PlanProcess) -> Iterator[str]:
         """Yield what launch does otherwise with a process."""
         yield from _unlike(process)
-        loads = [one.name for one in self._components.get(process.name, [])]
+        loads = [component.name for component in self._components.get(process.name, [])]
         if loads and process.restart != "no":
             yield (
                 f"when {process.name} is started again, it has none of its components:"
@@ -404,11 +404,11 @@ class _Export:
     def _started(self, process: PlanProcess) -> CodeBlock:
         if process.component:
             container = self.known[process.component.container].nodes[0]
-            several = items([self._component(process)], "composable_node_descriptions")
+            components = items([self._component(process)], "composable_node_descriptions")
             return call(
                 "LoadComposableNodes",
                 f"target_container={container!r}",
-                several,
+                components,
                 *self._condition(process),
             )
         if _is_launch(process):
@@ -416,12 +416,12 @@ class _Export:
         if _is_node(process):
             return self._node(process, [*self._settings(process), *self._condition(process)])
         if _is_command(process):
-            words = self._filled(process, process.argv)
+            argv = self._filled(process, process.argv)
             for index, text in self._texts_of(process, "args").items():
-                words[int(index)] = text_code(text)
+                argv[int(index)] = text_code(text)
             return call(
                 "ExecuteProcess",
-                items(words, "cmd"),
+                items(argv, "cmd"),
                 f"name={process.name!r}",
                 *self._settings(process),
                 *self._condition(process),
@@ -433,8 +433,8 @@ class _Export:
         """Return Python that gives the process's parameter file."""
         return f"{'HERE' if process in self.values.more else 'BUILD'} / {process.params_file!r}"
 
-    def _filled(self, process: PlanProcess, words: Iterable[str]) -> list[CodeBlock | str]:
-        return [_filled(word, self._file(process)) for word in words]
+    def _filled(self, process: PlanProcess, argv: Iterable[str]) -> list[CodeBlock | str]:
+        return [_filled(argument, self._file(process)) for argument in argv]
 
     def _environment(self, process: PlanProcess) -> dict[str, CodeBlock | str]:
         """Return the process's variables, as Python."""
@@ -478,16 +478,16 @@ class _Export:
     def _node(self, process: PlanProcess, more: list[CodeBlock | str]) -> CodeBlock:
         package = _EXECUTABLE.fullmatch(process.argv[0])
         own, ros_words = _rest(process)
-        words = self._filled(process, own)
+        argv = self._filled(process, own)
         for index, text in self._texts_of(process, "args").items():
-            words[int(index)] = text_code(text)
+            argv[int(index)] = text_code(text)
         texts = {
             name: parameter_code(text) for name, text in self._texts_of(process, "params").items()
         }
-        given: list[CodeBlock | str] = (
+        parameters: list[CodeBlock | str] = (
             [f"str({self._file(process)})"] if "--params-file" in process.argv else []
         )
-        given += [_mapping(texts)] if texts else []
+        parameters += [_mapping(texts)] if texts else []
         named = (
             []
             if process.nodes[0].endswith(f"/{process.name}")
@@ -499,14 +499,16 @@ class _Export:
             *_named(process),
             *named,
             *self._remapped(process),
-            *([items(words, "arguments")] if words else []),
+            *([items(argv, "arguments")] if argv else []),
             *([items(self._filled(process, ros_words), "ros_arguments")] if ros_words else []),
-            *([items(given, "parameters")] if given else []),
+            *([items(parameters, "parameters")] if parameters else []),
             *more,
         ]
         if loaded := self._components.get(process.name, []):
             components = [
-                self._component(one) for one in loaded if self._comes_with_container(one)
+                self._component(component)
+                for component in loaded
+                if self._comes_with_container(component)
             ]
             return call(
                 "ComposableNodeContainer",
@@ -556,10 +558,10 @@ class _Export:
 
     def _included(self, process: PlanProcess) -> CodeBlock:
         """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
-        plan, meant = self.plan, _LAUNCH.fullmatch(process.argv[0])
-        package, file = (meant[1], meant[2]) if meant else ("", "")
+        plan, parsed = self.plan, _LAUNCH.fullmatch(process.argv[0])
+        package, file = (parsed[1], parsed[2]) if parsed else ("", "")
         texts = self._texts_of(process, "args")
-        pairs = [word.split(":=", 1) for word in process.argv[1:]]
+        pairs = [argument.split(":=", 1) for argument in process.argv[1:]]
         arguments = [
             (name, texts.get(str(index)), value) for index, (name, value) in enumerate(pairs)
         ]
@@ -577,12 +579,12 @@ class _Export:
         for name, text, value in arguments:
             code = text_code(text) if text else _filled(value, self._file(process))
             rows.append(f"({name!r}, {code})")
-        given = items(rows)
+        arguments_code = items(rows)
         return call(
             "included",
             repr(package),
             repr(file),
-            given,
+            arguments_code,
             items(settings),
             *self._condition(process),
         )
@@ -594,10 +596,10 @@ def _named(process: PlanProcess) -> Iterator[str]:
     yield f"namespace={namespace or '/'!r}"
 
 
-def _variable_name(name: str, taken: Collection[str]) -> str:
+def _variable_name(name: str, names_in_use: Collection[str]) -> str:
     plain = re.sub(r"\W", "_", name)
     plain = plain if plain.isidentifier() and not iskeyword(plain) else f"process_{plain}"
-    while plain in taken:
+    while plain in names_in_use:
         plain += "_"
     return plain
 
@@ -692,14 +694,17 @@ def _stock(plan: Plan, urdf: str) -> list[PlanEdge] | None:
 
 
 def _package(process: PlanProcess) -> str:
-    meant = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
-    return meant[1] if meant else ""
+    parsed = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
+    return parsed[1] if parsed else ""
 
 
 def _keywords(plan: Plan) -> Iterator[str | CodeBlock]:
     """Yield the keywords of stock nodes: namespace, and the publishers' remappings."""
     remap = {
-        old: new for one in plan.started if one.kind in OWN_KINDS for old, new in one.remap.items()
+        old: new
+        for process in plan.started
+        if process.kind in OWN_KINDS
+        for old, new in process.remap.items()
     }
     if plan.ros.namespace:
         yield f"namespace={plan.ros.namespace!r}"
@@ -710,8 +715,11 @@ def _keywords(plan: Plan) -> Iterator[str | CodeBlock]:
 def _state_publisher(plan: Plan) -> CodeBlock:
     """Return robot_state_publisher, limited to the joint states of the plan's publisher."""
     joints = next((process for process in plan.started if process.kind == "joints"), None)
-    given = _params(joints.argv) if joints else {}
-    values = {"publish_frequency": min(given.pop("publish_frequency", MOST_HZ), MOST_HZ), **given}
+    parameters = _params(joints.argv) if joints else {}
+    values = {
+        "publish_frequency": min(parameters.pop("publish_frequency", MOST_HZ), MOST_HZ),
+        **parameters,
+    }
     values["use_sim_time"] = plan.ros.clock == "sim"
     if plan.ros.frame_prefix:
         values["frame_prefix"] = plan.ros.frame_prefix
@@ -730,8 +738,11 @@ def _state_publisher(plan: Plan) -> CodeBlock:
 
 def _params(argv: tuple[str, ...]) -> dict[str, Any]:
     """Return the parameters that one of tfcompose's own processes is given in its command."""
-    words = [word for before, word in pairwise(argv) if before == "-p"]
-    return {name: json.loads(value) for name, _, value in (word.partition(":=") for word in words)}
+    settings = [argument for before, argument in pairwise(argv) if before == "-p"]
+    return {
+        name: json.loads(value)
+        for name, _, value in (argument.partition(":=") for argument in settings)
+    }
 
 
 def _fixed(plan: Plan, edge: PlanEdge, name: str) -> CodeBlock:
@@ -773,15 +784,15 @@ def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
 
     Names, remappings and parameter files are keywords of their own.
     """
-    words = list(process.argv[1:])
-    at = words.index("--ros-args") if "--ros-args" in words else len(words)
-    kept, rest = [], iter(words[at + 1 :])
-    for word in rest:
-        if word in _MOVED:
+    argv = list(process.argv[1:])
+    at = argv.index("--ros-args") if "--ros-args" in argv else len(argv)
+    kept, rest = [], iter(argv[at + 1 :])
+    for argument in rest:
+        if argument in _MOVED:
             next(rest, None)
         else:
-            kept.append(word)
-    return words[:at], kept
+            kept.append(argument)
+    return argv[:at], kept
 
 
 #: What a word of the plan stands for in the launch file.
@@ -791,12 +802,14 @@ _WORDS = {
 }
 
 
-def _filled(word: str, file: str) -> str:
+def _filled(argument: str, file: str) -> str:
     """Return the word as Python that knows the plan's folder.
 
     ``file`` is Python that gives the parameter file.
     """
-    found = {mark: code.replace("{file}", file) for mark, code in _WORDS.items() if mark in word}
-    if word in found:
-        return found[word]
-    return repr(word) + "".join(f".replace({mark!r}, {code})" for mark, code in found.items())
+    found = {
+        mark: code.replace("{file}", file) for mark, code in _WORDS.items() if mark in argument
+    }
+    if argument in found:
+        return found[argument]
+    return repr(argument) + "".join(f".replace({mark!r}, {code})" for mark, code in found.items())

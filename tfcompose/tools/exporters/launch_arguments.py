@@ -86,8 +86,8 @@ def collect_launch_values(
             texts[process][place] = _text(text, kinds)
     used = {
         part.name
-        for several in texts.values()
-        for text in several.values()
+        for lines in texts.values()
+        for text in lines.values()
         for part in text
         if isinstance(part, ArgumentValue)
     }
@@ -113,7 +113,7 @@ def collect_launch_values(
         if name not in used and f"args.{name}" in uses.fixed
     ]
     added = {name: found for name, found in more.items() if name in conditions}
-    files = tuple(file for _, several in added.values() for file in several)
+    files = tuple(file for _, files_added in added.values() for file in files_added)
     return (
         LaunchValues(declared, conditions, texts, tuple(process for process, _ in added.values())),
         files,

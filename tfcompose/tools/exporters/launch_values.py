@@ -98,13 +98,13 @@ class LaunchValues:
     @property
     def kinds(self) -> dict[str, str]:
         """The arguments' kinds, by name."""
-        return {one.name: one.kind for one in self.arguments}
+        return {argument.name: argument.kind for argument in self.arguments}
 
 
 def text_code(text: Text) -> CodeBlock | str:
     """Return the substitutions that make a text."""
-    several = [_part(part) for part in text]
-    return several[0] if len(several) == 1 else items(several)
+    parts = [_part(part) for part in text]
+    return parts[0] if len(parts) == 1 else items(parts)
 
 
 def parameter_code(text: Text) -> CodeBlock | str:

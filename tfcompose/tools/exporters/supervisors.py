@@ -67,13 +67,15 @@ def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str
     No two are the same, and one that is plain stays.
     """
     made = {name: name for name in names if plain_of(name) == name}
-    taken = set(made)
+    names_in_use = set(made)
     for name in names:
         if name not in made:
             plain = plain_of(name)
             candidates = chain([plain], (f"{plain}-{number}" for number in count(2)))
-            made[name] = next(candidate for candidate in candidates if candidate not in taken)
-            taken.add(made[name])
+            made[name] = next(
+                candidate for candidate in candidates if candidate not in names_in_use
+            )
+            names_in_use.add(made[name])
     return made
 
 
@@ -110,7 +112,9 @@ def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
         elif not component and plan.process(name).kind != "external":
             waits[name] = what
     guards = [
-        one.name for one in plan.started if one.kind == "guard" and plan.guard.mode == "strict"
+        process.name
+        for process in plan.started
+        if process.kind == "guard" and plan.guard.mode == "strict"
     ]
     return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
 
@@ -171,7 +175,7 @@ def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
     robot's domain.
     """
     edge = plan.edges_of(process.name)[0]
-    words = [
+    argv = [
         *anywhere("python3"),
         "echo",
         edge.parent,
@@ -182,17 +186,17 @@ def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
     ]
     namespace = process.topics[0].removesuffix("/tf")
     sourced = _SOURCED.replace("RELEASE", plan.ros.distro or "jazzy")
-    return ["sh", "-c", sourced, "sh", *words, *(["--namespace", namespace] if namespace else [])]
+    return ["sh", "-c", sourced, "sh", *argv, *(["--namespace", namespace] if namespace else [])]
 
 
 def outside_of(plan: Plan, folder: str) -> list[str]:
     """Return sentences about needs that a container with the plan's folder lacks."""
     gaps = []
     for process in plan.started:
-        outside = [word for word in process.texts if "${build_dir}/.." in word]
+        outside = [argument for argument in process.texts if "${build_dir}/.." in argument]
         gaps += [
-            f"{process.name} needs {word}, which is outside of {folder}: add a volume"
-            for word in outside
+            f"{process.name} needs {argument}, which is outside of {folder}: add a volume"
+            for argument in outside
         ]
     return gaps
 
@@ -281,7 +285,11 @@ def _settling_s(plan: Plan, process: PlanProcess) -> float:
     """Return how many seconds after its start others wait for a process; 0 where none does."""
     name = process.name
     return max(
-        (waiting_s(process, one.after[name]) for one in plan.started if name in one.after),
+        (
+            waiting_s(process, waiting.after[name])
+            for waiting in plan.started
+            if name in waiting.after
+        ),
         default=0.0,
     )
 
@@ -330,10 +338,10 @@ def _logs(plan: Plan, machine: Machine) -> list[str]:
 
 
 def _exec(process: PlanProcess, machine: Machine) -> str:
-    words = source_then_run(
+    argv = source_then_run(
         machine.setup, command_of(process, machine.python, f"{machine.folder}/plan.json")
     )
-    return " ".join(quote(word).replace("$", "$$") for word in words)
+    return " ".join(quote(argument).replace("$", "$$") for argument in argv)
 
 
 #: Where the plan's folder is inside a container.
@@ -403,7 +411,9 @@ def _compose_service(
         "network_mode": "host",
         "ipc": "host",
         "init": True,
-        "command": [_kept(word) for word in command_of(process, "python3", f"{INSIDE}/plan.json")],
+        "command": [
+            _kept(argument) for argument in command_of(process, "python3", f"{INSIDE}/plan.json")
+        ],
         "environment": {"ROS_DOMAIN_ID": domain, **_discovery(plan)},
         "volumes": [
             {"type": "bind", "source": machine.folder, "target": INSIDE, "read_only": True}

@@ -127,14 +127,14 @@ def _import_urdf(arguments: Namespace) -> int:
     packages = pairs(arguments.packages, "=")
     known = _known_packages(packages, arguments)
     document = read_urdf(arguments.file, known, arguments.given)
-    errors = [one for one in document.findings() if one.severity == "error"]
+    errors = [finding for finding in document.findings() if finding.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
         fail("nothing was written; --keep-going writes as much as possible")
     text, more_errors = _robot_file(document, arguments, known.local | packages)
     if more_errors and not arguments.keep_going:
         print_findings(
-            [replace(one, span=None) for one in more_errors], sys.stderr
+            [replace(finding, span=None) for finding in more_errors], sys.stderr
         )  # places in what is not written
         fail(
             "nothing was written: a robot file cannot express all of the source; --keep-going"
@@ -338,7 +338,7 @@ def _finish(draft: ImportDraft, arguments: Namespace) -> int:
     found = (
         compiled.found
         if arguments.output
-        else [replace(one, span=None, notes=()) for one in compiled.found]
+        else [replace(finding, span=None, notes=()) for finding in compiled.found]
     )
     print_findings(list(dict.fromkeys(found)), sys.stderr)
     return FAILED if compiled.errors else 0

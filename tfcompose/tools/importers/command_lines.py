@@ -46,16 +46,16 @@ def _without_shell(program: Program) -> Program:
     text = concatenated(program.argv, " ")
     is_known = all(isinstance(part, str) for part in parts_of(text))
     does_more = not is_known or bool(_OF_SHELLS.search(text))
-    words = program.argv
+    argv = program.argv
     try:
-        words = tuple(shlex.split(text)) if is_known else words
+        argv = tuple(shlex.split(text)) if is_known else argv
     except ValueError:
         does_more = True
     if program.package is not None:
         todo = (f"what a shell makes of {text}",) if does_more else ()
-        return replace(program, argv=words, shell=False, todo=(*program.todo, *todo))
+        return replace(program, argv=argv, shell=False, todo=(*program.todo, *todo))
     if not does_more:
-        plain = replace(program, argv=words, shell=False)
+        plain = replace(program, argv=argv, shell=False)
         return plain if _of_command(plain).package else program
     if PROGRAM in text:
         return replace(program, todo=(*program.todo, f"the edge of the {PROGRAM} in it"))
@@ -64,10 +64,10 @@ def _without_shell(program: Program) -> Program:
 
 def _of_command(program: Program) -> Program:
     """Return the package's program that a command starts, if it starts one."""
-    words = list(program.argv)
-    while words and words[0] in BEFORE:
-        words.pop(0)
-    match words:
+    argv = list(program.argv)
+    while argv and argv[0] in BEFORE:
+        argv.pop(0)
+    match argv:
         case ["ros2", "run", package, executable, *rest] if not package.startswith("-"):
             reader: Reader | None = "ros2"
         case ["rosrun", package, executable, *rest] if not package.startswith("-"):
@@ -98,28 +98,28 @@ def _without_ros_arguments(program: Program) -> Program:
     names: dict[str, str] = {}
     keys = dict(program.keys)
     inside = False
-    words = iter(program.argv)
-    for word in words:
-        if not inside or word in {"--ros-args", "--"}:
-            inside = word == "--ros-args" if word in {"--ros-args", "--"} else inside
-            if not inside and word != "--ros-args":
-                own.append(word)
+    own_argv = iter(program.argv)
+    for argument in own_argv:
+        if not inside or argument in {"--ros-args", "--"}:
+            inside = argument == "--ros-args" if argument in {"--ros-args", "--"} else inside
+            if not inside and argument != "--ros-args":
+                own.append(argument)
             continue
-        value = next(words, "") if word in _WITH_VALUE else ""
+        value = next(own_argv, "") if argument in _WITH_VALUE else ""
         left, _, right = partition(value, ":=")
-        if word in {"-r", "--remap"} and right:
+        if argument in {"-r", "--remap"} and right:
             if left in _NAMES:
                 names.setdefault(_NAMES[left], right)
             else:
                 remap.append((left, right))
-        elif word in {"-p", "--param"} and right:
+        elif argument in {"-p", "--param"} and right:
             params.append({left: _yaml_value(right)})
-        elif word == "--params-file":
+        elif argument == "--params-file":
             params.append(value)
-        elif word == "--log-level" and value in _LEVELS:
+        elif argument == "--log-level" and value in _LEVELS:
             keys["log_level"] = value
         else:
-            kept += [word, value] if value else [word]
+            kept += [argument, value] if value else [argument]
     argv = (*own, "--ros-args", *kept) if kept else tuple(own)
     before = len(params)
     return replace(

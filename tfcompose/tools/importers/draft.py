@@ -101,9 +101,9 @@ class ImportDraft:
         """Say that something of the source is not imported: in a comment, and as a finding."""
         where = f"{posixpath.basename(span.file)}:{span.line}: " if span and span.file else ""
         self.note(at, f"TODO {where}{message}")
-        one = finding("TF020", message, span, help=advice)
-        if one not in self.found:
-            self.found.append(one)
+        noted = finding("TF020", message, span, help=advice)
+        if noted not in self.found:
+            self.found.append(noted)
 
     def frame(
         self, parent: str, child: str, keys: Mapping[str, Any], span: Span | None, *notes: str
@@ -154,14 +154,14 @@ class ImportDraft:
         """
         plain = _NO_NAME.sub("_", wanted).strip("_") or "process"
         plain = plain if plain[0].isalpha() else f"process_{plain}"
-        taken = {
+        names_in_use = {
             *self.sections["processes"],
             *self.sections["sensors"],
             *self.sections["containers"],
             *BUILT_IN,
         }
         count, name = 1, plain
-        while name in taken:
+        while name in names_in_use:
             count += 1
             name = f"{plain}_{count}"
         return name
@@ -230,7 +230,7 @@ def path_from(target: Target, path: str) -> str:
 def where(at: Span | None, what: str = "") -> str:
     """Return the place of a value as a comment has it."""
     place = f"{posixpath.basename(at.file)}:{at.line}" if at and at.file else ""
-    return ": ".join(word for word in (place, what) if word)
+    return ": ".join(part for part in (place, what) if part)
 
 
 def _described(parent: str, keys: Mapping[str, Any]) -> str:

@@ -45,8 +45,8 @@ _ATTACHMENTS: dict[str, dict[str, Any]] = {
     "j100.fender": {"parent": "base_link"},
     "j100.top_plate": {"model": "ark_enclosure"},
     **{
-        f"{one}.top_plate": {"model": "pacs", "height": 0.1}
-        for one in ("dd100", "dd150", "do100", "do150")
+        f"{model}.top_plate": {"model": "pacs", "height": 0.1}
+        for model in ("dd100", "dd150", "do100", "do150")
     },
     "r100.fams": {"table_height": 0.3},
     "r100.hams": {"table_height": 0.6, "mount_height": 0.3},
@@ -120,7 +120,7 @@ def add_vehicles(
     draft: ImportDraft,
     folder: Path,
     target: Target,
-    given: Mapping[str, str],
+    selection: Mapping[str, str],
     read: Callable[[str], Source],
 ) -> None:
     """Add calibrations of Autoware's individual parameters, a folder per vehicle.
@@ -146,12 +146,12 @@ def add_vehicles(
     for inner in _folders_of_kits(config):
         if any(is_file(inner / name) for name in _CALIBRATIONS):
             kits.setdefault(inner.name, []).append(inner.parent.name)
-    kit = _one_of(kits, given, "sensor_model", str(folder), "kit")
+    kit = _one_of(kits, selection, "sensor_model", str(folder), "kit")
     vehicles = kits[kit]
     usual = "default" if "default" in vehicles else vehicles[0]
     vehicle = _one_of(
         vehicles,
-        {"vehicle_id": given.get("vehicle_id", usual)},
+        {"vehicle_id": selection.get("vehicle_id", usual)},
         "vehicle_id",
         str(folder),
         "vehicle",
@@ -166,16 +166,16 @@ def add_vehicles(
         }
     draft.note(("", ""), f"the calibrations of {kit}, which stay in their files")
     for name in _CALIBRATIONS:
-        files = {one: config / one / kit / name for one in vehicles}
-        sources = {one: read(str(file)) for one, file in files.items() if is_file(file)}
+        files = {vehicle: config / vehicle / kit / name for vehicle in vehicles}
+        sources = {vehicle: read(str(file)) for vehicle, file in files.items() if is_file(file)}
         path = concatenated([target.from_folder(str(config)), of_vehicle, kit, name], "/")
-        for (parent, child), several in _calibrated(draft, sources).items():
+        for (parent, child), having in _calibrated(draft, sources).items():
             keys: dict[str, Any] = {"calibration": path}
-            if len(several) < len(vehicles):
+            if len(having) < len(vehicles):
                 keys["when"] = ExpressionText(
-                    " or ".join(f"args.vehicle_id == {_quoted(one)}" for one in several)
+                    " or ".join(f"args.vehicle_id == {_quoted(vehicle)}" for vehicle in having)
                 )
-            draft.frame(parent, child, keys, sources[several[0]].at_key((parent, child)))
+            draft.frame(parent, child, keys, sources[having[0]].at_key((parent, child)))
 
 
 def _folders_of_kits(config: Path) -> Iterator[Path]:
@@ -184,8 +184,8 @@ def _folders_of_kits(config: Path) -> Iterator[Path]:
         yield from (vehicle / name for name in names_in(vehicle))
 
 
-def _quoted(word: str) -> str:
-    return f'"{word}"' if "'" in word else f"'{word}'"
+def _quoted(text: str) -> str:
+    return f'"{text}"' if "'" in text else f"'{text}'"
 
 
 def _calibrated(
@@ -204,14 +204,14 @@ def _calibrated(
 
 
 def _one_of(
-    known: Collection[str], given: Mapping[str, str], argument: str, folder: str, what: str
+    known: Collection[str], selection: Mapping[str, str], argument: str, folder: str, what: str
 ) -> str:
     """Return the name that is given, or the only one.
 
     Raises:
         RejectedError: if there are none, or several and none is given.
     """
-    wanted = given.get(argument, next(iter(known)) if len(known) == 1 else "")
+    wanted = selection.get(argument, next(iter(known)) if len(known) == 1 else "")
     if wanted in known:
         return wanted
     if not known:
@@ -271,15 +271,17 @@ class _Clearpath:
     def _kinds(self, section: str) -> list[str]:
         found = self.data.get(section)
         return (
-            [kind for kind, several in found.items() if several] if isinstance(found, dict) else []
+            [kind for kind, entries in found.items() if entries] if isinstance(found, dict) else []
         )
 
     def _entries(self, section: str, kind: str) -> list[tuple[int, Steps, dict[str, Any]]]:
         found = self.data.get(section)
-        several = found.get(kind) if isinstance(found, dict) else None
-        listed = several if isinstance(several, list) else []
+        entries = found.get(kind) if isinstance(found, dict) else None
+        listed = entries if isinstance(entries, list) else []
         return [
-            (i, (section, kind, i), one) for i, one in enumerate(listed) if isinstance(one, dict)
+            (i, (section, kind, i), entry)
+            for i, entry in enumerate(listed)
+            if isinstance(entry, dict)
         ]
 
     def _system(self) -> None:
@@ -304,7 +306,7 @@ class _Clearpath:
 
     def _platform(self) -> None:
         platform = self.data.get("platform")
-        given = platform if isinstance(platform, dict) else {}
+        settings = platform if isinstance(platform, dict) else {}
         at = self.source.at_key(("serial_number",))
         if not self.platform or self.platform == "generic":
             self.draft.todo(
@@ -312,7 +314,7 @@ class _Clearpath:
             )
         else:
             model = self.platform
-            wheel = {"wheel": given.get("wheel", "default")}
+            wheel = {"wheel": settings.get("wheel", "default")}
             keys = {
                 "xacro": self._of_platform(),
                 "macro": model,
@@ -321,7 +323,7 @@ class _Clearpath:
             }
             self.draft.sections["parts"]["platform"] = keys
             self.draft.note(("parts", "platform"), where(at))
-        attachments = given.get("attachments")
+        attachments = settings.get("attachments")
         for index, entry in enumerate(attachments if isinstance(attachments, list) else []):
             path: Steps = ("platform", "attachments", index)
             if not isinstance(entry, dict):
@@ -338,7 +340,7 @@ class _Clearpath:
             self._part(
                 str(entry.get("name", f"{kind}_{index}")), file, kind, {**usual, **entry}, path
             )
-        for key in given.keys() - {"attachments", "wheel"}:
+        for key in settings.keys() - {"attachments", "wheel"}:
             self.draft.todo(
                 f"platform.{key} is not imported", self.source.at_key(("platform", key))
             )
@@ -393,7 +395,7 @@ class _Clearpath:
         for key in ("xyz", "rpy"):
             value = entry.get(key, [0.0, 0.0, 0.0])
             is_one = isinstance(value, list) and len(value) == len(_AXES) // 2
-            if not is_one or not all(isinstance(one, (int, float)) for one in value):
+            if not is_one or not all(isinstance(number, (int, float)) for number in value):
                 self.draft.todo(f"{key}: {value}", self.source.at((*path, key)))
                 value = [0.0, 0.0, 0.0]
             x, y, z = map(float, value)
@@ -413,9 +415,13 @@ class _Clearpath:
         self._part(
             name, f"clearpath_sensors_description/urdf/{model}.urdf.xacro", model, call, path
         )
-        given = entry.get("ros_parameters")
+        parameters = entry.get("ros_parameters")
         if entry.get("launch_enabled") is not False:
-            nodes = f" ({', '.join(given)})" if isinstance(given, dict) and given else ""
+            nodes = (
+                f" ({', '.join(parameters)})"
+                if isinstance(parameters, dict) and parameters
+                else ""
+            )
             message = f"the driver of {name}, {model}, with its ros_parameters{nodes}"
             advice = (
                 "sensors: {NAME: {preset: VENDOR/MODEL, …}} starts it; tfcompose presets lists"

@@ -101,7 +101,8 @@ def add_launch(draft: ImportDraft, launch: Launch, target: Target) -> list[Descr
     if answer["stopped"]:
         at = launch.span(answer["line"])
         if not any(
-            one["kind"] not in {"package", "todo", "argument", "file"} for one in answer["records"]
+            record["kind"] not in {"package", "todo", "argument", "file"}
+            for record in answer["records"]
         ):
             raise RejectedError([finding("TF002", answer["stopped"], at), *draft.found])
         draft.todo(f"the launch file is not read to its end: {answer['stopped']}", at)
@@ -136,7 +137,7 @@ class _LaunchImport:
         """Add one record."""
         span = self._span(record["at"])
         kind = record["kind"]
-        several: dict[str, Callable[[dict[str, Any], Span], None]] = {
+        adders: dict[str, Callable[[dict[str, Any], Span], None]] = {
             "node": self._node,
             "process": self._node,
             "container": self._node,
@@ -146,8 +147,8 @@ class _LaunchImport:
             "lifecycle": self._lifecycle,
             "required": self._required,
         }
-        if kind in several:
-            several[kind](record, span)
+        if kind in adders:
+            adders[kind](record, span)
         elif kind == "file":
             self._saved[record["path"]] = self._span(record["at"])
         elif kind == "package":
@@ -208,10 +209,8 @@ class _LaunchImport:
             if name not in used and name not in decided
         }
         if unread:
-            several = f"the launch argument{'' if len(unread) == 1 else 's'} {', '.join(unread)}"
-            self.draft.todo(
-                f"nothing that is imported reads {several}", next(iter(unread.values()))
-            )
+            named = f"the launch argument{'' if len(unread) == 1 else 's'} {', '.join(unread)}"
+            self.draft.todo(f"nothing that is imported reads {named}", next(iter(unread.values())))
         fixed: dict[str, Span] = {}
         for name, (record, span) in self._arguments.items():
             value, at = record["value"], ("args", name)
@@ -220,10 +219,10 @@ class _LaunchImport:
                 kind = {str: "string", float: "float"}.get(type(typed))
                 keys: dict[str, Any] = {"type": kind} if kind else {}
                 keys |= {"default": typed}
-                choices = [scalar_of(one) for one in record["choices"]]
+                choices = [scalar_of(choice) for choice in record["choices"]]
                 keys |= (
                     {"choices": choices}
-                    if choices and {type(one) for one in choices} == {type(typed)}
+                    if choices and {type(choice) for choice in choices} == {type(typed)}
                     else {}
                 )
                 keys |= (
@@ -242,7 +241,7 @@ class _LaunchImport:
                         f"where it decides what is started, or is computed with, it is {value!r}",
                     )
         if fixed:
-            several = (
+            named = (
                 f"{'this launch argument' if len(fixed) == 1 else 'these launch arguments'}:"
                 f" {' '.join(fixed)}"
             )
@@ -251,7 +250,7 @@ class _LaunchImport:
                 " leave out"
             )
             self.draft.todo(
-                f"what is imported holds for {several}", next(iter(fixed.values())), advice=advice
+                f"what is imported holds for {named}", next(iter(fixed.values())), advice=advice
             )
 
     def _in_expressions(self) -> set[str]:
@@ -300,9 +299,9 @@ class _LaunchImport:
         """
         plugin = record["plugin"]
         if plugin in _PUBLISHERS:
-            words = static_words(record["params"]) if plugin == STATIC_PLUGIN else []
-            record = {**record, "executable": _PUBLISHERS[plugin], "argv": words}
-            self._node(record | ({"params": []} if words else {}), span)
+            argv = static_words(record["params"]) if plugin == STATIC_PLUGIN else []
+            record = {**record, "executable": _PUBLISHERS[plugin], "argv": argv}
+            self._node(record | ({"params": []} if argv else {}), span)
             return
         program = replace(self._program(record, span), plugin=plugin)
         if not program.name:
@@ -349,7 +348,7 @@ class _LaunchImport:
             self._read |= arguments_in(argv)
             argv = tuple(map(str, argv))
         else:
-            argv = tuple(_without_texts(word, todo) for word in argv)
+            argv = tuple(_without_texts(argument, todo) for argument in argv)
         reader = None if record["kind"] == "process" else "ros2"
         loads = record["kind"] == "container" or self._is_container(record)
         if record.get("ros1"):
@@ -420,8 +419,8 @@ class _LaunchImport:
 
     def _describe(self, program: Program, span: Span) -> None:
         params: dict[str, Any] = {}
-        for one in program.params:
-            params |= one if isinstance(one, dict) else {}
+        for param_set in program.params:
+            params |= param_set if isinstance(param_set, dict) else {}
         described = program.description
         if described is None and program.argv and program.argv[0].endswith(".urdf"):
             described = Description(file=program.argv[0])
@@ -471,8 +470,8 @@ class _LaunchImport:
         moved = dict(program.remap)
         if not isolated(self.draft, moved, program.namespace):
             self.draft.todo(f"robot_state_publisher is remapped: {moved}", span)
-        for one in program.todo:
-            self.draft.todo(one, span)
+        for message in program.todo:
+            self.draft.todo(message, span)
 
     def _include(self, record: dict[str, Any], span: Span) -> None:
         """Add a launch file of a package that is not found as one process."""
@@ -492,8 +491,8 @@ class _LaunchImport:
             name, keys, where(span, "an included launch file, which runs as one process")
         )
         self._conditions(record, ("processes", name))
-        for one in todo:
-            self.draft.todo(one, span, ("processes", name))
+        for message in todo:
+            self.draft.todo(message, span, ("processes", name))
         if record.get("after"):
             self._after.append((name, record["after"]))
         if record.get("period"):
@@ -525,12 +524,12 @@ class _LaunchImport:
         for name, period_s in self._delays:
             if period_s not in gates:
                 free = [
-                    one
-                    for one in self._names.values()
-                    if one not in unfit
-                    and one not in gates.values()
-                    and "run" in started[one]
-                    and not {"ready", "after", "when"} & processes[one].keys()
+                    own_name
+                    for own_name in self._names.values()
+                    if own_name not in unfit
+                    and own_name not in gates.values()
+                    and "run" in started[own_name]
+                    and not {"ready", "after", "when"} & processes[own_name].keys()
                 ]
                 if free:
                     gates[period_s] = free[0]
@@ -554,14 +553,14 @@ def _seconds(value: float) -> Bare:
     return Bare(f"{number(value)} s")
 
 
-def _without_texts(word: str, todo: list[str]) -> str:
+def _without_texts(argument: str, todo: list[str]) -> str:
     """Return a command's word with files in place of xacro output and file texts."""
     todo += [
         f"an argument is what is made of {relative(part.file)}, or its text: here it is the"
         " file's name"
-        for part in files_in(word)
+        for part in files_in(argument)
     ]
-    return fill(word, FileText)
+    return fill(argument, FileText)
 
 
 def _exact(record: dict[str, Any]) -> range:
@@ -575,12 +574,12 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
     """Return parameters without descriptions, and the robot's description."""
     description: Description | None = None
     kept: list[Any] = []
-    for one in params:
-        if isinstance(one, str):
-            kept.append(one)
+    for param_set in params:
+        if isinstance(param_set, str):
+            kept.append(param_set)
             continue
         own = {}
-        for key, value in one.items():
+        for key, value in param_set.items():
             if key == "robot_description" and isinstance(value, str):
                 description = _description(value)
             elif files := files_in(value):

@@ -61,8 +61,8 @@ def has_launch() -> bool:
 
     Folders of that name are often near launch files, and are not it.
     """
-    several = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
-    return all(spec is not None and spec.origin is not None for spec in several)
+    specs = [find_spec(name) for name in ("launch", "launch_ros", "launch_xml", "launch_yaml")]
+    return all(spec is not None and spec.origin is not None for spec in specs)
 
 
 def reach_of(launch: Launch) -> Reach:
@@ -229,7 +229,7 @@ def _is_record(record: dict[str, Any]) -> bool:
 def _with_texts(record: dict[str, Any]) -> dict[str, Any]:
     """Return a record with texts in the place of what JSON has for them."""
     texts: dict[str, Callable[[Any], Any]] = {
-        "argv": lambda words: list(map(from_json, words)),
+        "argv": lambda argv: list(map(from_json, argv)),
         "remap": lambda rules: [list(map(from_json, rule)) for rule in rules],
         "env": _values_with_texts,
         "args": _values_with_texts,

@@ -125,11 +125,11 @@ class MoveItConfigsBuilder:
         }
         return self
 
-    def planning_scene_monitor(self, *given: Any, **more: Any) -> MoveItConfigsBuilder:
+    def planning_scene_monitor(self, *args: Any, **more: Any) -> MoveItConfigsBuilder:
         """Take what the monitor of the scene publishes."""
         self._parts["planning_scene_monitor"] = {
             **_MONITOR,
-            **dict(zip(_MONITOR, given, strict=False)),
+            **dict(zip(_MONITOR, args, strict=False)),
             **more,
         }
         return self
@@ -156,9 +156,9 @@ class MoveItConfigsBuilder:
         """Take sensors of the scene, if there is a file that has some."""
         known = self._config("sensors_3d.yaml")
         values = self._read(str(file_path or known[0])) if file_path or known else {}
-        several = values.get("sensors")
+        sensors = values.get("sensors")
         self._parts["sensors_3d"] = (
-            values if several and isinstance(several, list) and several[0] else {}
+            values if sensors and isinstance(sensors, list) and sensors[0] else {}
         )
         return self
 
@@ -187,7 +187,7 @@ class MoveItConfigsBuilder:
         first = default_planning_pipeline or ("ompl" if "ompl" in names else names[0])
         values: dict[str, Any] = {"planning_pipelines": names, "default_planning_pipeline": first}
         self._parts["planning_pipelines"] = values | {
-            one: self._read(f"config/{one}_planning.yaml") for one in names
+            pipeline: self._read(f"config/{pipeline}_planning.yaml") for pipeline in names
         }
         return self
 

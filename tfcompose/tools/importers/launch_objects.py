@@ -79,13 +79,13 @@ def arguments_of(made: Any) -> Mapping[str, Any]:
         return {}
     signature, args, kwargs = vars(made)["_made_of"][1]
     bound = signature.bind_partial(made, *args, **kwargs)
-    given: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
     for name, value in bound.arguments.items():
         if signature.parameters[name].kind is inspect.Parameter.VAR_KEYWORD:
-            given |= value
+            arguments |= value
         else:
-            given[name] = value
-    return given
+            arguments[name] = value
+    return arguments
 
 
 def class_name(made: Any) -> str:

@@ -107,10 +107,10 @@ def _parts(value: Any, context: RecordingContext, *, typed: bool) -> list[Part]:
     return [text_of(value, context)]
 
 
-def _joined(several: Iterable[list[Part]]) -> list[Part]:
+def _joined(paths: Iterable[list[Part]]) -> list[Part]:
     """Return the parts of a path, as ``os.path.join`` has it."""
     path: list[Part] = []
-    for parts in several:
+    for parts in paths:
         before, added = str(Text.of(path)), str(Text.of(parts))
         if added.startswith("/"):
             path = []
@@ -146,34 +146,37 @@ def describe(value: Any) -> str:
     return described(arguments_of(value)) if described else str(value.describe())
 
 
-def _operands(given: Mapping[str, Any]) -> list[Any]:
-    return list(given["args"]) if "args" in given else [given["left"], given["right"]]
+def _operands(arguments: Mapping[str, Any]) -> list[Any]:
+    return (
+        list(arguments["args"]) if "args" in arguments else [arguments["left"], arguments["right"]]
+    )
 
 
-def _describe_all(given: Mapping[str, Any]) -> str:
-    return " and ".join(map(describe, _operands(given)))
+def _describe_all(arguments: Mapping[str, Any]) -> str:
+    return " and ".join(map(describe, _operands(arguments)))
 
 
-def _describe_any(given: Mapping[str, Any]) -> str:
-    return " or ".join(map(describe, _operands(given)))
+def _describe_any(arguments: Mapping[str, Any]) -> str:
+    return " or ".join(map(describe, _operands(arguments)))
 
 
-def _describe_equality(given: Mapping[str, Any], sign: str) -> str:
-    return f"{describe(given['left']) or repr('')} {sign} {describe(given['right']) or repr('')}"
+def _describe_equality(arguments: Mapping[str, Any], sign: str) -> str:
+    left, right = (describe(arguments[side]) or repr("") for side in ("left", "right"))
+    return f"{left} {sign} {right}"
 
 
 #: What substitutions are for people, by their classes.
 _DESCRIBED: dict[str, Callable[[Mapping[str, Any]], str]] = {
-    "TextSubstitution": lambda given: str(given["text"]),
-    "LaunchConfiguration": lambda given: describe(given["variable_name"]),
-    "PathJoinSubstitution": lambda given: "/".join(map(describe, given["substitutions"])),
-    "PythonExpression": lambda given: " ".join(describe(given["expression"]).split()),
-    "FindPackage": lambda given: describe(given["package"]),
-    "FindPackageShare": lambda given: describe(given["package"]),
-    "FindPackagePrefix": lambda given: describe(given["package"]),
-    "NotSubstitution": lambda given: f"not {describe(given['value'])}",
-    "EqualsSubstitution": lambda given: _describe_equality(given, "=="),
-    "NotEqualsSubstitution": lambda given: _describe_equality(given, "!="),
+    "TextSubstitution": lambda arguments: str(arguments["text"]),
+    "LaunchConfiguration": lambda arguments: describe(arguments["variable_name"]),
+    "PathJoinSubstitution": lambda arguments: "/".join(map(describe, arguments["substitutions"])),
+    "PythonExpression": lambda arguments: " ".join(describe(arguments["expression"]).split()),
+    "FindPackage": lambda arguments: describe(arguments["package"]),
+    "FindPackageShare": lambda arguments: describe(arguments["package"]),
+    "FindPackagePrefix": lambda arguments: describe(arguments["package"]),
+    "NotSubstitution": lambda arguments: f"not {describe(arguments['value'])}",
+    "EqualsSubstitution": lambda arguments: _describe_equality(arguments, "=="),
+    "NotEqualsSubstitution": lambda arguments: _describe_equality(arguments, "!="),
     "AndSubstitution": _describe_all,
     "AllSubstitution": _describe_all,
     "OrSubstitution": _describe_any,
@@ -186,24 +189,24 @@ _DESCRIBED: dict[str, Callable[[Mapping[str, Any]], str]] = {
 _KINDS: dict[Any, str] = {bool: "bool", int: "int", float: "float", str: "string"}
 
 
-def parameters_of(given: Any, context: RecordingContext, at: Any) -> list[Any]:
+def parameters_of(declared: Any, context: RecordingContext, at: Any) -> list[Any]:
     """Return parameters as mappings and names of files, in order.
 
     What cannot be resolved is said.
     """
-    several: list[Any] = []
-    for params in given or ():
+    read: list[Any] = []
+    for params in declared or ():
         try:
             if isinstance(params, Mapping):
-                several.append(dict(_flat(params, context, "", at)))
+                read.append(dict(_flat(params, context, "", at)))
             elif isinstance(params, Parameter):
                 made_of = arguments_of(params)
-                several.append({text_of(made_of["name"], context): _described(made_of, context)})
+                read.append({text_of(made_of["name"], context): _described(made_of, context)})
             else:
-                several.append(_parameter_file(params, context, at))
+                read.append(_parameter_file(params, context, at))
         except FailedError as error:
             context.todo(at, f"parameters: {error}")
-    return several
+    return read
 
 
 def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
@@ -213,9 +216,9 @@ def _parameter_file(params: Any, context: RecordingContext, at: Any) -> str:
         FailedError: if it has some that cannot be resolved, or cannot be read.
     """
     is_described = isinstance(params, ParameterFile)
-    given = arguments_of(params) if is_described else {"param_file": params}
-    file = shown(with_package(text_of(given["param_file"], context)))
-    if file.startswith(PACKAGE) or not is_true(given.get("allow_substs") or False, context):
+    arguments = arguments_of(params) if is_described else {"param_file": params}
+    file = shown(with_package(text_of(arguments["param_file"], context)))
+    if file.startswith(PACKAGE) or not is_true(arguments.get("allow_substs") or False, context):
         return file
     source = file_text(file)
     if "$(" not in source:
@@ -362,28 +365,28 @@ def _typed(text: str) -> Any:
 
 def when_of(condition: Any, context: RecordingContext) -> str | None:
     """Return a condition as an expression of a robot file, or None where it cannot be one."""
-    given = arguments_of(condition)
+    arguments = arguments_of(condition)
     if isinstance(condition, IfCondition):
-        inner = expression_of(given["predicate_expression"], context)
+        inner = expression_of(arguments["predicate_expression"], context)
         return inner and f"not ({inner})" if isinstance(condition, UnlessCondition) else inner
     if isinstance(condition, LaunchConfigurationEquals):
         sign = "!=" if class_name(condition) == "LaunchConfigurationNotEquals" else "=="
-        name = describe(given["launch_configuration_name"])
-        return _comparison(name, sign, given["expected_value"], context)
+        name = describe(arguments["launch_configuration_name"])
+        return _comparison(name, sign, arguments["expected_value"], context)
     return None
 
 
 def describe_condition(condition: Any) -> str:
     """Return a condition for people."""
-    given = arguments_of(condition)
+    arguments = arguments_of(condition)
     if isinstance(condition, UnlessCondition):
-        return f"not {describe(given['predicate_expression'])}"
+        return f"not {describe(arguments['predicate_expression'])}"
     if isinstance(condition, IfCondition):
-        return describe(given["predicate_expression"])
+        return describe(arguments["predicate_expression"])
     if isinstance(condition, LaunchConfigurationEquals):
         sign = "!=" if class_name(condition) == "LaunchConfigurationNotEquals" else "=="
-        name = describe(given["launch_configuration_name"])
-        return f"{name} {sign} {describe(given['expected_value'])}"
+        name = describe(arguments["launch_configuration_name"])
+        return f"{name} {sign} {describe(arguments['expected_value'])}"
     return "a condition"
 
 
@@ -392,23 +395,27 @@ def expression_of(value: Any, context: RecordingContext) -> str | None:
     only = _alone(value)
     if not isinstance(only, launch.Substitution):
         return None
-    given = arguments_of(only)
+    arguments = arguments_of(only)
     match class_name(only):
         case "LaunchConfiguration":
-            name = describe(given["variable_name"])
+            name = describe(arguments["variable_name"])
             return f"args.{name}" if context.declared.get(name) == "bool" else None
         case "NotSubstitution":
-            inner = expression_of(given["value"], context)
+            inner = expression_of(arguments["value"], context)
             return inner and f"not ({inner})"
         case "AndSubstitution" | "AllSubstitution":
-            return conjunction((expression_of(arg, context) for arg in _operands(given)), " and ")
+            return conjunction(
+                (expression_of(arg, context) for arg in _operands(arguments)), " and "
+            )
         case "OrSubstitution" | "AnySubstitution":
-            return conjunction((expression_of(arg, context) for arg in _operands(given)), " or ")
+            return conjunction(
+                (expression_of(arg, context) for arg in _operands(arguments)), " or "
+            )
         case "EqualsSubstitution" | "NotEqualsSubstitution" as name:
-            left = _alone(given["left"])
+            left = _alone(arguments["left"])
             if isinstance(left, LaunchConfiguration):
                 sign = "==" if name == "EqualsSubstitution" else "!="
-                return _comparison(describe(left), sign, given["right"], context)
+                return _comparison(describe(left), sign, arguments["right"], context)
         case "PythonExpression":
             return _of_python_expression(only, context)
     return None
@@ -471,13 +478,13 @@ class _PythonText:
     def _of(self, node: ast.expr) -> str | None:
         match node:
             case ast.BoolOp(op=op, values=values):
-                word = " and " if isinstance(op, ast.And) else " or "
-                return conjunction(map(self._of, values), word)
+                operator = " and " if isinstance(op, ast.And) else " or "
+                return conjunction(map(self._of, values), operator)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 inner = self._of(operand)
                 return inner and f"not ({inner})"
-            case ast.Name(id=word) if word in self._arguments:
-                name = self._arguments[word]
+            case ast.Name(id=variable) if variable in self._arguments:
+                name = self._arguments[variable]
                 return f"args.{name}" if self._context.declared.get(name) == "bool" else None
             case ast.Compare(left=left, ops=[op], comparators=[ast.Constant(value=value)]) if (
                 type(op) in _SIGNS
@@ -491,12 +498,12 @@ class _PythonText:
                 left = inner
         is_equality = sign in {"==", "!="}
         match left:
-            case ast.Constant(value=str(word)) if word in self._arguments and is_equality:
+            case ast.Constant(value=str(name)) if name in self._arguments and is_equality:
                 if not isinstance(value, str):
                     return None
-                return _comparison(self._arguments[word], sign, value, self._context)
-            case ast.Name(id=word) if word in self._arguments:
-                name = self._arguments[word]
+                return _comparison(self._arguments[name], sign, value, self._context)
+            case ast.Name(id=variable) if variable in self._arguments:
+                name = self._arguments[variable]
             case _:
                 return None
         if isinstance(value, bool):

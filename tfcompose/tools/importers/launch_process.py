@@ -159,9 +159,9 @@ def _watch(  # noqa: C901 (one hook after another)
         if event in _REFUSED or ((writes or flags) and not isinstance(args[0], int)):
             what = next(
                 (
-                    str(one)
-                    for one in args
-                    if isinstance(one, (str, bytes, os.PathLike, list, tuple))
+                    str(argument)
+                    for argument in args
+                    if isinstance(argument, (str, bytes, os.PathLike, list, tuple))
                 ),
                 "",
             )
@@ -180,8 +180,8 @@ def _watch(  # noqa: C901 (one hook after another)
             for root in (*readable.paths, *readable.listed)
         )
 
-    def run(words: Any, *_args: Any, **more: Any) -> Any:
-        argv = words.split() if isinstance(words, str) else list(map(str, words))
+    def run(command: Any, *_args: Any, **more: Any) -> Any:
+        argv = command.split() if isinstance(command, str) else list(map(str, command))
         try:
             output = launch_records.of_command(argv, " ".join(argv))
         except FailedError:
@@ -216,8 +216,8 @@ def _watch(  # noqa: C901 (one hook after another)
         (subprocess, "call", lambda *a, **k: run(*a, **k).returncode),
         (subprocess, "check_call", lambda *a, **k: run(*a, **k).returncode),
         (subprocess, "check_output", lambda *a, **k: run(*a, **k).stdout),
-        (subprocess, "getoutput", lambda words, **k: run(words, text=True, **k).stdout),
-        (os, "popen", lambda words, *_a, **_k: io.StringIO(run(words, text=True).stdout)),
+        (subprocess, "getoutput", lambda argv, **k: run(argv, text=True, **k).stdout),
+        (os, "popen", lambda argv, *_a, **_k: io.StringIO(run(argv, text=True).stdout)),
         (builtins, "open", opened),
         (io, "open", opened),
         (tempfile, "mktemp", saved.temporary),

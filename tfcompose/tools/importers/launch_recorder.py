@@ -133,10 +133,10 @@ def _parsed(path: str) -> tuple[Any, Any]:
 def _command(self: Any, context: Any) -> str:
     text = text_of(self.command, context)
     try:
-        words = shlex.split(text)
+        argv = shlex.split(text)
     except ValueError as error:
         raise FailedError(f"the command {text}: {error}") from None
-    return of_command(words, text)
+    return of_command(argv, text)
 
 
 _PERFORMED: dict[Any, Callable[[Any, Any], str]] = {
@@ -252,39 +252,42 @@ def described(made: Any) -> str:
     return str(getattr(made, "NAME", type(made).__name__))
 
 
-def _describe_components(given: Mapping[str, Any]) -> str:
-    container = given["target_container"]
+def _describe_components(arguments: Mapping[str, Any]) -> str:
+    container = arguments["target_container"]
     if isinstance(container, launch.Action):
         container = arguments_of(container).get("name")
-    count = len(list(given["composable_node_descriptions"] or ()))
+    count = len(list(arguments["composable_node_descriptions"] or ()))
     return f"{count} component{'' if count == 1 else 's'} for {describe(container)}"
 
 
-def _describe_node(given: Mapping[str, Any]) -> str:
-    return f"the node {describe(given.get('package'))}/{describe(given['executable'])}"
+def _describe_node(arguments: Mapping[str, Any]) -> str:
+    return f"the node {describe(arguments.get('package'))}/{describe(arguments['executable'])}"
 
 
 #: What actions are for people, by their classes, a derived one before its base.
 _DESCRIBED: tuple[tuple[type, Callable[[Mapping[str, Any]], str]], ...] = (
     (
         launch.actions.DeclareLaunchArgument,
-        lambda given: f"the launch argument {describe(given['name'])}",
+        lambda arguments: f"the launch argument {describe(arguments['name'])}",
     ),
-    (launch.actions.GroupAction, lambda given: f"a group of {len(list(given['actions']))}"),
+    (
+        launch.actions.GroupAction,
+        lambda arguments: f"a group of {len(list(arguments['actions']))}",
+    ),
     (
         launch.actions.TimerAction,
-        lambda given: f"a timer with {len(list(given['actions']))} actions",
+        lambda arguments: f"a timer with {len(list(arguments['actions']))} actions",
     ),
     (
         launch.actions.OpaqueFunction,
-        lambda given: f"the function {getattr(given['function'], '__name__', '')}",
+        lambda arguments: f"the function {getattr(arguments['function'], '__name__', '')}",
     ),
     (launch_ros.actions.Node, _describe_node),
-    (launch.actions.ExecuteProcess, lambda given: f"the process {describe(given['cmd'])}"),
+    (launch.actions.ExecuteProcess, lambda arguments: f"the process {describe(arguments['cmd'])}"),
     (launch_ros.actions.LoadComposableNodes, _describe_components),
     (
         launch_ros.descriptions.ComposableNode,
-        lambda given: f"the component {describe(given['plugin'])}",
+        lambda arguments: f"the component {describe(arguments['plugin'])}",
     ),
 )
 
@@ -296,18 +299,18 @@ def _declare(action: Any, context: RecordingContext) -> None:
     evaluated(action.execute, context)
     if context.depth > 1:
         return
-    given, name = arguments_of(action), str(action.name)
+    arguments, name = arguments_of(action), str(action.name)
     value = str(context.launch_configurations[name])
     context.declare(name, value)
     context.record(
         "argument",
         place_of(action),
         name=name,
-        default=optional_text(given.get("default_value"), context),
+        default=optional_text(arguments.get("default_value"), context),
         value=value,
         choices=list(action.choices or ()),
-        description=str(given.get("description") or ""),
-        variable=_variable_of(given.get("default_value"), context),
+        description=str(arguments.get("description") or ""),
+        variable=_variable_of(arguments.get("default_value"), context),
     )
 
 
@@ -316,14 +319,16 @@ def _variable_of(default: Any, context: RecordingContext) -> str:
     only = default[0] if isinstance(default, (list, tuple)) and len(default) == 1 else default
     if not isinstance(only, substitutions.EnvironmentVariable):
         return ""
-    given = arguments_of(only)
-    return text_of(given["name"], context) if given.get("default_value") is not None else ""
+    arguments = arguments_of(only)
+    return (
+        text_of(arguments["name"], context) if arguments.get("default_value") is not None else ""
+    )
 
 
 def _set_configuration(action: Any, context: RecordingContext) -> None:
     evaluated(action.execute, context)
-    given = arguments_of(action)
-    context.declared.pop(text_of(given.get("name", ""), context), None)
+    arguments = arguments_of(action)
+    context.declared.pop(text_of(arguments.get("name", ""), context), None)
 
 
 def _unset_variable(action: Any, context: RecordingContext) -> None:
@@ -334,19 +339,19 @@ def _unset_variable(action: Any, context: RecordingContext) -> None:
 
 
 def _append_variable(action: Any, context: RecordingContext) -> None:
-    given = arguments_of(action)
-    name = text_of(given["name"], context)
+    arguments = arguments_of(action)
+    name = text_of(arguments["name"], context)
     if name in context.variables:
         evaluated(action.execute, context)
         return
-    value = relative(with_package(text_of(given["value"], context)))
+    value = relative(with_package(text_of(arguments["value"], context)))
     context.todo(place_of(action), f"{value} is appended to the environment's {name}")
 
 
 def _set_parameter(action: Any, context: RecordingContext) -> None:
-    given = arguments_of(action)
+    arguments = arguments_of(action)
     evaluated(action.execute, context)
-    name, value = text_of(given["name"], context), parameter_value(given["value"], context)
+    name, value = text_of(arguments["name"], context), parameter_value(arguments["value"], context)
     if isinstance(value, str) and not isinstance(value, Text):
         value = yaml.safe_load(value)  # it goes onto the command line
     context.params.append({name: value})
@@ -374,9 +379,9 @@ _STATES = {1: "inactive", 3: "active"}
 
 def _emit(action: Any, context: RecordingContext) -> None:
     if isinstance(action.event, ChangeState):
-        given = arguments_of(action.event)
-        node = getattr(given.get("lifecycle_node_matcher"), "action", None)
-        state = _STATES.get(int(given.get("transition_id") or 0))
+        arguments = arguments_of(action.event)
+        node = getattr(arguments.get("lifecycle_node_matcher"), "action", None)
+        state = _STATES.get(int(arguments.get("transition_id") or 0))
         if isinstance(node, launch.Action) and state:
             context.record("lifecycle", place_of(action), node=id_of(node), state=state)
             return
@@ -403,19 +408,19 @@ _AFTER: dict[type, tuple[str, str, str]] = {
 
 def _register(action: Any, context: RecordingContext) -> None:
     handler = arguments_of(action)["event_handler"]
-    given, at = arguments_of(handler), place_of(action)
-    word, of_target, of_entities = _AFTER.get(type(handler), ("", "", ""))
-    target, entities = given.get(of_target), given.get(of_entities)
+    arguments, at = arguments_of(handler), place_of(action)
+    event, of_target, of_entities = _AFTER.get(type(handler), ("", "", ""))
+    target, entities = arguments.get(of_target), arguments.get(of_entities)
     entities = entities if isinstance(entities, (list, tuple)) else [entities]
     if not isinstance(target, launch.Action) or any(map(callable, entities)):
         context.todo(at, f"what happens {type(handler).__name__}")
         return
     for entity in entities:
-        if word == "done" and _ends_all(entity):
+        if event == "done" and _ends_all(entity):
             context.record("required", at, node=id_of(target))
             continue
         before = dict(context.after)
-        context.after[str(id_of(target))] = word
+        context.after[str(id_of(target))] = event
         context.visit_later(partial(visit_all, [entity], context))
         context.after = before
 
@@ -425,14 +430,14 @@ def _ends_all(action: Any) -> bool:
 
 
 def _wait(action: Any, context: RecordingContext) -> None:
-    given = arguments_of(action)
-    text = text_of(given["period"], context)
+    arguments = arguments_of(action)
+    text = text_of(arguments["period"], context)
     try:
         period_s = float(text)
     except ValueError:
         raise FailedError(f"{text!r} is no time") from None
     context.period_s += period_s
-    context.visit_later(partial(visit_all, list(given["actions"]), context))
+    context.visit_later(partial(visit_all, list(arguments["actions"]), context))
     context.period_s -= period_s
 
 
@@ -444,8 +449,8 @@ def _location_of(action: Any) -> Any:
     source = arguments_of(action)["launch_description_source"]
     if not isinstance(source, LaunchDescriptionSource):
         return source
-    given = arguments_of(source)
-    return given.get("launch_file_path") or given.get("launch_description") or source
+    arguments = arguments_of(source)
+    return arguments.get("launch_file_path") or arguments.get("launch_description") or source
 
 
 def _shown_location(action: Any) -> str:
@@ -458,7 +463,7 @@ def _include(action: Any, context: RecordingContext) -> None:
     location = _location_of(action)
     if isinstance(location, LaunchDescriptionSource):
         raise FailedError("its source is not known here")
-    given = _given_arguments(action, context)
+    arguments = _given_arguments(action, context)
     if isinstance(location, launch.LaunchDescription):
         visit_all([location], context)
         return
@@ -468,7 +473,7 @@ def _include(action: Any, context: RecordingContext) -> None:
             "include",
             place_of(action),
             file=path,
-            args=given,
+            args=arguments,
             namespace=_namespace(None, context),
             env=context.variables,
             period=context.period_s,
@@ -480,7 +485,7 @@ def _include(action: Any, context: RecordingContext) -> None:
 
 def _given_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
     """Set the arguments of an included file; return them with those that stand for themselves."""
-    given: dict[str, str] = {}
+    values: dict[str, str] = {}
     pairs = arguments_of(action).get("launch_arguments") or ()
     for name, value in pairs.items() if isinstance(pairs, Mapping) else pairs:
         try:
@@ -492,12 +497,12 @@ def _given_arguments(action: Any, context: RecordingContext) -> dict[str, str]:
                 place_of(action), f"the argument {describe(name)} of {described(action)}: {error}"
             )
             continue
-        given[argument] = kept
+        values[argument] = kept
         context.launch_configurations[argument] = text
         same = argument_of(kept)
         if not same or same.name != argument:
             context.declared.pop(argument, None)
-    return given
+    return values
 
 
 def include(path: str, context: RecordingContext) -> None:
@@ -516,8 +521,8 @@ def include(path: str, context: RecordingContext) -> None:
 
 
 def _process(action: Any, context: RecordingContext) -> None:
-    given = arguments_of(action)
-    program, *words = given["cmd"]
+    arguments = arguments_of(action)
+    program, *argv = arguments["cmd"]
     is_of_package = isinstance(program, ExecutableInPackage)
     of_package = {}
     if is_of_package:
@@ -526,10 +531,13 @@ def _process(action: Any, context: RecordingContext) -> None:
     context.record(
         "process",
         place_of(action),
-        argv=[kept_text(word, context) for word in (words if is_of_package else given["cmd"])],
-        label=optional_text(given.get("name"), context),
+        argv=[
+            kept_text(argument, context)
+            for argument in (argv if is_of_package else arguments["cmd"])
+        ],
+        label=optional_text(arguments.get("name"), context),
         **of_package,
-        **_common(action, given, context),
+        **_common(action, arguments, context),
     )
 
 
@@ -550,33 +558,35 @@ def _container(action: Any, context: RecordingContext) -> None:
 
 def _record_node(action: Any, kind: str, context: RecordingContext, **more: Any) -> None:
     """Record a node with all that it is told."""
-    given = arguments_of(action)
-    argv = [kept_text(word, context) for word in given.get("arguments") or ()]
-    ros_argv = [text_of(word, context) for word in given.get("ros_arguments") or ()]
+    arguments = arguments_of(action)
+    argv = [kept_text(argument, context) for argument in arguments.get("arguments") or ()]
+    ros_argv = [text_of(argument, context) for argument in arguments.get("ros_arguments") or ()]
     context.record(
         kind,
         place_of(action),
-        executable=text_of(given["executable"], context),
-        label=optional_text(given.get("exec_name"), context),
+        executable=text_of(arguments["executable"], context),
+        label=optional_text(arguments.get("exec_name"), context),
         argv=argv + (["--ros-args", *ros_argv] if ros_argv else []),
-        **_of_node(action, given, context),
-        **_common(action, given, context),
+        **_of_node(action, arguments, context),
+        **_common(action, arguments, context),
         **more,
     )
 
 
-def _of_node(action: Any, given: Mapping[str, Any], context: RecordingContext) -> dict[str, Any]:
+def _of_node(
+    action: Any, arguments: Mapping[str, Any], context: RecordingContext
+) -> dict[str, Any]:
     """Return what a node has, in its own process or in a container's."""
     global_rules = context.launch_configurations.get("ros_remaps", ())
     rules = [
         (text_of(old, context), kept_text(new, context))
-        for old, new in given.get("remappings") or ()
+        for old, new in arguments.get("remappings") or ()
     ]
-    params = parameters_of(given.get("parameters"), context, place_of(action))
+    params = parameters_of(arguments.get("parameters"), context, place_of(action))
     return {
-        "package": optional_text(given.get("package"), context),
-        "name": optional_text(given.get("name"), context),
-        "namespace": _namespace(given.get("namespace"), context),
+        "package": optional_text(arguments.get("package"), context),
+        "name": optional_text(arguments.get("name"), context),
+        "namespace": _namespace(arguments.get("namespace"), context),
         "params": [*context.params, *params],
         "common": len(context.params),
         "remap": [*global_rules, *rules],
@@ -592,9 +602,11 @@ def _namespace(namespace: Any, context: RecordingContext) -> str | None:
     return full
 
 
-def _common(action: Any, given: Mapping[str, Any], context: RecordingContext) -> dict[str, Any]:
+def _common(
+    action: Any, arguments: Mapping[str, Any], context: RecordingContext
+) -> dict[str, Any]:
     """Return what any process can be told."""
-    variables = [given.get(keyword.name) for keyword in launch_keywords("variables")]
+    variables = [arguments.get(keyword.name) for keyword in launch_keywords("variables")]
     env = context.variables
     for values in variables:
         env |= _texts(values, context)
@@ -607,13 +619,13 @@ def _common(action: Any, given: Mapping[str, Any], context: RecordingContext) ->
     if variables[-1] is not None:
         what["only_env"] = True
     for keyword in (*launch_keywords(*_READERS), Keyword("shell", "switch")):
-        if given.get(keyword.name) is not None:
-            what[keyword.name] = _READERS[keyword.kind](given[keyword.name], context)
+        if arguments.get(keyword.name) is not None:
+            what[keyword.name] = _READERS[keyword.kind](arguments[keyword.name], context)
     for keyword in launch_keywords("text"):
-        if keyword.name == _PREFIX and given.get(keyword.name) is None:
-            what |= _configured_prefix(keyword.attribute, given, context)
+        if keyword.name == _PREFIX and arguments.get(keyword.name) is None:
+            what |= _configured_prefix(keyword.attribute, arguments, context)
     for keyword in launch_keywords("shutdown"):
-        follows = given.get(keyword.name)
+        follows = arguments.get(keyword.name)
         follows = follows if isinstance(follows, (list, tuple)) else [follows]
         follows = [entity for entity in follows if entity is not None]
         if not all(map(_ends_all, follows)):
@@ -627,11 +639,11 @@ _PREFIX = "prefix"
 
 
 def _configured_prefix(
-    name: str, given: Mapping[str, Any], context: RecordingContext
+    name: str, arguments: Mapping[str, Any], context: RecordingContext
 ) -> dict[str, str]:
     """Return the prefix that launch configurations set for all programs, or those of a filter."""
     configured = context.launch_configurations
-    program = text_of(given.get("executable") or given["cmd"][0], context)
+    program = text_of(arguments.get("executable") or arguments["cmd"][0], context)
     is_meant = re.match(configured.get(f"{name}-filter", ""), posixpath.basename(program))
     return {_PREFIX: configured[name]} if name in configured and is_meant else {}
 
@@ -657,10 +669,10 @@ def _output(value: Any, context: RecordingContext) -> str | list[str]:
         for places in value.values():
             outputs.update([places] if isinstance(places, str) else places)
         return sorted(outputs)
-    word = text_of(value, context)
-    if word not in _OUTPUTS:
-        raise FailedError(f"output={word!r}")
-    return word
+    place = text_of(value, context)
+    if place not in _OUTPUTS:
+        raise FailedError(f"output={place!r}")
+    return place
 
 
 #: What reads a keyword's value, by its kind.
@@ -676,15 +688,15 @@ _READERS: dict[KeywordKind, Callable[[Any, RecordingContext], Any]] = {
 
 
 def _load_into(action: Any, context: RecordingContext) -> None:
-    given = arguments_of(action)
-    container = given["target_container"]
+    arguments = arguments_of(action)
+    container = arguments["target_container"]
     if isinstance(container, launch.Action):
         target = str(id_of(container))
     else:
         target = f"/{text_of(container, context).strip('/')}"
     if target == "/":
         raise FailedError("it names no container")
-    _load(action, given["composable_node_descriptions"], target, context)
+    _load(action, arguments["composable_node_descriptions"], target, context)
 
 
 def _load(action: Any, components: Any, container: str, context: RecordingContext) -> None:
@@ -703,10 +715,10 @@ def _load(action: Any, components: Any, container: str, context: RecordingContex
 
 
 def _component(component: Any, container: str, context: RecordingContext) -> None:
-    given = arguments_of(component)
+    arguments = arguments_of(component)
     at = place_of(component)
     more = {
-        keyword.name: parameters_of(given.get(keyword.name), context, at)
+        keyword.name: parameters_of(arguments.get(keyword.name), context, at)
         for keyword in launch_keywords("parameters")
     }
     context.record(
@@ -714,10 +726,10 @@ def _component(component: Any, container: str, context: RecordingContext) -> Non
         at,
         id=id_of(component),
         container=container,
-        plugin=text_of(given["plugin"], context),
+        plugin=text_of(arguments["plugin"], context),
         period=context.period_s,
         after=dict(context.after),
-        **_of_node(component, given, context),
+        **_of_node(component, arguments, context),
         **more,
     )
 

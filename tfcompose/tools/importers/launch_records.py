@@ -117,9 +117,9 @@ def scalar_of(text: str) -> Any:
     return text
 
 
-def conjunction(words: Iterable[str | None], separator: str) -> str | None:
+def conjunction(parts: Iterable[str | None], separator: str) -> str | None:
     """Return conditions of a robot file as one, or None where one of them cannot be written."""
-    conditions = list(words)
+    conditions = list(parts)
     if not all(conditions):
         return None
     return separator.join(f"({condition})" for condition in conditions)
@@ -178,18 +178,20 @@ def with_package(path: str) -> str:
     return re.sub(r"^.*?package:/+", PACKAGE, path)
 
 
-def of_command(words: list[str], text: str) -> str:
+def of_command(argv: list[str], text: str) -> str:
     """Return what stands for the output of a command that makes a robot's description.
 
     Raises:
         FailedError: for any other command: none is run.
     """
-    program = Path(words[0]).name if words else ""
-    rest = [with_package(word) for word in words[1:]]
-    if program.startswith("xacro") or words[:3] == ["ros2", "run", "xacro"]:
+    program = Path(argv[0]).name if argv else ""
+    rest = [with_package(argument) for argument in argv[1:]]
+    if program.startswith("xacro") or argv[:3] == ["ros2", "run", "xacro"]:
         rest = rest[3:] if program == "ros2" else rest
-        files = [word for word in rest if ":=" not in word and not word.startswith("-")]
-        args = dict(word.split(":=", 1) for word in rest if ":=" in word)
+        files = [
+            argument for argument in rest if ":=" not in argument and not argument.startswith("-")
+        ]
+        args = dict(argument.split(":=", 1) for argument in rest if ":=" in argument)
         if files:
             return placeholder(files[0], args)
     if program == "cat" and len(rest) == 1:

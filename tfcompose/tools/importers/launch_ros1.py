@@ -285,8 +285,8 @@ def _text(text: str, recording: Ros1Recording) -> str:
 
 
 def _substituted(found: re.Match[str], recording: Ros1Recording) -> Part:
-    kind, words = found[1], found[2].split()
-    name = words[0] if words else ""
+    kind, operands = found[1], found[2].split()
+    name = operands[0] if operands else ""
     match kind:
         case "arg":
             value = _argument(name, recording)
@@ -301,7 +301,7 @@ def _substituted(found: re.Match[str], recording: Ros1Recording) -> Part:
             raise FailedError(f"{found[0]} is only part of a value")
     value = recording.variables.get(name, os.environ.get(name, ""))
     if not value and kind == "optenv":
-        return " ".join(words[1:])
+        return " ".join(operands[1:])
     if name not in recording.variables and name not in os.environ:
         raise FailedError(f"the environment variable {name} is not set")
     return value
@@ -423,21 +423,21 @@ def _node(element: _Attributes, recording: Ros1Recording) -> None:
 
 def _keywords(element: _Attributes) -> dict[str, Any]:
     """Return what a node is told in launch's words."""
-    words: dict[str, Any] = {}
+    keywords: dict[str, Any] = {}
     for keyword in launch_keywords("text", "switch", "number", "output"):
         text = element.value(keyword.attribute or keyword.name)
         if text is None:
             continue
         match keyword.kind:
             case "switch":
-                words[keyword.name] = text.lower() in {"true", "1"}
+                keywords[keyword.name] = text.lower() in {"true", "1"}
             case "number":
-                words[keyword.name] = _number(text)
+                keywords[keyword.name] = _number(text)
             case _:
-                words[keyword.name] = text
+                keywords[keyword.name] = text
     for keyword in launch_keywords("shutdown"):
-        words[keyword.name] = (element.value(keyword.ros1) or "").lower() == "true"
-    return words
+        keywords[keyword.name] = (element.value(keyword.ros1) or "").lower() == "true"
+    return keywords
 
 
 def _number(text: str) -> float:

@@ -79,28 +79,30 @@ def params_of(
     full = f"{(program.namespace or '').rstrip('/')}/{node}"
     sections: _Sections = {}
     of_files: _Sections = {}
-    for index, one in enumerate(program.params):
-        if not isinstance(one, str):
-            params = {key: brought(value, draft) for key, value in one.items()}
-            given = [(full if index in program.exact else _ANY, params)]
-        elif one.startswith(PACKAGE):
-            left.append(f"the parameters of {one}: the package is not found here")
+    for index, param_set in enumerate(program.params):
+        if not isinstance(param_set, str):
+            params = {key: brought(value, draft) for key, value in param_set.items()}
+            by_node = [(full if index in program.exact else _ANY, params)]
+        elif param_set.startswith(PACKAGE):
+            left.append(f"the parameters of {param_set}: the package is not found here")
             continue
-        elif one not in draft.made and not is_file(posixpath.join(target.top, one)):
-            left.append(f"the parameters of {one}, which is not there")
+        elif param_set not in draft.made and not is_file(posixpath.join(target.top, param_set)):
+            left.append(f"the parameters of {param_set}, which is not there")
             continue
         else:
-            files.append(draft.bring(one) if one in draft.made else path_from(target, one))
-            nodes = _nodes_in(one, draft)
+            files.append(
+                draft.bring(param_set) if param_set in draft.made else path_from(target, param_set)
+            )
+            nodes = _nodes_in(param_set, draft)
             if nodes is None and any(sections.values()):
                 left.append(
-                    f"{one} is laid over the parameters before it: here they are laid over the"
-                    " file"
+                    f"{param_set} is laid over the parameters before it: here they are laid over"
+                    " the file"
                 )
-            given = [(each.name, dict(_by_full_name(each.params, ""))) for each in nodes or ()]
-            for name, params in given:
+            by_node = [(each.name, dict(_by_full_name(each.params, ""))) for each in nodes or ()]
+            for name, params in by_node:
                 of_files.setdefault((name, 0), {}).update(params)
-        for name, params in given:
+        for name, params in by_node:
             sections.setdefault((name, index if program.plugin else 0), {}).update(params)
     common: dict[str, Any] = {}
     if keeps_name:
@@ -148,8 +150,8 @@ def _values(params: Mapping[str, Any]) -> dict[str, Any]:
 
 def _that_count(sections: _Sections, node: str) -> dict[str, Any]:
     """Return the parameters that a node has of sections, which are by their names in order."""
-    several = (params for (name, _), params in sections.items() if matches(name, node))
-    return {key: value for params in several for key, value in params.items()}
+    of_sections = (params for (name, _), params in sections.items() if matches(name, node))
+    return {key: value for params in of_sections for key, value in params.items()}
 
 
 def value_in(value: Any) -> Any:

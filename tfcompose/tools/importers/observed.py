@@ -58,8 +58,8 @@ class Observed:
 
     def add(self, edges: Iterable[EdgeState]) -> None:
         """Add the edges, parents before children, and their owners."""
-        taken = [edge for edge in edges if edge.stream.rejections < edge.stream.arrivals.count]
-        for edge in _parents_first(taken):
+        accepted = [edge for edge in edges if edge.stream.rejections < edge.stream.arrivals.count]
+        for edge in _parents_first(accepted):
             self._edge(edge)
 
     def _edge(self, edge: EdgeState) -> None:
@@ -143,8 +143,8 @@ class Observed:
         ``driver`` is the process that publishes those inside of it.
         """
         frames, mount = self.draft.sections["frames"], sensor.mount.child
-        taken = sensor.name in self.draft.sections["processes"]
-        new = self._renamed(sensor.name) if taken else ""
+        is_in_use = sensor.name in self.draft.sections["processes"]
+        new = self._renamed(sensor.name) if is_in_use else ""
         own = {key: value for key, value in frames[mount].items() if key in {"owner", "static"}}
         pose = pose_keys(sensor.mount.pose, quaternion=True)
         keys = sensor_keys(sensor, pose, {}, new if driver == sensor.name else driver) | own
@@ -209,8 +209,8 @@ class Observed:
     def _notes(self, edge: EdgeState) -> Iterable[str]:
         where = self.where(edge.stream.gid)
         found = _PID.search(where)
-        words = self.words_of(int(found[1])) if found else ()
-        run = started_by(words)
+        argv = self.words_of(int(found[1])) if found else ()
+        run = started_by(argv)
         if run:
             yield f"it runs here as: run: {flow(run)}"
         elif where:
@@ -263,14 +263,14 @@ def round_rate(rate_hz: float | None) -> float | None:
     return float(f"{math.floor(rate_hz / scale * 10) / 10 * scale:.6g}")
 
 
-def started_by(words: Sequence[str]) -> dict[str, Any]:
+def started_by(argv: Sequence[str]) -> dict[str, Any]:
     """Return the package, executable and arguments of a command line.
 
     Nothing where it is no package's program.
 
     A program of a Python package has the interpreter in front.
     """
-    rest = list(words)
+    rest = list(argv)
     if rest and posixpath.basename(rest[0]).startswith("python") and rest[1:]:
         rest.pop(0)
     found = re.search(r"/lib/([^/]+)/([^/]+)$", rest[0]) if rest else None

@@ -54,17 +54,19 @@ def omitted(document: Document) -> Notes:
             continue
         at = (f"{element.tag}s", element.attributes.get("name", ""))
         entries.append((element.at, at))
-        several = list(dict.fromkeys(_in_element(element, colours)))
-        if several:
-            notes.setdefault(at, []).append(f"left out: {', '.join(several)}")
+        left_out = list(dict.fromkeys(_in_element(element, colours)))
+        if left_out:
+            notes.setdefault(at, []).append(f"left out: {', '.join(left_out)}")
         if _has_no_ends(element):
             notes.setdefault(at, []).append(
                 "the source gives no lower and upper limit, and parsers take 0"
             )
-    for one in document.converted.of_elements:  # of blocks and files nothing is left out for it
-        if one.span:
-            notes.setdefault(_entry_at(one.span, entries), []).append(
-                f"{one.code} in the source: {one.message}"
+    for (
+        element
+    ) in document.converted.of_elements:  # of blocks and files nothing is left out for it
+        if element.span:
+            notes.setdefault(_entry_at(element.span, entries), []).append(
+                f"{element.code} in the source: {element.message}"
             )
     of_robot = list(_in_robot(document.root, document.robot))
     if of_robot:
@@ -89,8 +91,8 @@ def _in_robot(root: Element, robot: Robot) -> Iterator[str]:
     known = {material.name for material in materials(robot.links)}
     unused = [
         name
-        for one in root.all("material")
-        if (name := one.attributes.get("name", "")) not in known
+        for element in root.all("material")
+        if (name := element.attributes.get("name", "")) not in known
     ]
     if unused:
         yield f"the unused material{'s' if unused[1:] else ''} {', '.join(unused)}"
@@ -99,36 +101,38 @@ def _in_robot(root: Element, robot: Robot) -> Iterator[str]:
 def _in_element(element: Element, colours: frozenset[str]) -> Iterator[str]:
     """Yield what is in a link or joint and has no place."""
     if element.tag == "joint" and element.attributes.get("type") == "fixed":
-        words = [child.tag for child in element.children if child.tag in _OF_MOTION]
-        yield from (f"the {word} of a fixed joint" for word in words)
-    for one in _elements_in(element):
-        for name, value in one.attributes.items():
-            if ":" in name or name in _NOT_HELD.get(one.tag, ()):
-                yield f'{one.tag} {name}="{value}"'
-        yield from (f"<{child.tag}>" for child in one.children if ":" in child.tag)
+        tags = [child.tag for child in element.children if child.tag in _OF_MOTION]
+        yield from (f"the {tag} of a fixed joint" for tag in tags)
+    for inner in _elements_in(element):
+        for name, value in inner.attributes.items():
+            if ":" in name or name in _NOT_HELD.get(inner.tag, ()):
+                yield f'{inner.tag} {name}="{value}"'
+        yield from (f"<{child.tag}>" for child in inner.children if ":" in child.tag)
         if (
-            one.tag == "material"
-            and one.attributes.get("name") not in colours
-            and not one.children
+            inner.tag == "material"
+            and inner.attributes.get("name") not in colours
+            and not inner.children
         ):
-            yield f"the undefined material {one.attributes.get('name', '')}"
+            yield f"the undefined material {inner.attributes.get('name', '')}"
 
 
 def _described_materials(root: Element) -> frozenset[str]:
     """Return the names of the materials that have a colour or a texture somewhere."""
-    visuals = [one for link in root.all("link") for one in link.all("visual")]
-    several = [material for around in (root, *visuals) for material in around.all("material")]
-    return frozenset(one.attributes.get("name", "") for one in several if one.children)
+    visuals = [visual for link in root.all("link") for visual in link.all("visual")]
+    described = [material for around in (root, *visuals) for material in around.all("material")]
+    return frozenset(
+        material.attributes.get("name", "") for material in described if material.children
+    )
 
 
 def _elements_in(element: Element) -> Iterator[Element]:
     """Yield the element and those in it, but for what is other programs' business."""
     waiting = [element]
     while waiting:
-        one = waiting.pop()
-        yield one
+        inner = waiting.pop()
+        yield inner
         waiting += [
-            child for child in one.children if child.tag not in OPAQUE and ":" not in child.tag
+            child for child in inner.children if child.tag not in OPAQUE and ":" not in child.tag
         ]
 
 
@@ -136,10 +140,12 @@ def angles(root: Element) -> dict[Quaternion, Vector]:
     """Return each origin's roll, pitch and yaw (rad) from the source, by rotation."""
     rpy: dict[Quaternion, Vector] = {}
     for top in root.children:
-        for one in _elements_in(top) if top.tag in {"link", "joint"} else ():
-            words = one.attributes.get("rpy", "").split() if one.tag == "origin" else []
+        for element in _elements_in(top) if top.tag in {"link", "joint"} else ():
+            angles_text = (
+                element.attributes.get("rpy", "").split() if element.tag == "origin" else []
+            )
             try:
-                roll, pitch, yaw = map(float, words)
+                roll, pitch, yaw = map(float, angles_text)
             except ValueError:
                 continue
             if max(map(abs, (roll, pitch, yaw))) < 1e9:  # noqa: PLR2004 (as where poses are read)
@@ -186,27 +192,29 @@ def with_material_names(robot: Robot) -> tuple[Robot, list[str]]:
             colour = ", ".join(f"{part:g}" for part in material.rgba)
             notes.append(f"the colour {material.name} is {colour} in the source: parts are 0 to 1")
 
-    def shape(one: Shape) -> Shape:
-        if one.material is None:
-            return one
-        name = names.get(one.material.name, one.material.name)
-        return replace(one, material=replace(one.material, name=name, rgba=_bounded(one.material)))
+    def shape(drawn: Shape) -> Shape:
+        if drawn.material is None:
+            return drawn
+        name = names.get(drawn.material.name, drawn.material.name)
+        return replace(
+            drawn, material=replace(drawn.material, name=name, rgba=_bounded(drawn.material))
+        )
 
-    def link(one: Link) -> Link:
-        return replace(one, visuals=tuple(map(shape, one.visuals)))
+    def link(body: Link) -> Link:
+        return replace(body, visuals=tuple(map(shape, body.visuals)))
 
-    links = {name: link(one) for name, one in robot.links.items()}
+    links = {name: link(body) for name, body in robot.links.items()}
     return replace(robot, links=links), list(dict.fromkeys(notes))
 
 
-def _material_name(name: str, taken: set[str]) -> str:
+def _material_name(name: str, used_names: set[str]) -> str:
     free = (
         name
         if _MATERIAL.fullmatch(name)
         else re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "material"
     )
     free = free if free[0].isalpha() else f"m_{free}"
-    while free in taken:
+    while free in used_names:
         free += "_"
     return free
 

@@ -80,15 +80,15 @@ def _add_transform(draft: ImportDraft, program: Program) -> None:
     added = draft.frame(transform.parent, transform.child, transform.keys(), at, *notes)
     entry = ("frames", transform.child)
     if added and not isolated(draft, moved, program.namespace):
-        several = ", ".join(f"{old} → {new}" for old, new in moved.items())
+        remaps = ", ".join(f"{old} → {new}" for old, new in moved.items())
         draft.todo(
-            f"the publisher is remapped: {several}",
+            f"the publisher is remapped: {remaps}",
             at,
             entry,
             advice="ros: {namespace: …, isolate: topics}",
         )
-    for one in program.todo:
-        draft.todo(one, at, entry)
+    for message in program.todo:
+        draft.todo(message, at, entry)
 
 
 def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
@@ -97,8 +97,8 @@ def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
     All joints at 0, as joint_state_publisher has them unless it is told.
     """
     params: dict[str, Any] = {}
-    for one in program.params:
-        params |= one if isinstance(one, dict) else {}
+    for param_set in program.params:
+        params |= param_set if isinstance(param_set, dict) else {}
     zeros = {
         name.partition(".")[2]: value
         for name, value in params.items()
@@ -125,11 +125,11 @@ def _add_joint_publisher(draft: ImportDraft, program: Program) -> str:
     ]
     for key in left:
         draft.todo(f"{program.executable}: the parameter {key}", program.at, entry)
-    for one in (
+    for message in (
         *program.todo,
         *(f"parameters of {file}" for file in program.params if isinstance(file, str)),
     ):
-        draft.todo(one, program.at, entry)
+        draft.todo(message, program.at, entry)
     return name
 
 
@@ -139,7 +139,7 @@ def _hertz(value: float) -> Any:
 
 def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
-    program = replace(program, argv=tuple(brought(word, draft) for word in program.argv))
+    program = replace(program, argv=tuple(brought(argument, draft) for argument in program.argv))
     source_name = program.name
     if not program.name and program.package and (name := named_in_files(program.params, draft)):
         program = replace(program, name=name)
@@ -178,18 +178,18 @@ def _add_process(draft: ImportDraft, program: Program, target: Target) -> str:
     keys |= dict(program.keys)
     section = "containers" if program.loads else "processes"
     draft.process(name, keys, *(note for note in notes if note), section=section)
-    for word in _texts((*program.argv, *program.env.values())):
-        if PACKAGE in word and not _is_literal(word, at, draft):
-            todo.append(f"{word} is in a package that is not found here: write its path")
+    for argument in _texts((*program.argv, *program.env.values())):
+        if PACKAGE in argument and not _is_literal(argument, at, draft):
+            todo.append(f"{argument} is in a package that is not found here: write its path")
             advice = "--package NAME=FOLDER, or source the workspace's setup file"
-    for one in (*todo, *params.left):
-        draft.todo(one, at, (section, name), advice)
+    for message in (*todo, *params.left):
+        draft.todo(message, at, (section, name), advice)
     if program.description is not None:
         draft.todo("the parameter robot_description", at, (section, name), _FROM_TOPIC)
     return name
 
 
-def _is_literal(word: str, at: Span | None, draft: ImportDraft) -> bool:
+def _is_literal(text: str, at: Span | None, draft: ImportDraft) -> bool:
     """Whether the source has the word's addresses of packages itself, as the program reads them.
 
     What the source looks up in a package that is not found has such an address too.
@@ -198,7 +198,7 @@ def _is_literal(word: str, at: Span | None, draft: ImportDraft) -> bool:
         source = draft.reach.read(at.file, MOST_BYTES) if at else b""
     except (OutsideError, OSError):
         return False
-    return all(address.encode() in source for address in re.findall(rf"{PACKAGE}\w+", word))
+    return all(address.encode() in source for address in re.findall(rf"{PACKAGE}\w+", text))
 
 
 def _keeps_its_name(program: Program) -> bool:
@@ -232,32 +232,32 @@ def _container_keys(program: Program) -> dict[str, Any]:
 
     By its isolation and executor if it is a stock one, else by its program.
     """
-    words = list(program.argv)
+    argv = list(program.argv)
     is_stock = program.package == CONTAINERS
     keys: dict[str, Any] = {} if is_stock else {"package": program.package}
     for (isolation, executor), (name, arguments) in reversed(PROGRAMS.items()):
-        if is_stock and program.executable == name and set(arguments) <= set(words):
-            words = [word for word in words if word not in arguments]
+        if is_stock and program.executable == name and set(arguments) <= set(argv):
+            argv = [argument for argument in argv if argument not in arguments]
             keys |= {"isolation": isolation} if isolation != "shared" else {}
             keys |= {"executor": executor} if executor != "single" else {}
             break
     else:
         keys["executable"] = program.executable
-    return keys | ({"args": words} if words else {})
+    return keys | ({"args": argv} if argv else {})
 
 
 def _usual_name(package: str) -> str | None:
     """Return how the node of a package calls itself, where that is known."""
     names = {
         preset.node
-        for one in node_preset_names()
-        if (preset := node_preset(one)).package == package
+        for preset_name in node_preset_names()
+        if (preset := node_preset(preset_name)).package == package
     }
     return names.pop() if len(names) == 1 else None
 
 
-def _texts(words: Sequence[Any]) -> list[str]:
-    return [word for word in words if isinstance(word, str)]
+def _texts(argv: Sequence[Any]) -> list[str]:
+    return [argument for argument in argv if isinstance(argument, str)]
 
 
 def _run(program: Program) -> Any:
@@ -268,13 +268,16 @@ def _run(program: Program) -> Any:
         run: dict[str, Any] = {"package": program.package, "executable": program.executable}
         return run | ({"args": list(program.argv)} if program.argv else {})
     match program.argv:
-        case ("ros2", "launch", package, file, *words) if (
-            all(":=" in word for word in words)
+        case ("ros2", "launch", package, file, *arguments) if (
+            all(":=" in argument for argument in arguments)
             and ":=" not in file
             and not package.startswith("-")
         ):
             run = {"launch": f"{package}/{file}"}
-            args = {left: right for left, _, right in (partition(word, ":=") for word in words)}
+            args = {
+                left: right
+                for left, _, right in (partition(argument, ":=") for argument in arguments)
+            }
             return run | ({"args": args} if args else {})
     return list(program.argv)
 
@@ -283,17 +286,17 @@ def _plain(program: Program) -> str:
     """Return the name of what is started, without its folder and ending."""
     match program.argv:
         case ("ros2", "launch", _, file, *_) if program.package is None:
-            word = file
+            stem = file
         case ("ros2", verb, *_) if program.package is None:
-            word = f"ros2_{verb}"
+            stem = f"ros2_{verb}"
         case _ if program.plugin:
             return _CAMEL.sub("_", program.plugin.rpartition("::")[2]).lower()
         case _:
-            word = program.executable or (
+            stem = program.executable or (
                 next(iter(program.argv[0].split()), "") if program.argv else ""
             )
-    plain = posixpath.basename(word).partition(".")[0]
-    script = next((one for one in program.argv[1:] if one.endswith(".py")), "")
+    plain = posixpath.basename(stem).partition(".")[0]
+    script = next((argument for argument in program.argv[1:] if argument.endswith(".py")), "")
     return (
         posixpath.basename(script).removesuffix(".py")
         if script and plain.startswith("python")

@@ -99,7 +99,7 @@ class _Writer:
             "packages": dict(imported.packages),
             "links": links,
             "joints": joints,
-            "ros2_control": {one.name: _hardware(one) for one in robot.hardware},
+            "ros2_control": {system.name: _hardware(system) for system in robot.hardware},
             "xml": {block.name: dedent_block(block.text) for block in robot.blocks},
             "frames": {
                 child: self._mount(edge)
@@ -218,11 +218,11 @@ class _Writer:
         free = [edge.joint_name for edge in self.robot.edges if edge.free]
         if not free:
             return {}
-        several = ", ".join(free)
+        names = ", ".join(free)
         self._note(
             "processes",
             MOVER,
-            f"the source does not say which process publishes {several}: name it here",
+            f"the source does not say which process publishes {names}: name it here",
         )
         return {MOVER: {"external": True}}
 
@@ -280,19 +280,22 @@ def _hardware(hardware: Hardware) -> dict[str, Any]:
     keys |= {"is_async": hardware.is_async} if hardware.is_async is not None else {}
     for kind in ("joint", "sensor", "gpio"):
         components = {}
-        for one in hardware.components:
-            if one.kind == kind:
-                values = {"command": _interfaces(one.command), "state": _interfaces(one.state)}
-                values["params"] = _params(one.params)
-                components[one.name] = {key: value for key, value in values.items() if value}
+        for component in hardware.components:
+            if component.kind == kind:
+                values = {
+                    "command": _interfaces(component.command),
+                    "state": _interfaces(component.state),
+                }
+                values["params"] = _params(component.params)
+                components[component.name] = {key: value for key, value in values.items() if value}
         keys |= {f"{kind}s": components} if components else {}
     return keys
 
 
-def _interfaces(several: tuple[Interface, ...]) -> Any:
-    if any(one.params for one in several):
-        return {one.name: _params(one.params) for one in several}
-    return [one.name for one in several]
+def _interfaces(interfaces: tuple[Interface, ...]) -> Any:
+    if any(interface.params for interface in interfaces):
+        return {interface.name: _params(interface.params) for interface in interfaces}
+    return [interface.name for interface in interfaces]
 
 
 def _params(params: dict[str, str]) -> dict[str, Any]:
@@ -352,7 +355,7 @@ def with_findings(
     """
     head = [f"imported from {posixpath.basename(source)} by tfcompose"]
     compiled = lint(robot_file(robot, head))
-    errors = [one for one in compiled.errors if one.code != "TF501"]
+    errors = [finding for finding in compiled.errors if finding.code != "TF501"]
     if errors != list(compiled.errors):
         notes = {**robot.notes, ("rules", "TF501"): ("the names are those of the source",)}
         robot = replace(robot, rules={"TF501": "warning"}, notes=notes)
@@ -361,11 +364,11 @@ def with_findings(
 
 def _faults(compiled: Compiled) -> Iterable[str]:
     """Yield what lint finds in the result, each rule once: these are faults of the source."""
-    several: dict[str, list[Finding]] = {}
-    for one in compiled.found:
-        several.setdefault(one.code, []).append(one)
-    if several:
+    by_code: dict[str, list[Finding]] = {}
+    for finding in compiled.found:
+        by_code.setdefault(finding.code, []).append(finding)
+    if by_code:
         yield "findings of lint, which the source has too:"
-    for code, found in several.items():
+    for code, found in by_code.items():
         more = f" (and {len(found) - 1} more)" if found[1:] else ""
         yield f"{code}: {found[0].message}{more}"

@@ -115,34 +115,34 @@ def recognised(
     """
     search = _Search(robot, library, publisher)
     fits = sorted(search.fits(), key=lambda fit: fit.quality, reverse=True)
-    taken: set[str] = set()
+    used_frames: set[str] = set()
     sensors: list[Recognised] = []
     undecided: dict[str, str] = {}
     for fit in fits:
         frames = {edge.child for edge in fit.sensor.edges}
-        if frames & taken or any(sensor.name == fit.sensor.name for sensor in sensors):
+        if frames & used_frames or any(sensor.name == fit.sensor.name for sensor in sensors):
             continue
         rivals = [
-            one
-            for one in fits
-            if one.quality[:3] == fit.quality[:3] and one.sensor.mount == fit.sensor.mount
+            rival
+            for rival in fits
+            if rival.quality[:3] == fit.quality[:3] and rival.sensor.mount == fit.sensor.mount
         ]
         chosen = search.chosen(rivals)
-        taken |= frames
+        used_frames |= frames
         if chosen:
             sensors.append(chosen)
         else:
-            presets = search.other_model(fit.sensor) or [one.sensor.preset for one in rivals]
+            presets = search.other_model(fit.sensor) or [rival.sensor.preset for rival in rivals]
             undecided[fit.sensor.mount.child] = _question(
                 fit.sensor.name, fit.sensor.mount, presets
             )
-    taken |= {above for frame in taken for above in search.above(frame)}
+    used_frames |= {above for frame in used_frames for above in search.above(frame)}
     for mount, presets in search.named():
-        if mount.child not in taken:
+        if mount.child not in used_frames:
             undecided[mount.child] = _question(_sensor_name(mount.child), mount, presets)
-            taken |= {mount.child, *search.below(mount.child), *search.above(mount.child)}
+            used_frames |= {mount.child, *search.below(mount.child), *search.above(mount.child)}
     order = [edge.child for edge in robot.edges]
-    return sorted(sensors, key=lambda one: order.index(one.mount.child)), undecided
+    return sorted(sensors, key=lambda sensor: order.index(sensor.mount.child)), undecided
 
 
 def _question(name: str, mount: Edge, presets: list[str]) -> str:
@@ -168,10 +168,10 @@ def _words(*texts: str) -> frozenset[str]:
     """
     joined: set[str] = set()
     for text in texts:
-        words = re.findall("[a-z0-9]+", text.lower())
+        tokens = re.findall("[a-z0-9]+", text.lower())
         joined |= {
-            "".join(words[begin:end])
-            for end in range(len(words) + 1)
+            "".join(tokens[begin:end])
+            for end in range(len(tokens) + 1)
             for begin in range(max(end - 3, 0), end)
         }
     return frozenset(joined)
@@ -205,20 +205,24 @@ class _Search:
 
     def chosen(self, rivals: list[_Fit]) -> Recognised | None:
         """Return the equally good fit that other facts single out, or None."""
-        rivals = [one for one in rivals if not self.other_model(one.sensor)]
+        rivals = [rival for rival in rivals if not self.other_model(rival.sensor)]
         if not rivals:
             return None
-        if len({one.sensor.preset for one in rivals}) == 1:
+        if len({rival.sensor.preset for rival in rivals}) == 1:
             return rivals[0].sensor
-        generic = [one.sensor for one in rivals if one.sensor.preset.startswith(f"{GENERIC}/")]
+        generic = [
+            rival.sensor for rival in rivals if rival.sensor.preset.startswith(f"{GENERIC}/")
+        ]
         named = [
-            one.sensor for one in rivals if self._is_named(one.sensor.preset, one.sensor.edges)
+            rival.sensor
+            for rival in rivals
+            if self._is_named(rival.sensor.preset, rival.sensor.edges)
         ]
         longest = max(
-            (len(_model(one.preset)) for one in named), default=0
+            (len(_model(candidate.preset)) for candidate in named), default=0
         )  # of oak-d and oak-d-pro, the longer one
-        named = [one for one in named if len(_model(one.preset)) == longest]
-        if len({one.preset for one in named}) == 1:
+        named = [candidate for candidate in named if len(_model(candidate.preset)) == longest]
+        if len({candidate.preset for candidate in named}) == 1:
             return named[0]
         return generic[0] if generic and not named else None
 
@@ -235,11 +239,11 @@ class _Search:
             for name in self.library.names:
                 presets.setdefault(naming(name), []).append(name)
             for edge in self.edges.values():
-                word = max(
+                token = max(
                     (self._words_of(edge.child) & presets.keys()) - {""}, key=len, default=""
                 )
-                if word:
-                    found.append((100 * rank - len(word), edge, presets[word]))
+                if token:
+                    found.append((100 * rank - len(token), edge, presets[token]))
         return [(edge, presets) for _, edge, presets in sorted(found, key=itemgetter(0))]
 
     def other_model(self, sensor: Recognised) -> list[str]:
@@ -247,17 +251,17 @@ class _Search:
 
         The mesh of a D435i may be that of a D435.
         """
-        words = frozenset().union(*(self._words_of(edge.child) for edge in sensor.edges))
-        named = {name: model for name in self.library.names if (model := _model(name)) in words}
+        tokens = frozenset().union(*(self._words_of(edge.child) for edge in sensor.edges))
+        named = {name: model for name in self.library.names if (model := _model(name)) in tokens}
         parts = {
-            one
-            for one in named.values()
+            model
+            for model in named.values()
             for more in named.values()
-            if more.startswith(one) and more != one
+            if more.startswith(model) and more != model
         }
         exact = {*named.values()} - parts  # of zedx and zedxone4k, the latter
         own = _model(sensor.preset)
-        if not own or any(own.startswith(one) for one in exact):
+        if not own or any(own.startswith(name) for name in exact):
             return []
         return [name for name, model in named.items() if model in exact]
 
@@ -332,7 +336,7 @@ class _Search:
             inside = found.values()
             if len(found) < len(wanted) or not any(match.tells for match in inside):
                 continue
-            given = {
+            changed_options = {
                 key: value for key, value in every.items() if value != preset.options[key].default
             }
             body = fill_name(preset.body.frame, sensor, preset.words) if preset.body else ""
@@ -342,7 +346,7 @@ class _Search:
                     name,
                     mount,
                     inside=tuple(match.edge for match in inside),
-                    options=given,
+                    options=changed_options,
                     own_xyz=frozenset(match.edge.child for match in inside if match.own_xyz),
                     own_rotation=frozenset(
                         match.edge.child for match in inside if match.own_rotation
@@ -354,7 +358,7 @@ class _Search:
                         match.edge.child for key, match in found.items() if wanted[key].driver
                     ),
                 ),
-                len(every) - len(given),
+                len(every) - len(changed_options),
             )
 
     def _as_sent(self, frame: PresetFrame) -> PresetFrame:
@@ -387,7 +391,7 @@ class _Search:
         found: dict[str, _FrameMatch] = {}
         waiting = dict(wanted)
         while waiting:
-            ready = [key for key, one in waiting.items() if one.parent not in waiting]
+            ready = [key for key, match in waiting.items() if match.parent not in waiting]
             for key in ready or list(waiting):
                 frame = waiting.pop(key)
                 own, parent = (
@@ -408,9 +412,9 @@ class _Search:
                 names[own] = match.edge.child
         return found
 
-    def _by_likeness(self, name: str, parent: str, taken: set[str]) -> list[Edge]:
+    def _by_likeness(self, name: str, parent: str, used_frames: set[str]) -> list[Edge]:
         """Return the edges from a parent, those to frames of the most similar names first."""
-        edges = [edge for edge in self._children.get(parent, ()) if edge.child not in taken]
+        edges = [edge for edge in self._children.get(parent, ()) if edge.child not in used_frames]
         return sorted(
             edges, key=lambda edge: -difflib.SequenceMatcher(None, name, edge.child).ratio()
         )
@@ -444,11 +448,13 @@ _KINDS = frozenset(get_args(SensorKind))
 _SHORTEST = 3
 
 
-def _naming(words: str, preset: str) -> str:
+def _naming(text: str, preset: str) -> str:
     """Return the words as one that names a preset, or nothing where they may be about anything."""
-    word = re.sub("[^a-z0-9]", "", words.lower())
+    compact = re.sub("[^a-z0-9]", "", text.lower())
     return (
-        "" if len(word) < _SHORTEST or word in _KINDS or preset.startswith(f"{GENERIC}/") else word
+        ""
+        if len(compact) < _SHORTEST or compact in _KINDS or preset.startswith(f"{GENERIC}/")
+        else compact
     )
 
 
@@ -467,26 +473,26 @@ def _vendor(preset: str) -> str:
 
 def _choices(preset: PresetSpec) -> Iterator[dict[str, str]]:
     """Yield the values that the preset's choices can have."""
-    several = {
+    choices = {
         key: list(option.variants)
         for key, option in preset.options.items()
         if option.type == "choice"
     }
-    for values in itertools.islice(itertools.product(*several.values()), _MOST_CHOICES):
-        yield dict(zip(several, values, strict=True))
+    for values in itertools.islice(itertools.product(*choices.values()), _MOST_CHOICES):
+        yield dict(zip(choices, values, strict=True))
 
 
 def _options(preset: PresetSpec) -> Iterator[dict[str, Any]]:
     """Yield the values of other options that change the frames."""
     used = {option for frame in preset.frames.values() for option in frame.when}
-    several: dict[str, list[Any]] = {}
+    options: dict[str, list[Any]] = {}
     for key, option in preset.options.items():
         if option.type == "bool":
-            several[key] = [False, True] if key in used else [option.default]
+            options[key] = [False, True] if key in used else [option.default]
         elif option.type == "set":
-            several[key] = [*_subsets(option.values)] if key in used else [option.default]
-    for values in itertools.islice(itertools.product(*several.values()), 4 * _MOST_CHOICES):
-        yield dict(zip(several, values, strict=True))
+            options[key] = [*_subsets(option.values)] if key in used else [option.default]
+    for values in itertools.islice(itertools.product(*options.values()), 4 * _MOST_CHOICES):
+        yield dict(zip(options, values, strict=True))
 
 
 def _subsets(values: tuple[str, ...]) -> Iterator[list[str]]:

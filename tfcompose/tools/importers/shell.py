@@ -170,32 +170,32 @@ class _ShellReader:
         piped = False
         while self.at < len(self.text):
             begin, line = self.at, self.line
-            words, unknown, ended = self._words()
+            argv, unknown, ended = self._words()
             body = " ".join(self.text[begin : self.at].rstrip(";&|\n ").split())
             is_piped = piped or ended == "|"
             piped = ended == "|"
-            if words:
+            if argv:
                 line += self.text[begin : self.at].count(
                     "\n", 0, _first_word(self.text[begin : self.at])
                 )
                 yield ShellCommand(
-                    tuple(words), body.replace("\\ ", ""), line, tuple(unknown), is_piped
+                    tuple(argv), body.replace("\\ ", ""), line, tuple(unknown), is_piped
                 )
 
     def _words(self) -> tuple[list[str], list[str], str]:
         """Return the words until a command ends, what is unknown of them, and what ended it."""
-        words: list[str] = []
+        argv: list[str] = []
         unknown: list[str] = []
-        word: str | None = None
+        token: str | None = None
         while self.at < len(self.text):
             char = self.text[self.at]
             if char == "\\" and self.text[self.at + 1 : self.at + 2] == "\n":
                 self._step(2)
             elif char in " \t":
-                words += [word] if word is not None else []
-                word = None
+                argv += [token] if token is not None else []
+                token = None
                 self._step()
-            elif char == "#" and word is None:
+            elif char == "#" and token is None:
                 end = self.text.find("\n", self.at)
                 self._step((end if end >= 0 else len(self.text)) - self.at)
             elif char in "\n;&|" and not self._is_redirection():
@@ -203,16 +203,16 @@ class _ShellReader:
                 double = self.at < len(self.text) and self.text[self.at] == char and char in "&|;"
                 self._step(1 if double else 0)
                 return (
-                    [*words, *([word] if word is not None else [])],
+                    [*argv, *([token] if token is not None else [])],
                     unknown,
                     "||" if double else char,
                 )
-            elif char in "()" and word is None:
+            elif char in "()" and token is None:
                 self._step()
-                words.append(char)
+                argv.append(char)
             else:
-                word = (word or "") + self._piece(unknown)
-        return [*words, *([word] if word is not None else [])], unknown, ""
+                token = (token or "") + self._piece(unknown)
+        return [*argv, *([token] if token is not None else [])], unknown, ""
 
     def _is_redirection(self) -> bool:
         """Return whether a & belongs to ``2>&1`` or ``&>``."""
@@ -325,57 +325,59 @@ class _Script:
         )
 
     def _command(self, command: ShellCommand, variables: dict[str, str]) -> None:
-        words = _without_prompt(list(command.words))
-        while words and words[0] in _LEADING:
-            words.pop(0)
-        if words[:1] == ["export"]:
-            self._export(command, words[1:], variables)
+        argv = _without_prompt(list(command.words))
+        while argv and argv[0] in _LEADING:
+            argv.pop(0)
+        if argv[:1] == ["export"]:
+            self._export(command, argv[1:], variables)
             return
-        given, words = _assignments(words)
-        if words[:1] == ["env"]:
-            more, words = _assignments(words[1:])
-            given |= more
-        if not words:
-            self._assign(given, command, variables)
-        elif words[0] in _CONTROL:
-            if words[0] not in _ENDS:
+        variables_set, argv = _assignments(argv)
+        if argv[:1] == ["env"]:
+            more, argv = _assignments(argv[1:])
+            variables_set |= more
+        if not argv:
+            self._assign(variables_set, command, variables)
+        elif argv[0] in _CONTROL:
+            if argv[0] not in _ENDS:
                 self._todo(command, "only a shell can do that")
-        elif words[0] in _ONCE:
-            self._todo(command, f"{words[0]} runs once, and starts nothing")
-        elif words[0] not in _OF_SHELL:
-            self._start(command, words, given)
+        elif argv[0] in _ONCE:
+            self._todo(command, f"{argv[0]} runs once, and starts nothing")
+        elif argv[0] not in _OF_SHELL:
+            self._start(command, argv, variables_set)
 
-    def _start(self, command: ShellCommand, words: list[str], given: dict[str, str]) -> None:
-        if tuple(words) in _STAYS_OPEN:
+    def _start(
+        self, command: ShellCommand, argv: list[str], variables_set: dict[str, str]
+    ) -> None:
+        if tuple(argv) in _STAYS_OPEN:
             return
         if command.unknown:
             self._todo(command, f"only a shell knows {', '.join(dict.fromkeys(command.unknown))}")
         elif command.piped:
             self._todo(command, "a pipe")
-        elif program := _without_redirections(words):
-            self._add(command, program, given)
+        elif program := _without_redirections(argv):
+            self._add(command, program, variables_set)
         else:
             self._todo(command, "it opens files, and starts nothing")
 
-    def _add(self, command: ShellCommand, words: list[str], given: dict[str, str]) -> None:
+    def _add(self, command: ShellCommand, argv: list[str], variables_set: dict[str, str]) -> None:
         """Add a command, or what it starts in a shell, in a terminal or behind a prefix."""
-        if words[0] in _TERMINALS | _SHELLS and "-c" in words[:-1]:
-            text = words[words.index("-c") + 1]
+        if argv[0] in _TERMINALS | _SHELLS and "-c" in argv[:-1]:
+            text = argv[argv.index("-c") + 1]
             if _OF_ROS.search(text):
                 for inner in _ShellReader(text).commands():
                     self._command(replace(inner, line=command.line), {})
                 return
-        begin = _program_at(words)
-        before, rest = words[:begin], words[begin:]
+        begin = _program_at(argv)
+        before, rest = argv[:begin], argv[begin:]
         while before and before[0] in BEFORE:
             before.pop(0)
         if before and before[0] in _TERMINALS:
             before = []
         starts_publisher = (
-            not begin and words[0] not in {"ros2", "rosrun"} and PROGRAM in " ".join(words[1:])
+            not begin and argv[0] not in {"ros2", "rosrun"} and PROGRAM in " ".join(argv[1:])
         )
         if starts_publisher or (before and before[0] not in _PREFIXES):
-            self._todo(command, f"what {words[0]} starts is not known here")
+            self._todo(command, f"what {argv[0]} starts is not known here")
             return
         keys = {"prefix": before} if before else {}
         env = {
@@ -384,74 +386,74 @@ class _Script:
             if not is_setting(self.draft, name, value)
         }
         program = Program(
-            Span(self.file, command.line), argv=tuple(rest), env=env | given, keys=keys
+            Span(self.file, command.line), argv=tuple(rest), env=env | variables_set, keys=keys
         )
         add_program(self.draft, program, self.target)
 
     def _assign(
-        self, given: dict[str, str], command: ShellCommand, variables: dict[str, str]
+        self, variables_set: dict[str, str], command: ShellCommand, variables: dict[str, str]
     ) -> None:
-        for name, value in given.items():
+        for name, value in variables_set.items():
             if command.unknown:
                 variables.pop(name, None)
             else:
                 variables[name] = value
 
-    def _export(self, command: ShellCommand, words: list[str], variables: dict[str, str]) -> None:
-        for word in words:
-            found = _ASSIGNMENT.fullmatch(word)
+    def _export(self, command: ShellCommand, argv: list[str], variables: dict[str, str]) -> None:
+        for argument in argv:
+            found = _ASSIGNMENT.fullmatch(argument)
             if found and not command.unknown:
                 variables[found[1]] = self.environment[found[1]] = found[2]
             elif found:
                 self._todo(command, "only a shell knows the value")
-            elif _NAME.fullmatch(word) and word in variables:
-                self.environment[word] = variables[word]
+            elif _NAME.fullmatch(argument) and argument in variables:
+                self.environment[argument] = variables[argument]
 
 
-def _without_prompt(words: list[str]) -> list[str]:
+def _without_prompt(argv: list[str]) -> list[str]:
     """Return the command without what a terminal or ``history`` prints before it."""
-    if len(words) > 1 and _NUMBER.fullmatch(words[0]):
-        words = words[1:]
-        while len(words) > 1 and _TIME.fullmatch(words[0]):
-            words = words[1:]
-    while words and _PROMPT.fullmatch(words[0]):
-        words = words[1:]
-    return words
+    if len(argv) > 1 and _NUMBER.fullmatch(argv[0]):
+        argv = argv[1:]
+        while len(argv) > 1 and _TIME.fullmatch(argv[0]):
+            argv = argv[1:]
+    while argv and _PROMPT.fullmatch(argv[0]):
+        argv = argv[1:]
+    return argv
 
 
-def _program_at(words: list[str]) -> int:
+def _program_at(argv: list[str]) -> int:
     """Return where in a command its ROS program begins, 0 for other commands."""
-    for index, word in enumerate(words):
-        if word in {"rosrun", "roslaunch"} or (
-            word == "ros2" and words[index + 1 : index + 2] in (["run"], ["launch"])
+    for index, argument in enumerate(argv):
+        if argument in {"rosrun", "roslaunch"} or (
+            argument == "ros2" and argv[index + 1 : index + 2] in (["run"], ["launch"])
         ):
             return index
-        if posixpath.basename(word) == PROGRAM:
-            return index if "/" in word or index == 0 else 0
+        if posixpath.basename(argument) == PROGRAM:
+            return index if "/" in argument or index == 0 else 0
     return 0
 
 
-def _assignments(words: list[str]) -> tuple[dict[str, str], list[str]]:
+def _assignments(argv: list[str]) -> tuple[dict[str, str], list[str]]:
     """Return the variables that are set in front of a command, and the command."""
-    given: dict[str, str] = {}
-    for index, word in enumerate(words):
-        found = _ASSIGNMENT.fullmatch(word)
+    variables_set: dict[str, str] = {}
+    for index, argument in enumerate(argv):
+        found = _ASSIGNMENT.fullmatch(argument)
         if found is None:
-            return given, words[index:]
-        given[found[1]] = found[2]
-    return given, []
+            return variables_set, argv[index:]
+        variables_set[found[1]] = found[2]
+    return variables_set, []
 
 
-def _without_redirections(words: list[str]) -> list[str]:
+def _without_redirections(argv: list[str]) -> list[str]:
     """Return the words without ``> file``, ``2>&1`` and ``< file``."""
     kept = []
-    rest = iter(words)
-    for word in rest:
-        if re.fullmatch(r"[0-9&]*(>>?|<)&?[^\s]*", word):
-            if re.fullmatch(r"[0-9&]*(>>?|<)&?", word):
+    rest = iter(argv)
+    for argument in rest:
+        if re.fullmatch(r"[0-9&]*(>>?|<)&?[^\s]*", argument):
+            if re.fullmatch(r"[0-9&]*(>>?|<)&?", argument):
                 next(rest, None)
         else:
-            kept.append(word)
+            kept.append(argument)
     return kept
 
 

@@ -68,71 +68,71 @@ class StaticTransform:
         return pose_keys(self.pose, self.rpy, quaternion=self.rpy is None)
 
 
-def static_transform(words: Sequence[str], reader: Reader = "ros2") -> StaticTransform:
+def static_transform(argv: Sequence[str], reader: Reader = "ros2") -> StaticTransform:
     """Return what the program's own arguments say, without those behind ``--ros-args``.
 
     Raises:
         RefusedError: if it would refuse them.
     """
-    own = _without_ros_arguments(words)
+    own = _without_ros_arguments(argv)
     if reader != "ros2":
         return _in_order(own, reader)
-    given: dict[str, str] = {}
+    options: dict[str, str] = {}
     loose: list[str] = []
     rest = iter(own)
-    for word in rest:
-        if word in _FLAGS:
+    for argument in rest:
+        if argument in _FLAGS:
             value = next(rest, None)
             if value is None:
-                raise ArgumentsRefusedError(f"{word} has no value")
-            given[word] = value
+                raise ArgumentsRefusedError(f"{argument} has no value")
+            options[argument] = value
         else:
-            loose.append(word)
+            loose.append(argument)
     if not loose:
-        return _by_name(given)
-    if given:
+        return _by_name(options)
+    if options:
         raise ArgumentsRefusedError(
-            f"{loose[0]} stands beside {next(iter(given))}: arguments are by name or in order"
+            f"{loose[0]} stands beside {next(iter(options))}: arguments are by name or in order"
         )
     return _in_order(loose, reader)
 
 
 def static_words(params: Sequence[Any]) -> list[str]:
     """Return the arguments that say what the component is told by parameters."""
-    given: dict[str, Any] = {}
-    for one in params:
-        given |= one if isinstance(one, dict) else {}
+    options: dict[str, Any] = {}
+    for param_set in params:
+        options |= param_set if isinstance(param_set, dict) else {}
     return [
-        word
+        argument
         for name, flag in _PARAMETERS.items()
-        if name in given
-        for word in (flag, str(given[name]))
+        if name in options
+        for argument in (flag, str(options[name]))
     ]
 
 
-def _without_ros_arguments(words: Sequence[str]) -> list[str]:
+def _without_ros_arguments(argv: Sequence[str]) -> list[str]:
     """Return the words outside ``--ros-args … --``.
 
     Those of ROS 1, as in ``__name:=a``, are left out too.
     """
     own, inside = [], False
-    for word in words:
-        if word == "--ros-args":
+    for argument in argv:
+        if argument == "--ros-args":
             inside = True
-        elif word == "--" and inside:
+        elif argument == "--" and inside:
             inside = False
-        elif not inside and ":=" not in word:
-            own.append(word)
+        elif not inside and ":=" not in argument:
+            own.append(argument)
     return own
 
 
-def _by_name(given: dict[str, str]) -> StaticTransform:
-    numbers = {key: _number(value, key) for key, value in given.items() if key not in _FRAMES}
+def _by_name(options: dict[str, str]) -> StaticTransform:
+    numbers = {key: _number(value, key) for key, value in options.items() if key not in _FRAMES}
     x, y, z = (numbers.get(key, 0.0) for key in _POSITION)
     has_angles = any(key in numbers for key in _ANGLES)
     if has_angles and any(key in numbers for key in _QUATERNION):
         raise ArgumentsRefusedError("angles and a quaternion at once")
-    parent, child = (given.get(key, "") for key in _FRAMES)
+    parent, child = (options.get(key, "") for key in _FRAMES)
     if any(key in numbers for key in _QUATERNION):
         usual = (0.0, 0.0, 0.0, 1.0)
         qx, qy, qz, qw = (
@@ -143,8 +143,8 @@ def _by_name(given: dict[str, str]) -> StaticTransform:
     return _of(parent, child, (x, y, z), (roll, pitch, yaw), "")
 
 
-def _in_order(words: list[str], reader: Reader) -> StaticTransform:
-    kept, period = list(words), ""
+def _in_order(argv: list[str], reader: Reader) -> StaticTransform:
+    kept, period = list(argv), ""
     if reader == "tf":
         if len(kept) not in {_WITH_ANGLES + 1, _WITH_QUATERNION + 1}:
             raise ArgumentsRefusedError(
@@ -165,7 +165,9 @@ def _in_order(words: list[str], reader: Reader) -> StaticTransform:
     if len(kept) not in {_WITH_ANGLES, _WITH_QUATERNION}:
         raise ArgumentsRefusedError(f"{len(kept)} arguments; it takes 8, or 9 with a quaternion")
     parent, child = kept[-2:]
-    numbers = [_number(word, f"argument {place}") for place, word in enumerate(kept[:-2], start=1)]
+    numbers = [
+        _number(argument, f"argument {place}") for place, argument in enumerate(kept[:-2], start=1)
+    ]
     x, y, z, *rest = numbers
     tail = " frame child period" if period else " frame child"
     if len(kept) == _WITH_ANGLES:
@@ -205,22 +207,22 @@ def _of(
     return StaticTransform(parent, child, Pose(xyz, (qx, qy, qz, qw)), None, order)
 
 
-def _number(word: str, what: str) -> float:
+def _number(text: str, what: str) -> float:
     try:
-        value = float(word)
+        value = float(text)
     except ValueError:
-        raise ArgumentsRefusedError(f"{what} is {word!r}, not a number") from None
+        raise ArgumentsRefusedError(f"{what} is {text!r}, not a number") from None
     if not math.isfinite(value) or abs(value) > _LARGEST_RAD:
-        raise ArgumentsRefusedError(f"{what} is {word}")
+        raise ArgumentsRefusedError(f"{what} is {text}")
     return value
 
 
-def reader_of(words: Sequence[str]) -> Reader:
+def reader_of(argv: Sequence[str]) -> Reader:
     """Return who reads the arguments of a program whose package is not given.
 
     Tf's have a period behind two frames.
     """
-    own = _without_ros_arguments(words)
+    own = _without_ros_arguments(argv)
     return (
         "tf"
         if len(own) > _WITH_ANGLES and _is_number(own[-1]) and not _is_number(own[-3])
@@ -228,9 +230,9 @@ def reader_of(words: Sequence[str]) -> Reader:
     )
 
 
-def _is_number(word: str) -> bool:
+def _is_number(text: str) -> bool:
     try:
-        float(word)
+        float(text)
     except ValueError:
         return False
     return True

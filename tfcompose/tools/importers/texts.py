@@ -111,7 +111,7 @@ def words_of(text: str) -> list[str]:
 
     An argument is within a word, whatever its value.
     """
-    words: list[list[Part]] = []
+    fields: list[list[Part]] = []
     quote, is_open, is_escaped = "", False, False
     for item in _characters(text):
         is_quote = not is_escaped and item in {quote or "'", quote or '"'}
@@ -120,14 +120,14 @@ def words_of(text: str) -> list[str]:
             is_open = False
             continue
         if not is_open:
-            words.append([])
+            fields.append([])
             is_open = True
         if is_quote:
             quote = "" if quote else str(item)
         elif not is_escape:
-            words[-1].append(item)
+            fields[-1].append(item)
         is_escaped = is_escape
-    return [Text.of(word) for word in words]
+    return [Text.of(parts) for parts in fields]
 
 
 def _characters(text: str) -> Iterator[Part]:

@@ -106,9 +106,9 @@ def _add_links(draft: ImportDraft, described: Description, workshop: Workshop) -
     except RejectedError as error:
         draft.todo(f"the description: {error.findings[0].message}", described.at)
         return
-    for one in document.findings():
-        if one.severity == "error":
-            draft.todo(f"the description has {one.code}: {one.message}", described.at)
+    for finding in document.findings():
+        if finding.severity == "error":
+            draft.todo(f"the description has {finding.code}: {finding.message}", described.at)
     robot = imported(document, workshop.target, draft.robot, packages.local, workshop.library)
     if described.prefix:
         draft.sections["ros"]["frame_prefix"] = described.prefix

@@ -153,7 +153,7 @@ def _clashing(robot: Robot) -> frozenset[str]:
     known: dict[str, set[Any]] = {}
     for material in materials(robot.links):
         known.setdefault(material.name, set()).add((material.rgba, material.texture))
-    return frozenset(name for name, several in known.items() if len(several) > 1)
+    return frozenset(name for name, kinds in known.items() if len(kinds) > 1)
 
 
 def _axis(joint: Joint) -> list[float]:

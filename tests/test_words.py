@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from tests.support.house import PACKAGE, ROOT, nodes_of
+from tests.support.house import PACKAGE, ROOT, nodes_of, tree_of
 
 #: One worker parses all files, once.
 pytestmark = pytest.mark.xdist_group("sources")
@@ -226,6 +226,44 @@ def names_in(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, int]]:
                 yield other or name, node.lineno
             case _:
                 pass
+
+
+#: Names of variables that say nothing of what they hold. ``given`` is left: what somebody gives the
+#: arguments of a robot file is ``Given``.
+EMPTY_NAMES = {"one", "ones", "several", "word", "meant"}
+
+
+def variables_in(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, int]]:
+    """Yield the variables and parameters that a module binds, with their lines."""
+    for node in nodes:
+        match node:
+            case ast.Name(id=name, ctx=ast.Store()) | ast.arg(arg=name):
+                yield name, node.lineno
+            case ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)):
+                yield name, node.lineno
+            case _:
+                pass
+
+
+def test_a_variable_is_named_by_what_it_holds() -> None:
+    assert not [
+        f"{file.relative_to(ROOT)}:{line}: {name}"
+        for file in sorted(PACKAGE.rglob("*.py"))
+        for name, line in variables_in(nodes_of(file))
+        if name.strip("_") in EMPTY_NAMES
+    ]
+
+
+#: What a module's docstring does not begin with: it names what the module holds, or what it does.
+NO_BEGINNINGS = ("What", "Where", "Whether", "How", "Which", "Who", "Whose", "When")
+
+
+def test_a_module_says_what_it_is_by_a_noun_or_a_verb() -> None:
+    beginnings = {
+        file.relative_to(ROOT).as_posix(): (ast.get_docstring(tree_of(file)) or " ").split(" ")[0]
+        for file in sorted(PACKAGE.rglob("*.py"))
+    }
+    assert {path: word for path, word in beginnings.items() if word in NO_BEGINNINGS} == {}
 
 
 def faults(folder: str) -> Iterator[str]:

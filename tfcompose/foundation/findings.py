@@ -225,7 +225,7 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str = "") -> str:
     names = list(dict.fromkeys(known))
     near = slips_of(name, names)
     if not 1 < len(near) <= _MOST_NEAR:
-        near = [one for one in (nearest(name, names),) if one]
+        near = [match for match in (nearest(name, names),) if match]
     if not near:
         return otherwise
     *others, last = near

@@ -202,7 +202,7 @@ class TopicWatch:
         if strangers:  # who sends once and goes is in the graph for a moment only
             self._ask_graph(now)
             self._graph_due = 0.0  # whom the graph did not know yet it may know soon
-        self._judge([message for one in messages for message in self._take_one(one, now)], now)
+        self._judge([sent for message in messages for sent in self._take_one(message, now)], now)
         return bool(strangers)
 
     def _judge(self, read: Iterable[tuple[JudgedMessage, Message]], now: float) -> None:

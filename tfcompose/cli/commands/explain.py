@@ -49,8 +49,8 @@ def run(arguments: Namespace) -> int:
             from tfcompose.cli.documentation import code_table
 
             sys.stdout.write(code_table(None if arguments.table == "all" else arguments.table))
-        case [word]:
-            _explain_code(word)
+        case [code]:
+            _explain_code(code)
         case [a, b] if not a.endswith((".yaml", ".yml")):
             _explain_frames(DEFAULT_FILE, a, b, arguments)
         case [file, a, b]:

@@ -175,7 +175,7 @@ def wheels_not_mirrored(robot: Robot) -> Iterator[Finding]:
             if edge.parent != twin.parent or axis != 1 or max(off) <= _MIRRORED_M:
                 continue
             others = [wheel for wheel in wheels.values() if wheel not in (edge, twin)]
-            if any(are_mirrored(one, other) for one in (edge, twin) for other in others):
+            if any(are_mirrored(side, other) for side in (edge, twin) for other in others):
                 continue  # TF622
             odd, pattern = edge, twin
             if _is_alike(edge, others) and not _is_alike(twin, others):

@@ -147,7 +147,9 @@ def file_params(process: Process) -> dict[str, dict[str, Any]]:
     names = [node.name for node in process.ros_nodes]
     nodes = process.other_params | {node.name: node.params for node in process.ros_nodes}
     later = dict(_launch_time_params(process.params))
-    for section in [one for one in nodes if any(matches(one, name) for name in names)]:
+    for section in [
+        declared for declared in nodes if any(matches(declared, name) for name in names)
+    ]:
         nodes[section] = _without(nodes[section], later)
     known = {node: _known_params(params) for node, params in nodes.items()}
     return {node: params for node, params in known.items() if params}

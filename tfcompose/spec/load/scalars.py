@@ -31,7 +31,7 @@ IMPLICIT = (
 )
 
 #: How YAML writes what is no finite number, in lower case.
-NOT_FINITE = {word: float(word.replace(".", "")) for word in (".inf", "+.inf", "-.inf", ".nan")}
+NOT_FINITE = {text: float(text.replace(".", "")) for text in (".inf", "+.inf", "-.inf", ".nan")}
 _PATTERNS = {tag: pattern for tag, pattern, _ in IMPLICIT}
 _FIRST = "nN~tTfF-+.0123456789"
 

@@ -176,8 +176,10 @@ def _with_named(named: Mapping[str, str]) -> list[str]:
         if path.as_posix() in found:
             continue
         if is_folder(path):
-            inside = (one for one in sorted(path.rglob("*")) if is_file(one))
-            waiting += [one.as_posix() for one in inside if not _is_hidden(one.relative_to(path))]
+            inside = (inner for inner in sorted(path.rglob("*")) if is_file(inner))
+            waiting += [
+                inner.as_posix() for inner in inside if not _is_hidden(inner.relative_to(path))
+            ]
         elif is_file(path):
             found[path.as_posix()] = None
             size += path.stat().st_size

@@ -318,8 +318,13 @@ class Rollout:
         found = await self._ask(share, "rehearse", release=share.wanted.name, host=share.name)
         place = share.host.at
         return [
-            finding(one["code"], f"{share.name}: {one['message']}", place, help=one["help"])
-            for one in found
+            finding(
+                finding_there["code"],
+                f"{share.name}: {finding_there['message']}",
+                place,
+                help=finding_there["help"],
+            )
+            for finding_there in found
         ]
 
     async def activate(self) -> str:

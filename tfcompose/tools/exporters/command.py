@@ -158,7 +158,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
         reject(error.findings, UNREADABLE)
     except OSError as error:
         fail(f"nothing was written to {folder}: {error.strerror}", UNREADABLE)
-    print(f"wrote {folder}: {', '.join(written.path for written in files)}")
+    print(f"wrote {folder}: {', '.join(file.path for file in files)}")
     if plan.host is None:
         differences += [
             f"{process.name} runs on {process.host}, and is here too: --host"

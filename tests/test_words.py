@@ -228,8 +228,8 @@ def names_in(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, int]]:
                 pass
 
 
-#: Names of variables that say nothing of what they hold. ``given`` is left: what somebody gives the
-#: arguments of a robot file is ``Given``.
+#: Names of variables that say nothing of what they hold. ``given`` is left: what somebody gives
+#: the arguments of a robot file is ``Given``.
 EMPTY_NAMES = {"one", "ones", "several", "word", "meant"}
 
 

@@ -187,8 +187,8 @@ def test_only_what_is_different_starts_again(computers: Computers) -> None:
     assert done.returncode == 0, done
     assert {
         "rear: restarted: rear_drive",
-        "brain: nothing starts again",
-        "arm: nothing starts again",
+        "brain: the plan is another one, and nothing had to be restarted",
+        "arm: the plan is another one, and nothing had to be restarted",
     } <= set(done.stdout.splitlines()), done
     after = {name: children(computers, name) for name in NAMES}
     assert [

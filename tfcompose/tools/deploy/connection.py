@@ -151,7 +151,7 @@ class ConnectedHost:
 
     async def execute(self, argv: list[str]) -> asyncssh.SSHClientProcess[bytes]:
         """Let the agent become tfcompose with these words, and return its process."""
-        self._process.stdin.write(f'["execute", {json.dumps({"words": argv})}]\n'.encode())
+        self._process.stdin.write(f'["execute", {json.dumps({"argv": argv})}]\n'.encode())
         return self._process
 
     async def close(self) -> None:

@@ -62,11 +62,11 @@ def omitted(document: Document) -> Notes:
                 "the source gives no lower and upper limit, and parsers take 0"
             )
     for (
-        element
-    ) in document.converted.of_elements:  # of blocks and files nothing is left out for it
-        if element.span:
-            notes.setdefault(_entry_at(element.span, entries), []).append(
-                f"{element.code} in the source: {element.message}"
+        finding
+    ) in document.converted.of_elements:  # what is about blocks and files leaves none out
+        if finding.span:
+            notes.setdefault(_entry_at(finding.span, entries), []).append(
+                f"{finding.code} in the source: {finding.message}"
             )
     of_robot = list(_in_robot(document.root, document.robot))
     if of_robot:

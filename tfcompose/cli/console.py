@@ -31,9 +31,9 @@ from tfcompose.model.messages import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-    from tfcompose.model.messages import Notice
+    from tfcompose.model.messages import Notice, PlanChange
     from tfcompose.model.plan import Plan
 
 #: Colours that differ on dark and light terminals; a process keeps its own by its place in the
@@ -214,13 +214,8 @@ class Console:
     @_write.register
     def _(self, notice: Replanned) -> None:
         self._width = max(self._width, *map(len, ("", *notice.added)))
-        parts = (
-            ("changed", notice.changed),
-            ("new", notice.added),
-            ("gone", notice.removed),
-            ("new description", notice.described),
-        )
-        changes = "; ".join(f"{label}: {', '.join(names)}" for label, names in parts if names)
+        labels = ("changed", "new", "gone", "new description")
+        changes = describe_changes(notice, labels)
         self._say(f"another plan: {changes or 'nothing to restart'}")
         if notice.held:
             self._say(self._paint(describe_vanished(notice.held), YELLOW))
@@ -304,6 +299,16 @@ class Console:
 
     def _paint(self, text: str, *codes: str) -> str:
         return f"{''.join(codes)}{text}{PLAIN}" if self._colour else text
+
+
+def describe_changes(change: PlanChange | Replanned, labels: Sequence[str]) -> str:
+    """Return the processes that another plan changes, adds, removes and describes anew.
+
+    Each group has its label, in this order; empty if nothing has to be restarted.
+    """
+    groups = (change.changed, change.added, change.removed, change.described)
+    labelled = zip(labels, groups, strict=True)
+    return "; ".join(f"{label}: {', '.join(names)}" for label, names in labelled if names)
 
 
 def describe_vanished(edges: tuple[str, ...]) -> str:

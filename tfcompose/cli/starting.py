@@ -18,7 +18,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.console import Console, Nowhere, StandardOutput, StatusLine, describe_vanished
+from tfcompose.cli.console import (
+    Console,
+    Nowhere,
+    StandardOutput,
+    StatusLine,
+    describe_changes,
+    describe_vanished,
+)
 from tfcompose.cli.live_run import can_show_live, follow
 from tfcompose.cli.plans import copy_plan, is_plan, plan_to_start, read_built_plan
 from tfcompose.cli.reading import read_text
@@ -172,13 +179,8 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     answer = request(place, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
         fail(who)
-    parts = (
-        ("restarted", answer.changed),
-        ("started", answer.added),
-        ("stopped", answer.removed),
-        ("given the new description", answer.described),
-    )
-    changes = "; ".join(f"{label}: {', '.join(names)}" for label, names in parts if names)
+    labels = ("restarted", "started", "stopped", "given the new description")
+    changes = describe_changes(answer, labels)
     if answer.differs:
         print(f"{who}; {changes or 'the plan is another one, and nothing had to be restarted'}")
     elif changes:

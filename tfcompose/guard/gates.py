@@ -138,17 +138,17 @@ class LifecycleDriver:
     def check(self) -> None:
         """Drive each node that is due one step further, and print what has changed."""
         now = time.monotonic()
-        for node in self._nodes:
-            if now < node.due:
+        for watched in self._nodes:
+            if now < watched.due:
                 continue
-            is_there, observed = node.node.check(now)
-            node.due = now + CHECK_EVERY_S
-            if node.node.answers and observed != node.reported:
-                node.reported = observed
+            is_there, observed = watched.node.check(now)
+            watched.due = now + CHECK_EVERY_S
+            if watched.node.answers and observed != watched.reported:
+                watched.reported = observed
                 say(observed)
             if is_there:
-                node.due = now + ASK_AGAIN_S
-                node.node.ask_again()
+                watched.due = now + ASK_AGAIN_S
+                watched.node.ask_again()
 
 
 def _some(what: str, names: list[str], wanted: str) -> str:
@@ -200,7 +200,7 @@ class Switches:
 
     def follow(self, plan: Plan) -> None:
         """Read the switches of a plan from now on; nodes whose switches are the same go on."""
-        before = {node.node: node for node in self._nodes}
+        before = {watched.node: watched for watched in self._nodes}
         self._nodes = []
         for process in plan.processes:
             for name, wanted in process.switches.items():
@@ -216,7 +216,7 @@ class Switches:
     @property
     def answered(self) -> list[str]:
         """The nodes that have answered and have not left since."""
-        return [node.node for node in self._nodes if node.done]
+        return [watched.node for watched in self._nodes if watched.done]
 
     def recall(self, answered: Collection[str]) -> None:
         """Ask these no more, unless they leave: the guard before this one has.
@@ -224,8 +224,8 @@ class Switches:
         Those that are not found yet, too.
         """
         self._finds_until = time.monotonic() + FINDING_S
-        for node in self._nodes:
-            node.done = node.node in answered
+        for watched in self._nodes:
+            watched.done = watched.node in answered
 
     def check(self) -> None:
         """Take the answers that have come and send the requests that are due, without blocking."""
@@ -233,26 +233,26 @@ class Switches:
         if not self._nodes or now < self._due:
             return
         self._due = now + _CHECK_SWITCHES_EVERY_S
-        for node in self._nodes:
-            self._at(node, now)
+        for watched in self._nodes:
+            self._at(watched, now)
 
-    def _at(self, node: _NodeSwitches, now: float) -> None:
-        if not node.reader.is_there:
-            node.since, node.done = None, node.done and now < self._finds_until
+    def _at(self, watched: _NodeSwitches, now: float) -> None:
+        if not watched.reader.is_there:
+            watched.since, watched.done = None, watched.done and now < self._finds_until
             return
-        if node.done:
+        if watched.done:
             return
-        if node.since is None:
-            node.since = node.due = now
-        found = node.reader.take()
+        if watched.since is None:
+            watched.since = watched.due = now
+        found = watched.reader.take()
         if found is None:
-            if now >= node.due:
-                node.reader.ask(now)
-        elif None in found.values() and now - node.since < DECLARED_WITHIN_S:
-            node.due = now + AGAIN_EVERY_S
+            if now >= watched.due:
+                watched.reader.ask(now)
+        elif None in found.values() and now - watched.since < DECLARED_WITHIN_S:
+            watched.due = now + AGAIN_EVERY_S
         else:
-            node.done = True
-            for wrong in not_taken(node.node, node.wanted, found, node.drives):
+            watched.done = True
+            for wrong in not_taken(watched.node, watched.wanted, found, watched.drives):
                 self._emit(FindingShown(wrong))
 
 

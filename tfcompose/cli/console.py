@@ -214,17 +214,19 @@ class Console:
     @_write.register
     def _(self, notice: Replanned) -> None:
         self._width = max(self._width, *map(len, ("", *notice.added)))
-        labels = ("changed", "new", "gone", "new description")
-        changes = describe_changes(notice, labels)
+        changes = describe_changes(notice, ("changed", "new", "gone", "new description"))
         self._say(f"another plan: {changes or 'nothing to restart'}")
         if notice.held:
             self._say(self._paint(describe_vanished(notice.held), YELLOW))
 
     @_write.register
     def _(self, notice: TreeComplete) -> None:
-        edges = plural(notice.edges, "edge")
         self._say(
-            self._paint(f"tree complete: {edges} live after {notice.seconds:.2f} s", GREEN, BOLD)
+            self._paint(
+                f"tree complete: {plural(notice.edges, 'edge')} live after {notice.seconds:.2f} s",
+                GREEN,
+                BOLD,
+            )
         )
 
     @_write.register
@@ -306,9 +308,13 @@ def describe_changes(change: PlanChange | Replanned, labels: Sequence[str]) -> s
 
     Each group has its label, in this order; empty if nothing has to be restarted.
     """
-    groups = (change.changed, change.added, change.removed, change.described)
-    labelled = zip(labels, groups, strict=True)
-    return "; ".join(f"{label}: {', '.join(names)}" for label, names in labelled if names)
+    return "; ".join(
+        f"{label}: {', '.join(names)}"
+        for label, names in zip(
+            labels, (change.changed, change.added, change.removed, change.described), strict=True
+        )
+        if names
+    )
 
 
 def describe_vanished(edges: tuple[str, ...]) -> str:

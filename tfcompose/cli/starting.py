@@ -179,8 +179,9 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     answer = request(place, UpdateRequest(str(copy), str(folder)), PlanChange)
     if answer is None:
         fail(who)
-    labels = ("restarted", "started", "stopped", "given the new description")
-    changes = describe_changes(answer, labels)
+    changes = describe_changes(
+        answer, ("restarted", "started", "stopped", "given the new description")
+    )
     if answer.differs:
         print(f"{who}; {changes or 'the plan is another one, and nothing had to be restarted'}")
     elif changes:

@@ -63,6 +63,12 @@ def test_what_no_preset_starts_is_one_finding(process: str, code: str) -> None:
     assert [one.code for one in compiled(f"  {process}").errors] == [code]
 
 
+@pytest.mark.parametrize("run", ["", "run: {args: [x]}, "])
+def test_a_mistyped_preset_is_named_where_nothing_says_what_to_start(run: str) -> None:
+    (wrong,) = compiled(f"  ekf: {{{run}node: robot_localization/ekff}}").errors
+    assert (wrong.code, "robot_localization/ekf?" in wrong.help) == ("TF102", True)
+
+
 def test_a_name_with_a_namespace_stays_a_name() -> None:
     done = compiled("  ekf: {node: left/filter, external: true}")
     assert done.robot

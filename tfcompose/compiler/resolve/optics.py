@@ -55,8 +55,9 @@ def optics_of(
         if pattern is None:
             advice = f"frame: {sensor.named(preset.mount)}; {sensor.spec.preset} has "
             advice += f"the streams {', '.join(preset.optics)}" if preset.optics else "no streams"
-            message = f"the stream {stream} has no frame"
-            yield finding("TF102", message, spec.at_key(at), help=advice)
+            yield finding(
+                "TF102", f"the stream {stream} has no frame", spec.at_key(at), help=advice
+            )
             continue
         frame = sensor.named(pattern)
         if own and own.frame and frame not in frames:

@@ -13,7 +13,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol
 
-from tfcompose.foundation.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.foundation.findings import (
+    Finding,
+    Note,
+    RejectedError,
+    Span,
+    did_you_mean,
+    finding,
+    nearest,
+)
 from tfcompose.spec.language import load_named, validate_file, validate_preset
 from tfcompose.spec.language.node_preset import NodePresetSpec
 from tfcompose.spec.language.overlay import extended_by, lay_over, without
@@ -417,8 +425,12 @@ def is_node_preset(name: str) -> bool:
 def unknown_node_preset(name: str, at: Span) -> Finding:
     """Return the finding for a name that no preset of a node has."""
     names = node_preset_names()
-    advice = did_you_mean(name.rpartition("/")[2], names, f"there is {', '.join(names)}")
-    return finding("TF601", f"unknown node preset {name}", at, help=advice)
+    return finding(
+        "TF601",
+        f"unknown node preset {name}",
+        at,
+        help=did_you_mean(name.rpartition("/")[2], names, f"there is {', '.join(names)}"),
+    )
 
 
 def preset_of(node: NamedNode | None) -> str | None:
@@ -431,6 +443,18 @@ def preset_of(node: NamedNode | None) -> str | None:
     if node.name is not None and "/" in node.name and is_node_preset(node.name):
         return node.name
     return None
+
+
+def start_advice(node: NamedNode | None, otherwise: str) -> str:
+    """Return advice for a process that does not say what to start.
+
+    If its node's name is nearly PACKAGE/NAME of a preset, that is probably meant.
+    """
+    package, _, short = (node.name or "" if node else "").rpartition("/")
+    near = nearest(
+        short, [name for name in node_preset_names() if node_preset(name).package == package]
+    )
+    return f"did you mean node: {package}/{near}? Otherwise {otherwise}" if near else otherwise
 
 
 def name_of(node: NamedNode | None) -> str | None:

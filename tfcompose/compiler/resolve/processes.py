@@ -16,6 +16,7 @@ from tfcompose.compiler.resolve.presets import (
     name_of,
     node_preset,
     preset_of,
+    start_advice,
     unknown_node_preset,
 )
 from tfcompose.foundation.findings import Note, did_you_mean, finding
@@ -94,19 +95,27 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> Find
     if _is_way_refused(name, validated):
         return None
     if declared.run:
-        advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
-        message = f"{name}: run needs package and executable"
-        yield finding("TF102", message, spec.at_key((*at, "run")), help=advice)
+        yield finding(
+            "TF102",
+            f"{name}: run needs package and executable",
+            spec.at_key((*at, "run")),
+            help=start_advice(
+                declared.node,
+                "run: {package: …, executable: …}, or {launch: package/file.launch.py}",
+            ),
+        )
         return None
     preset = preset_of(declared.node)
     if preset is not None and not is_node_preset(preset):
         yield unknown_node_preset(preset, spec.at((*at, "node", "preset")))
         return None
-    advice = (
-        "run: {package: …, executable: …}, component: PACKAGE/CLASS, simulate: {…}, or external:"
-        " true"
+    ways = "run: {package: …, executable: …}, component: PACKAGE/CLASS, simulate: {…}"
+    yield finding(
+        "TF102",
+        f"{name} does not say how it runs",
+        place,
+        help=start_advice(declared.node, f"{ways}, or external: true"),
     )
-    yield finding("TF102", f"{name} does not say how it runs", place, help=advice)
     return None
 
 

@@ -34,8 +34,12 @@ def limits_of(spec: RobotSpec) -> Finds[dict[str, float]]:
         known = CATALOGUE[code].limit
         if known is None:
             others = ", ".join(code.code for code in CATALOGUE.values() if code.limit)
-            message = f"{code} {CATALOGUE[code].name} has no limit"
-            yield finding("TF107", message, place, help=f"these have one: {others}")
+            yield finding(
+                "TF107",
+                f"{code} {CATALOGUE[code].name} has no limit",
+                place,
+                help=f"these have one: {others}",
+            )
             continue
         dimension, kind, sample = _KINDS[known[1]]
         if setting.limit.dimension not in {NUMBER, dimension}:

@@ -148,7 +148,7 @@ def test_its_calibrated_robot_is_linted_and_explained_as_printed(tmp_path: Path)
 
 
 def test_its_preset_of_ones_own_has_no_findings(tmp_path: Path) -> None:
-    (preset,) = blocks("yaml", PAGES["presets"])
+    _, preset = blocks("yaml", PAGES["presets"])
     file = tmp_path / "presets/waterlinked/dvl-a50.yaml"
     file.parent.mkdir(parents=True)
     file.write_text(preset, encoding="utf-8")

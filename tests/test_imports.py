@@ -42,6 +42,7 @@ ONLY_IN: dict[str, set[str]] = {
     "launch_xml": {"tools.importers"},
     "launch_yaml": {"tools.importers"},
     "asyncssh": {"tools.deploy"},
+    "ros2cli": {"tools.ros2"},
     "markdown_it": {"cli"},
     "pydantic": {"spec.language", "tools.fleet.spec"},
     "pydantic_core": {"spec.language", "foundation.units"},

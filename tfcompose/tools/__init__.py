@@ -1,4 +1,4 @@
-"""Tools around the product: importers, exporters, the browser view, deployment and fleets.
+"""Tools around the product: importers, exporters, the browser view, deployment, fleets and ROS.
 
 A tool is a folder with a ``tool.py``, whose ``TOOL`` says what it brings. It may use every other
 wing; no wing imports a tool, and no tool another: ``tfcompose.foundation.tool`` loads the table.
@@ -8,7 +8,8 @@ from tfcompose.tools.deploy.tool import TOOL as DEPLOY
 from tfcompose.tools.exporters.tool import TOOL as EXPORT
 from tfcompose.tools.fleet.tool import TOOL as FLEET
 from tfcompose.tools.importers.tool import TOOL as IMPORT
+from tfcompose.tools.ros2.tool import TOOL as ROS2
 from tfcompose.tools.view.tool import TOOL as VIEW
 
 #: The tools that ship, in the order of the help.
-TOOLS = (IMPORT, VIEW, DEPLOY, EXPORT, FLEET)
+TOOLS = (IMPORT, VIEW, DEPLOY, EXPORT, FLEET, ROS2)

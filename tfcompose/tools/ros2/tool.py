@@ -1,0 +1,9 @@
+"""ROS tool: the verb ``ros2 tfcompose``, colcon packages and launch files with robots."""
+
+from tfcompose.foundation.tool import Tool, Topic
+
+TOOL = Tool(
+    name="ros2",
+    package=__package__,
+    topics=(Topic("ros2", "colcon, `ros2 tfcompose`, and launch files"),),
+)

@@ -7,7 +7,14 @@ from collections.abc import Callable
 
 import pytest
 
-from tfcompose.guard.process import CHECK_EVERY_S, plans_by_topics, rest_s, together
+from tfcompose.guard.process import (
+    CHECK_EVERY_S,
+    GATHER_BELOW,
+    gather_s,
+    plans_by_topics,
+    rest_s,
+    together,
+)
 from tfcompose.model.messages import Clear, GuardEvent, OwnerReady, TreeComplete
 from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings
 
@@ -69,3 +76,19 @@ def test_the_graph_is_left_alone_for_longer_the_longer_an_inquiry_takes(
     took_s: float, *, changed: bool, least_s: float, most_s: float
 ) -> None:
     assert least_s <= rest_s(took_s, changed=changed) <= most_s
+
+
+@pytest.mark.parametrize(
+    ("taken", "is_prompt", "gathers"),
+    [
+        pytest.param(0, False, True, id="idle"),
+        pytest.param(GATHER_BELOW - 1, False, True, id="some came"),
+        pytest.param(GATHER_BELOW, False, False, id="a burst: readers keep a thousand"),
+        pytest.param(0, True, False, id="passed on, or before the start"),
+    ],
+)
+def test_a_watching_guard_lets_messages_gather_unless_many_come(
+    taken: int, *, is_prompt: bool, gathers: bool
+) -> None:
+    pause_s = gather_s(taken, is_prompt=is_prompt)
+    assert 0 < pause_s <= CHECK_EVERY_S if gathers else pause_s == 0

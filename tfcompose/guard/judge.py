@@ -123,6 +123,11 @@ class Judge:
         return judged.admitted
 
     @property
+    def has_begun(self) -> bool:
+        """Whether the observation before the start is over."""
+        return self._start.cleared is not None
+
+    @property
     def compared(self) -> frozenset[str]:
         """The frames whose poses it compares with the plan's."""
         return self._sent.frames

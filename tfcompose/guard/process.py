@@ -86,6 +86,10 @@ LATE_S = 0.05
 #: took, and at most this long, in seconds: of two hundred publishers one takes 13 ms of a
 #: processor, and what is to be passed on waits for it.
 REST_PER_INQUIRY, LONGEST_REST_S = 20.0, 0.3
+#: A guard that passes nothing on lets messages gather this long between two steps, in seconds: a
+#: wake-up costs more than a message. After a step that took this many it does not, since readers
+#: keep a thousand.
+GATHER_S, GATHER_BELOW = 0.05, 100
 #: How often a strict guard says what it held back, in seconds.
 REPORT_EVERY_S = 10.0
 
@@ -125,6 +129,7 @@ class TopicWatch:
         self._publishers: list[Publisher] = []
         self._malformed: dict[bytes | None, None] = {}
         self._known: dict[bytes | None, None] = {}
+        self._number_taken = 0
         self._decoder = self._reader.decoder
         self._flood = FloodReader(frozenset(edge.child for edge in judge.plan.edges))
         self._most = (
@@ -153,6 +158,12 @@ class TopicWatch:
         due_s = max(0.0, self._due - time.monotonic())
         return min(due_s, WAIT_S) if self._flood.is_reading else due_s
 
+    @property
+    def gather_s(self) -> float:
+        """How long messages may gather before the next step, in seconds."""
+        is_prompt = self.relay is not None or not self.judge.has_begun or self._flood.is_reading
+        return gather_s(self._number_taken, is_prompt=is_prompt)
+
     def close(self) -> None:
         """End what must end before the node does."""
         self.data.close()
@@ -165,6 +176,7 @@ class TopicWatch:
         fenced = list(self.data.take_fenced())
         strangers = self._take(fenced, now)  # first: it is passed on
         public = list(self.data.take_public())
+        self._number_taken = len(fenced) + len(public)
         if self._by_partition:
             self._graph.hear_public(
                 message.received.gid for message in public if message.received.gid
@@ -261,6 +273,14 @@ class TopicWatch:
 def rest_s(took_s: float, *, changed: bool) -> float:
     """Return how long the graph is left alone after a look that took so long, in seconds."""
     return 0.0 if changed else min(REST_PER_INQUIRY * took_s, LONGEST_REST_S)
+
+
+def gather_s(taken: int, *, is_prompt: bool) -> float:
+    """Return how long messages gather after a step that took so many, in seconds.
+
+    ``is_prompt`` says that what comes must not wait.
+    """
+    return 0.0 if is_prompt or taken >= GATHER_BELOW else GATHER_S
 
 
 def _run_marks(plan: Plan, profile: str) -> RunMarks:
@@ -409,6 +429,8 @@ def guard(own: Own, stop: Stop) -> None:
             wait_set.wait(min(watch.wait_s for watch in watches))
             for step in steps:
                 step()
+            if gathering_s := min(watch.gather_s for watch in watches):
+                stop.wait(gathering_s)
         for watch in watches:
             watch.report(0.0)
             watch.close()

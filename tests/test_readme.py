@@ -7,9 +7,10 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from tests.benchmarks import results
-from tests.support import processes
+from tests.support import pictures, processes
 from tests.support.cli import tfcompose_in
 from tfcompose.__main__ import PROCESSES
 from tfcompose.cli.compiling import library
@@ -29,6 +30,15 @@ EVERYTHING = "\n".join((README, *PAGES.values()))
 
 def blocks(language: str, text: str = README) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_its_pictures_are_small_and_show_the_robot_file_of_today() -> None:
+    shown = {Path(path).name for path in re.findall(r"!\[.+?\]\((\S+)\)", README)}
+    assert shown == {file.name for file in pictures.FOLDER.iterdir()} == {"up.png", "view.png"}
+    for file in pictures.FOLDER.iterdir():
+        assert file.stat().st_size <= 200_000
+        with Image.open(file) as image:
+            assert image.info[pictures.ROBOT_HASH] == pictures.robot_hash()
 
 
 def test_it_is_one_read() -> None:

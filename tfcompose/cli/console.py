@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.cli.reading import line_of
 from tfcompose.cli.terminal import CLEAR_LINE, keep_colours, plain
-from tfcompose.compiler.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
+from tfcompose.compiler.render.text import (
+    BOLD,
+    GREEN,
+    PLAIN,
+    RED,
+    YELLOW,
+    no_address,
+    render_text,
+)
 from tfcompose.foundation.text import listed, plural
 from tfcompose.model.messages import (
     AllReady,
@@ -33,6 +41,7 @@ from tfcompose.model.messages import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from tfcompose.compiler.render.text import CodeAddress
     from tfcompose.model.messages import Notice, PlanChange
     from tfcompose.model.plan import Plan
 
@@ -90,17 +99,19 @@ class Nowhere:
 class Console:
     """Writes notices as lines: ``name | text``, coloured on a terminal.
 
+    ``address_of`` gives the pages that codes of findings lead to.
     ``keep`` gets each line without colours, and may return a complaint to print; ``status`` stays
     below the lines. A process's own lines are only kept, or only written, where its ``output``
     says so.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (all but two are named)
         self,
         plan: Plan,
         output: Output,
         *,
         colour: bool,
+        address_of: CodeAddress = no_address,
         keep: Callable[[str, str], str | None] | None = None,
         status: StatusLine | None = None,
     ) -> None:
@@ -109,6 +120,7 @@ class Console:
         self._keep = keep
         self._status = status
         self._colour = colour
+        self._address_of = address_of
         self._width = max(map(len, [*names, LAUNCHER]))
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
@@ -238,10 +250,14 @@ class Console:
     @_write.register
     def _(self, notice: FindingShown) -> None:
         notes = tuple(note for note in notice.found.notes if not self._is_printed(note.message))
-        for line in render_text(
-            [replace(notice.found, notes=notes)], line_of, colour=self._colour
-        ).splitlines():
-            self._say(line)
+        text = render_text(
+            [replace(notice.found, notes=notes)],
+            line_of,
+            colour=self._colour,
+            address_of=self._address_of,
+        )
+        for line in text.splitlines():
+            self._line(LAUNCHER, line, BOLD, is_rendered=True)
 
     @_write.register
     def _(self, notice: RecoveredShown) -> None:
@@ -283,12 +299,22 @@ class Console:
     def _kept(self, name: str, text: str) -> str | None:
         return self._keep(name, plain(text)) if self._keep else None
 
-    def _line(
-        self, name: str, text: str, colour: str, *, log: bool = False, keep: bool = True
+    def _line(  # noqa: PLR0913 (all but three are named)
+        self,
+        name: str,
+        text: str,
+        colour: str,
+        *,
+        log: bool = False,
+        keep: bool = True,
+        is_rendered: bool = False,
     ) -> None:
+        """Write a line; of one that is not rendered here only colours are left."""
         fault = self._kept(name, text) if keep else None
         clear = self._status.cleared() if self._status else ""
-        shown = keep_colours(text) if self._colour else plain(text)
+        shown = text
+        if not is_rendered:
+            shown = keep_colours(text) if self._colour else plain(text)
         self._output.write(
             f"{clear}{self._paint(prefix_of(name, self._width), colour)} {shown}\n", log=log
         )

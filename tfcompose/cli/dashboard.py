@@ -23,7 +23,7 @@ from tfcompose.cli.console import Console, Nowhere
 from tfcompose.cli.process_table import HEAD, TABLE, row, uptime
 from tfcompose.cli.reading import line_of
 from tfcompose.cli.tables import Table, shorten
-from tfcompose.cli.terminal import is_coloured, plain
+from tfcompose.cli.terminal import code_addresses, is_coloured, plain
 from tfcompose.compiler.render.text import GREEN, RED, YELLOW, render_text
 from tfcompose.foundation.text import plural
 from tfcompose.model.messages import Ended, FindingShown, RecoveredShown, Stopping
@@ -171,7 +171,9 @@ class Dashboard:
         self._console(notice)
         if isinstance(notice, FindingShown):
             self._counts[notice.found.severity] += 1
-            text = render_text([notice.found], line_of, colour=True)
+            text = render_text(
+                [notice.found], line_of, colour=True, address_of=code_addresses(sys.stdout)
+            )
             self._reports.append(_Reported(at, tuple(map(Text.from_ansi, text.splitlines()))))
         elif isinstance(notice, RecoveredShown):
             self._reports.append(
@@ -274,7 +276,7 @@ class Dashboard:
         with self._renderer.capture() as captured:
             text = Text("\n").join(self.lines(columns, rows))
             self._renderer.print(text, soft_wrap=True, end="")
-        return captured.get().split("\n")
+        return _LINK_ID.sub("\033]8;;", captured.get()).split("\n")
 
     def lines(self, columns: int, rows: int) -> list[Text]:
         """Return as many lines as the terminal has, each at most as wide as it."""
@@ -456,6 +458,10 @@ class Dashboard:
         today = time.localtime(self.clock())[:3] == time.localtime(at)[:3]
         stamp = time.strftime("%H:%M:%S" if today else "%b %d %H:%M", time.localtime(at))
         return Text(f"{stamp} ", style="dim").append_text(line)
+
+
+#: rich gives each link another id in each drawing, with which all rows with links would differ.
+_LINK_ID = re.compile(r"\033\]8;id=[^;]*;")
 
 
 def _ends(text: str, width: int) -> Sequence[str]:

@@ -19,7 +19,7 @@ import msgspec
 
 from tfcompose.cli.console import Console
 from tfcompose.cli.runs import plan_of_run
-from tfcompose.cli.terminal import FAILED, can_redraw, is_coloured, warn
+from tfcompose.cli.terminal import FAILED, can_redraw, code_addresses, is_coloured, warn
 from tfcompose.foundation.text import plural
 from tfcompose.launcher.control import connect
 from tfcompose.launcher.output import Follower, NonBlockingOutput, runs_of
@@ -198,7 +198,12 @@ class _LiveView:
         """Print on the terminal's own screen what went wrong, and how it ended."""
         if self._fault:
             warn(f"the live view failed: {self._fault}")
-        console = Console(plan, output, colour=is_coloured(sys.stdout))
+        console = Console(
+            plan,
+            output,
+            colour=is_coloured(sys.stdout),
+            address_of=code_addresses(sys.stdout),
+        )
         with contextlib.suppress(OSError):
             if self._left_out:
                 output.write(

@@ -43,6 +43,7 @@ from tfcompose.cli.terminal import (
     INTERRUPTED,
     UNREADABLE,
     can_redraw,
+    code_addresses,
     fail,
     is_coloured,
     print_findings,
@@ -151,7 +152,14 @@ def _run(
     """Run the plan on this terminal until it ends, and return the exit code."""
     logs = Logs(place.logs)
     status = StatusLine(plan, lambda: size_of(output.fd)[0]) if can_redraw(sys.stdout) else None
-    console = Console(plan, output, colour=is_coloured(sys.stdout), keep=logs.write, status=status)
+    console = Console(
+        plan,
+        output,
+        colour=is_coloured(sys.stdout),
+        address_of=code_addresses(sys.stdout),
+        keep=logs.write,
+        status=status,
+    )
     session.refresh = console.refresh if status else None
     try:
         return supervise(
@@ -318,7 +326,12 @@ def _launch(plan: Plan, place: RuntimeDir, session: RunSession, duration_s: floa
 
 
 def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> int:
-    console = Console(plan, StandardOutput(), colour=is_coloured(sys.stdout))
+    console = Console(
+        plan,
+        StandardOutput(),
+        colour=is_coloured(sys.stdout),
+        address_of=code_addresses(sys.stdout),
+    )
     goal = AllReady if arguments.wait else AllStarted
     with contextlib.suppress(OSError):
         try:

@@ -10,7 +10,7 @@ from collections import Counter
 from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
 
-from tfcompose.compiler.render.text import PLAIN, render_text
+from tfcompose.compiler.render.text import PLAIN, no_address, render_text
 from tfcompose.foundation.text import mask_invisible
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import TextIO
 
+    from tfcompose.compiler.render.text import CodeAddress
     from tfcompose.foundation.findings import Finding
 
 #: Exit codes: findings, or a process that failed; wrong use, what cannot be read, or what is not
@@ -70,7 +71,9 @@ def print_findings(found: Sequence[Finding], stream: TextIO, *, most: int | None
         counts[place] += 1
         if most is None or counts[place] <= most:
             shown.append(finding)
-    stream.write(render_text(shown, line_of, colour=is_coloured(stream)))
+    stream.write(
+        render_text(shown, line_of, colour=is_coloured(stream), address_of=code_addresses(stream))
+    )
     for (file, code), count in counts.items():
         if most is not None and count > most:
             where, how = (f"{file}: ", "; tfcompose lint --all lists them") if file else ("", "")
@@ -108,6 +111,42 @@ def can_redraw(stream: TextIO) -> bool:
     On a terminal that moves its cursor.
     """
     return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+
+
+#: Where the project publishes the pages that ``help --html`` writes; empty: nowhere.
+DOCUMENTATION_URL = ""
+
+
+def code_page(code: str) -> str:
+    """Return the path of a code's page below the address of the documentation."""
+    return f"codes/{code}.html"
+
+
+def code_addresses(stream: TextIO) -> CodeAddress:
+    """Return what gives the address of a code's page, for links in findings on a terminal.
+
+    The pages are at ``$TFCOMPOSE_DOCS``, a URL or a folder, or at the project's own address. There
+    are no links into a file or a pipe, with NO_COLOR, or to a page that a folder does not have.
+    """
+    docs = os.environ.get("TFCOMPOSE_DOCS") or DOCUMENTATION_URL
+    if not docs or os.environ.get("NO_COLOR") or not can_redraw(stream):
+        return no_address
+    from pathlib import Path
+    from urllib.parse import quote
+
+    from tfcompose.foundation.reading import exists
+
+    if _URL.match(docs):
+        base = quote(docs.rstrip("/"), safe=_URL_SAFE)
+        return lambda code: f"{base}/{code_page(code)}"
+    folder = Path(docs).expanduser().absolute()
+    base = f"file://{os.uname().nodename}{quote(os.fsencode(folder))}"
+    return lambda code: f"{base}/{code_page(code)}" if exists(folder / code_page(code)) else ""
+
+
+#: The begin of a URL, and the characters that it may have as they are (RFC 3986).
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")
+_URL_SAFE = ":/?#[]@!$&'()*+,;=%~"
 
 
 def table_width(stream: TextIO) -> int | None:

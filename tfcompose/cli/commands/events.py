@@ -10,7 +10,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_format, add_robot
-from tfcompose.cli.terminal import FAILED, fail, is_coloured, warn
+from tfcompose.cli.terminal import FAILED, code_addresses, fail, is_coloured, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -41,6 +41,7 @@ def run(arguments: Namespace) -> int:
         Plan(place.name, "", None, ros=RosSettings(), edges=(), processes=()),
         lines,
         colour=is_coloured(sys.stdout),
+        address_of=code_addresses(sys.stdout),
     )
     try:
         for notice, at in notices(place, output=sys.stdout):

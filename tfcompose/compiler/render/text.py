@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tfcompose.foundation.text import mask_invisible, plural, visible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from tfcompose.foundation.findings import Finding, Span
 
@@ -25,22 +26,43 @@ _LONGEST_LINE = 160
 _LONGEST_MESSAGE = 1000
 
 
+#: Returns the address of a code's page; empty: there is none.
+CodeAddress = Callable[[str], str]
+
+
+def no_address(code: str) -> str:
+    """Return no address for any code."""
+    del code
+    return ""
+
+
 def render_text(
-    found: Sequence[Finding], line_of: Callable[[str, int], str | None], *, colour: bool
+    found: Sequence[Finding],
+    line_of: Callable[[str, int], str | None],
+    *,
+    colour: bool,
+    address_of: CodeAddress = no_address,
 ) -> str:
     """Return the findings as text.
 
-    ``line_of`` returns a line of a file (from 1), or None if it cannot be read.
+    ``line_of`` returns a line of a file (from 1), or None if it cannot be read. A code with an
+    address is a link to it (OSC 8).
     """
-    return "".join(_one(finding, line_of, _Paint(colour=colour)) for finding in found)
+    paint = _Paint(address_of, colour=colour)
+    return "".join(_one(finding, line_of, paint) for finding in found)
 
 
 class _Paint:
-    def __init__(self, *, colour: bool) -> None:
+    def __init__(self, address_of: CodeAddress, *, colour: bool) -> None:
+        self._address_of = address_of
         self.colour = colour
 
     def __call__(self, text: str, *codes: str) -> str:
         return f"{''.join(codes)}{text}{PLAIN}" if self.colour else text
+
+    def link(self, code: str) -> str:
+        address = self._address_of(code)
+        return f"\033]8;;{address}\033\\{code}\033]8;;\033\\" if address else code
 
 
 def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
@@ -48,7 +70,7 @@ def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Pain
     place = _printable(f"{found.span}: ") if found.span else ""
     message = _printable(found.message)
     head = (
-        f"{paint(place, BOLD)}{paint(f'{found.severity}[{found.code}]', shade, BOLD)}"
+        f"{paint(place, BOLD)}{paint(f'{found.severity}[{paint.link(found.code)}]', shade, BOLD)}"
         f" {paint(message, BOLD)}"
     )
     lines = [head]

@@ -79,7 +79,7 @@ ONLY_IN: dict[str, set[str]] = {
     "lifecycle_msgs": {"tf.ros"},
     "composition_interfaces": {"tf.ros"},
     "rcl_interfaces": {"tf.ros"},
-    "launch": {"launcher", "tools.importers"},
+    "launch": {"launcher", "tools.importers", "tools.ros2"},
     "launch_ros": {"launcher", "tools.importers"},
     "std_msgs": {"tf.ros"},
     "builtin_interfaces": {"tf.ros"},

@@ -20,9 +20,10 @@ from tfcompose.foundation import findings
 from tfcompose.foundation.catalogue import Catalogue
 from tfcompose.launcher import supervisor
 from tfcompose.launcher.child import READ_SIZE
+from tfcompose.launcher.output import EventStream
 from tfcompose.launcher.preflight import own_env
 from tfcompose.launcher.state import Times
-from tfcompose.launcher.supervisor import supervise
+from tfcompose.launcher.supervisor import RunSession, supervise
 from tfcompose.model.messages import (
     Clear,
     Ended,
@@ -36,6 +37,7 @@ from tfcompose.model.messages import (
     Stopping,
     TreeComplete,
     line_of,
+    read_notice,
 )
 from tfcompose.model.plan import Plan, PlanProcess, Ready, RosSettings
 
@@ -478,3 +480,34 @@ def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_many_runs
     signal.signal(SIGTERM, before_all)
     assert signal.set_wakeup_fd(-1) == -1
     assert psutil.Process().children() == children
+
+
+def test_a_pipe_gets_each_event_and_the_plan_ends_with_its_reader(tmp_path: Path) -> None:
+    pipe = tmp_path / "events"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    read: list[Notice] = []
+
+    def report(notice: Notice) -> None:
+        if isinstance(notice, LogLine):
+            lines = os.read(reader, 1 << 16).splitlines()
+            read.extend(read_notice(line)[0] for line in lines)
+            os.close(reader)
+
+    session = RunSession(tmp_path / "plan.json", events=EventStream(str(pipe)))
+    plan = plan_of(program("a", "import time; print('up', flush=True); time.sleep(180)"))
+    assert supervise(plan, tmp_path / "plan.json", report=report, session=session) == 141
+    states = [notice.state for notice in read if isinstance(notice, ProcessState)]
+    assert states[:1] == ["starting"]
+    with pytest.raises(OSError, match="No such device"):
+        EventStream(str(pipe))
+
+
+def test_a_file_gets_each_event(tmp_path: Path) -> None:
+    file = tmp_path / "events.jsonl"
+    session = RunSession(tmp_path / "plan.json", events=EventStream(str(file)))
+    code, _ = run(tmp_path, program("a", "print('up')"), session=session)
+    notices = [read_notice(line)[0] for line in file.read_bytes().splitlines()]
+    assert code == 0
+    assert isinstance(notices[-1], Ended)
+    assert not any(isinstance(notice, LogLine) for notice in notices)

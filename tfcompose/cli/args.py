@@ -11,15 +11,16 @@ from tfcompose.cli.plans import is_plan
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, printable, reject
 from tfcompose.foundation.findings import RejectedError
-from tfcompose.spec.language import Given, compose, validate, with_includes
+from tfcompose.spec.language import Given, compose, profiles_in, validate, with_includes
 from tfcompose.spec.language.args import as_given
 from tfcompose.spec.load import load
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.spec.language import ArgSpec
+    from tfcompose.spec.load import Source
 
 
 def show_args(arguments: Namespace) -> int:
@@ -31,9 +32,7 @@ def show_args(arguments: Namespace) -> int:
     if is_plan(file):
         fail(f"{file} is a built plan, and arguments are those of a robot file", UNREADABLE)
     try:
-        source = with_includes(load(read_text(file), file), read_text)
-        source = compose(source, arguments.profiles, overlays_of(arguments), read=read_text)
-        args = validate(source, given=Given({}, os.environ)).spec.args
+        args, _ = args_and_profiles(file, arguments.profiles, overlays_of(arguments))
     except RejectedError as error:
         reject(error.findings)
     if not args:
@@ -41,6 +40,20 @@ def show_args(arguments: Namespace) -> int:
     for name, declared in args.items():
         print("\n".join(map(printable, _lines(name, declared))))
     return 0
+
+
+def args_and_profiles(
+    file: str, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()
+) -> tuple[Mapping[str, ArgSpec], tuple[str, ...]]:
+    """Return the arguments of a robot file with its ``profiles`` and overlays, and all profiles.
+
+    Raises:
+        RejectedError: with the findings of a file that cannot be read.
+    """
+    source = with_includes(load(read_text(file), file), read_text)
+    names = tuple(profiles_in(source))
+    source = compose(source, profiles, overlays, read=read_text)
+    return validate(source, given=Given({}, os.environ)).spec.args, names
 
 
 def _file(arguments: Namespace) -> str:

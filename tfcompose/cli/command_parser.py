@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from argparse import ArgumentParser, HelpFormatter
+from argparse import ArgumentParser, HelpFormatter, Namespace
 from functools import partial
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol
@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 from tfcompose.cli.terminal import UNREADABLE, fail, size_of
 
 if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 
 class Parser(ArgumentParser):
@@ -42,9 +41,14 @@ class Parser(ArgumentParser):
         It may stand anywhere on the command line.
         """
         argv = list(args or ())
+        ros_args: list[str] = []
         takes_given = any(action.dest == "given" for action in self._actions)
+        if any(action.dest == "ros_args" for action in self._actions):
+            argv, ros_args = split_ros_args(argv)
         settings = [argument for argument in argv if _GIVEN.match(argument)] if takes_given else []
         rest = [argument for argument in argv if argument not in settings]
+        if ros_args:
+            namespace = Namespace(**vars(namespace or Namespace()), ros_args=ros_args)
         arguments = super().parse_intermixed_args(rest, namespace)
         if takes_given:
             from tfcompose.cli.options import pairs
@@ -57,6 +61,24 @@ class Parser(ArgumentParser):
         options = takewhile(lambda argument: argument != "--", argv)
         names = {argument.partition("=")[0] for argument in options if argument.startswith("--")}
         return not names <= self._option_string_actions.keys()
+
+
+def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the command line without ROS arguments, and those, as rcl separates them.
+
+    They follow ``--ros-args``, up to the end or ``--``.
+    """
+    rest: list[str] = []
+    ros_args: list[str] = []
+    target = rest
+    for argument in argv:
+        if argument == "--ros-args":
+            target = ros_args
+        elif argument == "--" and target is ros_args:
+            target = rest
+        else:
+            target.append(argument)
+    return rest, ros_args
 
 
 #: A word that gives an argument of a robot, xacro or launch file its value.

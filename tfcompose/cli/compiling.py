@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.reading import read_text
+from tfcompose.cli.ros_arguments import ros_arguments
 from tfcompose.cli.terminal import (
     MOST_OF_ONE_CODE,
     fail,
@@ -156,11 +157,15 @@ def disk_of(file: str, arguments: Namespace) -> Disk:
 
 
 def inputs_of(arguments: Namespace) -> Given:
-    """Return what the command line and the environment give the robot's arguments."""
+    """Return what the command line and the environment give the robot.
+
+    Raises:
+        SystemExit: after saying what is wrong with ROS arguments.
+    """
     args = {
         name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()
     }
-    return Given(args, os.environ)
+    return Given(args, os.environ, ros_arguments(getattr(arguments, "ros_args", ())))
 
 
 def compile_or_exit(file: str, arguments: Namespace) -> Robot:

@@ -73,6 +73,17 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
     add_trust(parser)
 
 
+def add_ros_args(parser: ArgumentParser) -> None:
+    """Add --ros-args, which takes the rest of the command line, or what is before ``--``."""
+    parser.add_argument(
+        "--ros-args",
+        nargs=1,
+        default=[],
+        metavar="…",
+        help="for all nodes of the robot: -r __ns:=NS, -r FROM:=TO, -p use_sim_time:=true",
+    )
+
+
 def add_trust(parser: ArgumentParser) -> None:
     """Add --trust."""
     parser.add_argument(

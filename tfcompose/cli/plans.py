@@ -75,6 +75,8 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
             " building it",
             UNREADABLE,
         )
+    if getattr(arguments, "ros_args", ()):
+        fail("a built plan takes no --ros-args: build with them", UNREADABLE)
     if arguments.given:
         built_with = "; tfcompose up --dry-run PLAN prints those that it was built with"
         fail(

@@ -77,16 +77,22 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from tfcompose.foundation.findings import Finding
+    from tfcompose.launcher.output import EventStream
     from tfcompose.launcher.runtime_dir import RuntimeDir
     from tfcompose.model.plan import Plan
 
 
-def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) -> int:
+def start(
+    file: Path,
+    arguments: Namespace,
+    built_with: Sequence[Finding] = (),
+    events: EventStream | None = None,
+) -> int:
     """Check all that the plan in the file needs, and start it.
 
     Return the exit code as ``up`` does.
 
-    ``built_with`` are the warnings of its build, which were printed.
+    ``built_with`` are the warnings of its build, which were printed. ``events`` gets each notice.
     """
     plan = plan_to_start(read_built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
@@ -108,7 +114,9 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
         if hidden := hidden_run(place):
             fail(hidden)
         copy = copy_plan(plan, file, place, alone=True)
-        session = RunSession(copy, RunFiles(place, lock, copy), file.absolute().parent)
+        session = RunSession(
+            copy, RunFiles(place, lock, copy), file.absolute().parent, events=events
+        )
         warnings = warnings_before_start(place, plan, session.run_id)
         for warning in warnings:
             warn(warning)

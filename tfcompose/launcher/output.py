@@ -133,19 +133,60 @@ def _not_waiting(fd: int) -> tuple[int, bool]:
         return fd, False
 
 
+class EventStream:
+    """A file or pipe with each notice but log lines, as ``tfcompose events --format json``.
+
+    Raises:
+        OSError: if the file cannot be opened; ENXIO for a named pipe that nobody reads.
+    """
+
+    def __init__(self, path: str) -> None:
+        flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+        self.fd = os.open(path, flags, 0o640)
+        #: Whether a reader can go away.
+        self.is_pipe = stat.S_ISFIFO(os.fstat(self.fd).st_mode)
+        self._output = NonBlockingOutput(self.fd)
+
+    def write(self, line: str) -> None:
+        """Write a notice; keep what the reader does not take now.
+
+        Raises:
+            OSError: if the reader has gone.
+        """
+        self._output.write(f"{line}\n")
+
+    def push(self) -> None:
+        """Write what was kept, as far as the reader takes it now.
+
+        Raises:
+            OSError: if the reader has gone.
+        """
+        if self._output.owes:
+            self._output.push()
+
+    def close(self) -> None:
+        """Write the rest, as far as the reader takes it, and close the file."""
+        self._output.close()
+        if self._output.fd != self.fd:
+            os.close(self.fd)
+
+
 class Notifier:
     """Passes notices on to the person at the output, and to whoever listens at the control socket.
 
-    ``lost`` is called once, when the reader of the ``output`` has gone, ``refresh`` now and then.
+    ``lost`` is called once, when the reader of the ``output`` or of ``events`` has gone,
+    ``refresh`` now and then.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (made in one place)
         self,
         selector: selectors.BaseSelector,
         report: Callable[[Notice], None],
         lost: Callable[[], None],
+        *,
         output: NonBlockingOutput | None,
         refresh: Callable[[], None] | None,
+        events: EventStream | None,
     ) -> None:
         self._selector = selector
         self._output = output
@@ -154,6 +195,9 @@ class Notifier:
         self._lost = lost
         self._owing: int | None = None
         self._control: Control | None = None
+        self._events = events
+        if events and events.is_pipe:
+            selector.register(events.fd, selectors.EVENT_READ, self._lose_events)
 
     def listen(self, listener: socket, answer: Callable[[Request], ProcessMessage]) -> None:
         """Take requests of other commands at the control socket, in place of the one before."""
@@ -166,11 +210,16 @@ class Notifier:
         """Let all go who listen."""
         if self._control:
             self._control.close()
+        if self._events:
+            self._events.close()
 
     def notify(self, notice: Notice) -> None:
         """Pass the notice on."""
-        if self._control and not isinstance(notice, LogLine):
-            self._control.publish(notice_line(notice, time.time()))
+        if (self._control or self._events) and not isinstance(notice, LogLine):
+            line = notice_line(notice, time.time())
+            if self._control:
+                self._control.publish(line)
+            self._try_events(lambda events: events.write(line))
         if self._report:
             self._try(partial(self._report, notice))
 
@@ -181,6 +230,7 @@ class Notifier:
         """
         if self._refresh and self._report:
             self._try(self._refresh)
+        self._try_events(EventStream.push)
         output = self._output
         if output is None or output.owes == (self._owing is not None):
             return
@@ -192,6 +242,22 @@ class Notifier:
         elif self._owing is not None:
             self._selector.unregister(self._owing)
             self._owing = None
+
+    def _try_events(self, write: Callable[[EventStream], None]) -> None:
+        if self._events:
+            try:
+                write(self._events)
+            except OSError:
+                self._lose_events()
+
+    def _lose_events(self) -> None:
+        """End the robot with the program that reads its events."""
+        if self._events:
+            if self._events.is_pipe:
+                self._selector.unregister(self._events.fd)
+            self._events.close()
+            self._events = None
+            self._lost()
 
     def _try(self, write: Callable[[], None]) -> None:
         try:

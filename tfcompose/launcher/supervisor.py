@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     from tfcompose.launcher.answers import Answer
     from tfcompose.launcher.child import ChildCommand
     from tfcompose.launcher.events import Action, Event
-    from tfcompose.launcher.output import NonBlockingOutput
+    from tfcompose.launcher.output import EventStream, NonBlockingOutput
     from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.run_files import RunFiles
     from tfcompose.launcher.state import State, Times
@@ -89,7 +89,7 @@ class RunSession:
 
     ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With files,
     what the run's processes leave behind is ended with it, also what left their groups.
-    ``refresh`` is called now and then.
+    ``refresh`` is called now and then. ``events`` gets each notice; the run ends with its reader.
     """
 
     plan_file: Path
@@ -97,6 +97,7 @@ class RunSession:
     base: Path | None = None
     output: NonBlockingOutput | None = None
     refresh: Callable[[], None] | None = None
+    events: EventStream | None = None
 
     @property
     def run_id(self) -> str:
@@ -181,7 +182,14 @@ class _Supervisor:
         self._known = known
         self._lost_files = ""
         lost = partial(self._events.append, OutputLost())
-        self._notifier = Notifier(selector, report, lost, session.output, session.refresh)
+        self._notifier = Notifier(
+            selector,
+            report,
+            lost,
+            output=session.output,
+            refresh=session.refresh,
+            events=session.events,
+        )
         if session.files:
             self._notifier.listen(session.files.listener, self._answer)
         self._notify = self._notifier.notify

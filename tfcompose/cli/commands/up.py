@@ -10,13 +10,16 @@ already, restart only what differs in the new plan.
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_variant, not_negative, positive
+from tfcompose.cli.options import DEFAULT_FILE, add_ros_args, add_variant, not_negative, positive
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+
+    from tfcompose.launcher.output import EventStream
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -25,6 +28,7 @@ def arguments(parser: ArgumentParser) -> None:
         "file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml"
     )
     add_variant(parser)
+    add_ros_args(parser)
     parser.add_argument(
         "-o", "--output", metavar="DIR", help="where to build; default: build/ROBOT"
     )
@@ -69,6 +73,14 @@ def arguments(parser: ArgumentParser) -> None:
         dest="live",
         action="store_false",
         help="print lines, as into a pipe, instead of the live view of a terminal",
+    )
+    parser.add_argument(
+        "--events",
+        metavar="FILE",
+        help=(
+            "write each event to this file or named pipe, as one JSON object per line; the robot"
+            " ends with the reader of a pipe"
+        ),
     )
     parser.add_argument(
         "--dry-run", action="store_true", help="print what would be started and exit"
@@ -118,14 +130,33 @@ def run(arguments: Namespace) -> int:
 
     if missing := no_ros():
         reject([missing])
+    events = _open_events(arguments.events)
     if is_plan(arguments.file):
         from tfcompose.cli.starting import start
 
-        return start(Path(arguments.file), arguments)
+        return start(Path(arguments.file), arguments, events=events)
     from tfcompose.cli.build_process import BuildProcess
 
     with BuildProcess(arguments) as build:
         from tfcompose.cli.starting import start  # while it is built
 
         plan_file, found = build.wait_until_built()
-    return start(plan_file, arguments, found)
+    return start(plan_file, arguments, found, events)
+
+
+def _open_events(path: str | None) -> EventStream | None:
+    """Return the stream to a file or named pipe, None without one.
+
+    Raises:
+        SystemExit: after saying that it cannot be opened.
+    """
+    if path is None:
+        return None
+    from tfcompose.cli.terminal import UNREADABLE, fail
+    from tfcompose.launcher.output import EventStream
+
+    try:
+        return EventStream(path)
+    except OSError as error:
+        why = "no process reads the pipe" if error.errno == errno.ENXIO else error.strerror
+        fail(f"--events {path}: {why}", UNREADABLE)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 #: The file of parameters, which is named once.
 _PARAMS_FILE = "${params_file}"
-_TF_TOPICS = frozenset({"/tf", "/tf_static"})
 
 
 def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> tuple[str, ...]:
@@ -40,7 +39,7 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
         return (*own, "--ros-args", *arguments) if arguments else own
     if process.launch is not None:
         return (f"${{launch:{process.launch}}}", *process.argv)
-    if process.package is None and not _is_node(process, owns=owns):
+    if not process.is_node(owns=owns):
         return process.argv
     arguments = _ros_arguments(process, robot, has_params=has_params)
     if process.package is None:
@@ -52,28 +51,6 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
         return (*process.argv, "--ros-args", *arguments) if arguments else process.argv
     program = f"${{executable:{process.package}/{process.executable}}}"
     return (program, *process.argv, "--ros-args", *_names(process, robot), *arguments)
-
-
-def _is_node(process: Process, *, owns: bool) -> bool:
-    """Whether a plain command is surely a ROS node.
-
-    It owns an edge, or has settings that only nodes have.
-
-    What follows a text that a shell reads, or a launch file, does not reach the program.
-    """
-    if not process.takes_ros_arguments:
-        return False
-    has_node_settings = (
-        process.log_level is not None
-        or process.namespace is not None
-        or bool(file_params(process))
-    )
-    return (
-        owns
-        or has_node_settings
-        or bool(process.remap.keys() - _TF_TOPICS)
-        or "--ros-args" in process.argv
-    )
 
 
 def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[str]:

@@ -12,22 +12,21 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.compiler.resolve.hosts import entry_of
+from tfcompose.compiler.resolve.processes import full_name
 from tfcompose.foundation.findings import Finding, did_you_mean, finding
 from tfcompose.model.fields import narrow
 from tfcompose.model.plan import RosSettings, known_at_launch
+from tfcompose.model.plan.topics import GLOBAL
 from tfcompose.spec.language.variables import CALLS
 from tfcompose.spec.load import path_named
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from tfcompose.compiler.resolve.draft import Draft
     from tfcompose.model.robot import Node, Process, Robot
     from tfcompose.spec.language.robot import RobotSpec, RosSpec
     from tfcompose.spec.load import Path
-
-
-TF_TOPICS = ("/tf", "/tf_static")
 
 
 def settings_of(ros: RosSpec) -> RosSettings:
@@ -45,7 +44,7 @@ def topics_below(namespace: str, isolate: str) -> dict[str, str]:
     Below the namespace, if they are isolated and it is one.
     """
     moves = isolate in {"topics", "both"} and namespace
-    return {topic: f"/{namespace}{topic}" for topic in TF_TOPICS} if moves else {}
+    return {topic: f"/{namespace}{topic}" for topic in GLOBAL} if moves else {}
 
 
 def isolate(draft: Draft) -> Iterator[Finding]:
@@ -53,13 +52,43 @@ def isolate(draft: Draft) -> Iterator[Finding]:
     robot, spec = draft.robot, draft.spec
     yield from _faults(robot, spec)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
+    rules = draft.validated.given.ros.remap
+    owners = {edge.owner for edge in robot.edges}
     processes = []
     filler = _ProcessFiller(draft)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
+        if rules:
+            owns = process.name in owners
+            moved = _remapped(moved, rules, robot.ros.namespace, owns=owns)
         processes.append(filler.fill(moved))
     yield from filler.found
     draft.robot = replace(robot, processes=tuple(processes))
+
+
+def _remapped(
+    process: Process, rules: Mapping[str, str], robot_namespace: str, *, owns: bool
+) -> Process:
+    """Return the process with the rules around the robot, which come before its own.
+
+    TF topics move for every process at once, others for those that are ROS nodes.
+    """
+    namespace = robot_namespace if process.namespace is None else process.namespace
+    names = {old: full_name(namespace, old) for old in rules}
+    # Whoever watches TF knows its topics by their full names.
+    rules_of_tf = {
+        names[old]: full_name(robot_namespace, new)
+        for old, new in rules.items()
+        if names[old] in GLOBAL
+    }
+    others = {old: new for old, new in rules.items() if names[old] not in GLOBAL}
+    outer = rules_of_tf | (others if process.is_node(owns=owns) else {})
+    remap = outer | {old: new for old, new in process.remap.items() if old not in outer}
+    ready = process.ready
+    if ready and ready.kind == "topic":
+        moved = {names[old]: full_name(namespace, new) for old, new in others.items()}
+        ready = replace(ready, text=moved.get(ready.text, ready.text))
+    return replace(process, remap=remap, ready=ready)
 
 
 def _faults(robot: Robot, spec: RobotSpec) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.model.fields import narrow
 from tfcompose.model.plan import PlanClaim, PlanHost, PlanProcess, switch_text
+from tfcompose.model.plan.topics import GLOBAL
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
 BUILT_IN = (STATIC, JOINTS, GUARD)
@@ -151,6 +152,25 @@ class Process(PlanProcess):
         A shell and a launch file do not pass it on.
         """
         return self.launch is None and self.argv[:2] not in {SHELL, ROS2_LAUNCH}
+
+    def is_node(self, *, owns: bool) -> bool:
+        """Return whether the process is surely a ROS node, and is given ROS arguments.
+
+        A plain command is one if it ``owns`` an edge, or has settings that only nodes have.
+        """
+        if self.kind != "run" or self.package is not None or self.launch is not None:
+            return True
+        if not self.takes_ros_arguments:
+            return False
+        return (
+            owns
+            or self.log_level is not None
+            or self.namespace is not None
+            or bool(self.other_params)
+            or any(node.params for node in self.ros_nodes)
+            or bool(self.remap.keys() - set(GLOBAL))
+            or "--ros-args" in self.argv
+        )
 
     @property
     def node(self) -> str:

@@ -6,7 +6,7 @@ The models are the one description of validation, JSON Schema and reference. ``o
 sources, ``validate`` makes a ``RobotSpec`` of one.
 """
 
-from tfcompose.spec.language.args import ArgSpec, Given, GivenArg
+from tfcompose.spec.language.args import ArgSpec, Given, GivenArg, RosArguments
 from tfcompose.spec.language.overlay import (
     as_part,
     compose,
@@ -30,6 +30,7 @@ __all__ = [
     "ArgSpec",
     "Given",
     "GivenArg",
+    "RosArguments",
     "Validated",
     "as_part",
     "compose",

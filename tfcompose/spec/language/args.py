@@ -46,11 +46,27 @@ class GivenArg:
 
 
 @dataclass(frozen=True, slots=True)
+class RosArguments:
+    """ROS arguments for the whole robot, as ``--ros-args`` and a launch file around it give them.
+
+    They apply to nodes and topics, never to frames.
+    """
+
+    #: The namespace above the robot's own, without slashes around; empty: none.
+    namespace: str = ""
+    #: Rules that come before those of each process, as ``-r FROM:=TO``.
+    remap: Mapping[str, str] = field(default_factory=dict)
+    #: Whether nodes follow /clock; None: as the robot file says.
+    use_sim_time: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Given:
     """What a robot file is built with: values of its arguments by name, and the environment."""
 
     args: Mapping[str, GivenArg] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
+    ros: RosArguments = field(default_factory=RosArguments)
 
 
 class ArgError(ValueError):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.foundation.catalogue import can_be_allowed, code_of
 from tfcompose.foundation.findings import Finding, RejectedError, without_duplicates
-from tfcompose.spec.language.args import Given
+from tfcompose.spec.language.args import Given, RosArguments
 from tfcompose.spec.language.conditions import unfold
 from tfcompose.spec.language.overlay import is_for_later
 from tfcompose.spec.language.preset import PresetSpec, wrong_names
@@ -22,7 +22,7 @@ from tfcompose.spec.language.variables import Variables, unused
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
 
-    from tfcompose.model.plan import ParameterValue
+    from tfcompose.model.plan import Isolation, ParameterValue
     from tfcompose.spec.language.robot import RobotSpec
     from tfcompose.spec.load import Path, Source
 
@@ -108,9 +108,13 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
     refused = frozenset([*already, *done.refused, *(refusal.path for refusal in refusals)])
     entries = {_entry(path) for path in refused}
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
-    from_outside = {"args given": args, "environment": variables.environment}
+    from_outside = {
+        "args given": args,
+        "environment": variables.environment,
+        "ros arguments": asdict(given.ros) if given.ros != RosArguments() else {},
+    }
     return Validated(
-        spec,
+        _with_ros_arguments(spec, given.ros),
         source,
         found,
         refused=refused,
@@ -122,6 +126,31 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
         broken=frozenset((*entries, *_children(entries, source.mapping("joints")))),
         source_data=source.data | {name: used for name, used in from_outside.items() if used},
     )
+
+
+def _with_ros_arguments(spec: RobotSpec, arguments: RosArguments) -> RobotSpec:
+    """Return the robot in the namespace around it, with the clock that it is given.
+
+    Frames keep the names of the robot file, also if those come from its own namespace.
+    """
+    if arguments == RosArguments():
+        return spec
+    ros, own = spec.ros, spec.ros.namespace.strip("/")
+    if arguments.namespace:
+        isolate, prefix = ros.isolate, ros.frame_prefix
+        if own and not prefix and isolate in {"frames", "both"}:
+            prefix = f"{own}/"
+        if not prefix:
+            isolate = _WITHOUT_FRAMES.get(isolate, isolate)
+        namespace = "/".join(filter(None, (arguments.namespace, own)))
+        ros = replace(ros, namespace=namespace, frame_prefix=prefix, isolate=isolate)
+    if arguments.use_sim_time is not None:
+        ros = replace(ros, clock="sim" if arguments.use_sim_time else "wall")
+    return spec.model_copy(update={"ros": ros})
+
+
+#: How topics are isolated where frames are not to be.
+_WITHOUT_FRAMES: dict[Isolation, Isolation] = {"frames": "none", "both": "topics"}
 
 
 def validate_preset(source: Source) -> PresetSpec:

@@ -1,0 +1,47 @@
+"""``--ros-args`` of a command: what the nodes of the robot are given together."""
+
+from __future__ import annotations
+
+from argparse import ArgumentTypeError
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.options import namespace
+from tfcompose.cli.terminal import UNREADABLE, fail
+from tfcompose.spec.language import RosArguments
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def ros_arguments(argv: Sequence[str]) -> RosArguments:
+    """Return what follows ``--ros-args``.
+
+    Raises:
+        SystemExit: after saying that one is not for a whole robot.
+    """
+    arguments, rest = RosArguments(), list(argv)
+    while rest:
+        flag = rest.pop(0)
+        rule = rest.pop(0) if rest and flag in _ROS_FLAGS else ""
+        old, sign, new = rule.partition(":=")
+        if not sign or not old or not new:
+            fail(f"--ros-args: {f'{flag} {rule}'.strip()} is none of {_TAKEN}", UNREADABLE)
+        if flag in _REMAP_FLAGS and old == "__ns":
+            try:
+                arguments = replace(arguments, namespace=namespace(new))
+            except ArgumentTypeError as error:
+                fail(f"--ros-args: {error}", UNREADABLE)
+        elif flag in _REMAP_FLAGS and not old.startswith("__"):
+            arguments = replace(arguments, remap={**arguments.remap, old: new})
+        elif flag in _PARAM_FLAGS and old == "use_sim_time" and new.lower() in {"true", "false"}:
+            arguments = replace(arguments, use_sim_time=new.lower() == "true")
+        else:
+            advice = "names and parameters of one node are in the robot file"
+            fail(f"--ros-args: {flag} {rule} is none of {_TAKEN}; {advice}", UNREADABLE)
+    return arguments
+
+
+_REMAP_FLAGS, _PARAM_FLAGS = frozenset({"-r", "--remap"}), frozenset({"-p", "--param"})
+_ROS_FLAGS = _REMAP_FLAGS | _PARAM_FLAGS
+_TAKEN = "-r __ns:=NAMESPACE, -r FROM:=TO and -p use_sim_time:=true"

@@ -26,8 +26,9 @@ TOPICS = ("/tf", "/tf_static")
 class Sender:
     """One of the relay's publishers: it keeps what it is given."""
 
-    def __init__(self, node: Bus, *, static: bool, topic: str) -> None:
+    def __init__(self, node: Bus, *, static: bool, topic: str, qos: int | None = None) -> None:
         node.senders.append(self)
+        self.depth = qos
         self.static, self.topic = static, topic
         self.publisher = self
         self.raw_gid = len(node.senders).to_bytes(16, "big")
@@ -256,3 +257,12 @@ def test_a_remapped_process_receives_the_rest_of_the_tree_and_nothing_of_its_own
     assert running.bus.latched("/drive/tf_static") == [{("map", "odom")}]
     running.observe()
     assert running.bus.latched("/drive/tf_static") == [set()]
+
+
+def test_a_burst_of_more_publishers_than_tf2_keeps_messages_is_kept_for_slow_listeners() -> None:
+    passing = Passing({"slam": ("/slam/tf", "/slam/tf_static")})
+    passing.bus.listeners = {"/slam/tf": 2, "/slam/tf_static": 2}
+    passing.observe()
+    depths = {(one.topic, one.depth) for one in passing.bus.senders}
+    assert depths == {("/tf", relay.KEPT), ("/slam/tf", relay.KEPT), ("/slam/tf_static", None)}
+    assert relay.KEPT >= 2 * 200

@@ -12,7 +12,6 @@ from tfcompose.guard.process import (
     GATHER_BELOW,
     gather_s,
     plans_by_topics,
-    rest_s,
     together,
 )
 from tfcompose.model.messages import Clear, GuardEvent, OwnerReady, TreeComplete
@@ -61,21 +60,6 @@ def test_all_is_clear_and_complete_once_the_last_judge_says_so(
     tell(Clear())
     tell(TreeComplete(2))
     assert reports == [OwnerReady("static"), Clear(), TreeComplete(3)]
-
-
-@pytest.mark.parametrize(
-    ("took_s", "changed", "least_s", "most_s"),
-    [
-        pytest.param(0.001, False, 0.0, CHECK_EVERY_S, id="quick: at each check"),
-        pytest.param(0.015, False, CHECK_EVERY_S, 0.3, id="slow: less often"),
-        pytest.param(1.0, False, 0.3, 0.3, id="stalled: and yet soon"),
-        pytest.param(0.015, True, 0.0, 0.0, id="changed: at the next check"),
-    ],
-)
-def test_the_graph_is_left_alone_for_longer_the_longer_an_inquiry_takes(
-    took_s: float, *, changed: bool, least_s: float, most_s: float
-) -> None:
-    assert least_s <= rest_s(took_s, changed=changed) <= most_s
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,60 @@ def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_alone_re
     assert "leaseAnnouncement" not in (commands["slam"].fence or ("", ""))[1]
 
 
+NAMESPACE = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
+IGNORES_ITSELF = "fastdds.ignore_local_endpoints"
+
+
+def participant_properties(command: ChildCommand) -> dict[str | None, str | None]:
+    """Return the properties that a command's fence gives its participants."""
+    assert command.fence
+    root = ET.fromstring(command.fence[1])  # noqa: S314 (made here)
+    path = "participant[@is_default_profile='true']/rtps/propertiesPolicy/properties/property"
+    path = "/".join(f"{NAMESPACE}{step}" for step in path.split("/"))
+    return {
+        one.findtext(f"{NAMESPACE}name"): one.findtext(f"{NAMESPACE}value")
+        for one in root.findall(f".//{path}")
+    }
+
+
+def with_participant(properties: str) -> str:
+    return (
+        f'<dds xmlns="{NAMESPACE[1:-1]}"><profiles><participant profile_name="mine" '
+        'is_default_profile="true"><rtps><name>n</name><propertiesPolicy><properties>'
+        f"{properties}</properties></propertiesPolicy></rtps></participant></profiles></dds>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("users", "expected"),
+    [
+        pytest.param("", {IGNORES_ITSELF: "true"}, id="no file"),
+        pytest.param(f'<dds xmlns="{NAMESPACE[1:-1]}"/>', {IGNORES_ITSELF: "true"}, id="empty"),
+        pytest.param(
+            with_participant("<property><name>a</name><value>b</value></property>"),
+            {"a": "b", IGNORES_ITSELF: "true"},
+            id="another property",
+        ),
+        pytest.param(
+            with_participant(
+                f"<property><name>{IGNORES_ITSELF}</name><value>false</value></property>"
+            ),
+            {IGNORES_ITSELF: "false"},
+            id="decided by the user",
+        ),
+    ],
+)
+def test_a_strict_guard_receives_nothing_of_what_it_sends_itself(
+    tmp_path: Path, users: str, expected: dict[str, str]
+) -> None:
+    (tmp_path / "own.xml").write_text(users)
+    named = str(tmp_path / "own.xml") if users else ""
+    commands, found = inspect(tmp_path, SLAM, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=named)
+    assert found == []
+    assert participant_properties(commands["guard"]) == expected
+    assert IGNORES_ITSELF not in participant_properties(commands["slam"]) or "false" in users
+
+
 #: A file as users have them: the writers' default, one for a topic of TF, and one for another.
 USERS = """<?xml version="1.0" encoding="ISO-8859-1"?>
 <!-- caf\xe9 -->

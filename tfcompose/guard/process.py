@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from tfcompose.guard.ledger import JudgedMessage
     from tfcompose.model.messages import GuardEvent
     from tfcompose.model.plan import Plan, PlanProcess
-    from tfcompose.tf.live.publishers import Message, Publisher
+    from tfcompose.tf.live.publishers import Message
     from tfcompose.tf.live.topics import TFData
     from tfcompose.tf.process import Own
 
@@ -82,10 +82,6 @@ if TYPE_CHECKING:
 CHECK_EVERY_S = 0.1
 #: A check waits so much longer while messages come that are passed on, in seconds.
 LATE_S = 0.05
-#: While the graph stays as it is, the next look at it waits so many times as long as this one
-#: took, and at most this long, in seconds: of two hundred publishers one takes 13 ms of a
-#: processor, and what is to be passed on waits for it.
-REST_PER_INQUIRY, LONGEST_REST_S = 20.0, 0.3
 #: A guard that passes nothing on lets messages gather this long between two steps, in seconds: a
 #: wake-up costs more than a message. After a step that took this many it does not, since readers
 #: keep a thousand.
@@ -125,8 +121,7 @@ class TopicWatch:
         self.judge = judge
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None
-        self._due = self._report_due = self._graph_due = 0.0
-        self._publishers: list[Publisher] = []
+        self._due = self._report_due = 0.0
         self._malformed: dict[bytes | None, None] = {}
         self._known: dict[bytes | None, None] = {}
         self._number_taken = 0
@@ -188,7 +183,7 @@ class TopicWatch:
         # What is under way waits for a check no longer than it must.
         if now >= self._due + (LATE_S if fenced else 0.0):
             self._due = now + CHECK_EVERY_S
-            if not strangers and now >= self._graph_due:  # else they were asked for
+            if not strangers:  # else it was asked for them
                 self._ask_graph(now)
             if self._clock:
                 self.judge.clocks.sent = self._graph.sends_clock()
@@ -213,7 +208,6 @@ class TopicWatch:
         self._known |= dict.fromkeys(strangers)
         if strangers:  # who sends once and goes is in the graph for a moment only
             self._ask_graph(now)
-            self._graph_due = 0.0  # whom the graph did not know yet it may know soon
         self._judge([sent for message in messages for sent in self._take_one(message, now)], now)
         return bool(strangers)
 
@@ -250,8 +244,7 @@ class TopicWatch:
 
     def _ask_graph(self, now: float) -> None:
         """Take who publishes now; what waited for a name may pass."""
-        began, before = time.monotonic(), self._publishers
-        publishers = self._publishers = self._graph.publishers()
+        publishers = self._graph.publishers()
         present = {publisher.gid for publisher in publishers}
         forget_oldest(self._known, present)
         forget_oldest(self._malformed, present)
@@ -262,17 +255,10 @@ class TopicWatch:
                 admitted = self.judge.admits(message, now)
                 self.relay.pass_on(data, message, admitted, self.judge.name_of(data.received.gid))
             self.relay.update(publishers, now)
-        ended = time.monotonic()
-        self._graph_due = ended + rest_s(ended - began, changed=publishers != before)
 
     def _pass_on(self, events: list[GuardEvent]) -> None:
         for event in events:
             self._emit(event)
-
-
-def rest_s(took_s: float, *, changed: bool) -> float:
-    """Return how long the graph is left alone after a look that took so long, in seconds."""
-    return 0.0 if changed else min(REST_PER_INQUIRY * took_s, LONGEST_REST_S)
 
 
 def gather_s(taken: int, *, is_prompt: bool) -> float:

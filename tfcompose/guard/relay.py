@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 #: The parts of a guard's memory that are a sender's fixed edges begin so.
 _LATCHED = "latched:"
+#: The most messages that are kept for listeners that have not received them yet. tf2's depth of
+#: 100 is that of one publisher; all publishers of the robot may send at the same moment.
+KEPT = 500
 #: Of so many senders' edges what was held back is counted.
 MOST_COUNTED = 1000
 NAMED_AT_MOST = 6
@@ -69,7 +72,7 @@ class Relay:
         self._graph = graph
         self._own = own
         self._feedback = feedback
-        self._moving = TFPublisher(node, static=False, topic=graph.topics[0])
+        self._moving = TFPublisher(node, static=False, topic=graph.topics[0], qos=KEPT)
         own.add(self._moving.raw_gid)
         self._fixed: dict[bytes, _Latched] = {}
         self._refused: dict[bytes, None] = {}
@@ -339,6 +342,7 @@ class Feedback:
         return self._node.count_subscribers(topic) > 1  # the first is the node's own
 
     def _publisher(self, topic: str, *, static: bool) -> TFPublisher:
-        publisher = TFPublisher(self._node, static=static, topic=topic)
+        kept = None if static else KEPT
+        publisher = TFPublisher(self._node, static=static, topic=topic, qos=kept)
         self._own.add(publisher.raw_gid)
         return publisher

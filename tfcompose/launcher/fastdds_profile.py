@@ -27,12 +27,15 @@ MOST_BYTES = 1 << 20
 DEEPEST = 100
 _EMPTY = b'<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles/></dds>'
 _PARTITIONS = "partitions"
+#: Fast DDS 2.11 and newer.
+_IGNORES_ITSELF = "fastdds.ignore_local_endpoints"
 
 
 def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partitions: str) -> str:
     """Return a profile file that puts readers or writers of topics into partitions.
 
-    What ``file`` holds stays, but for its comments.
+    What ``file`` holds stays, but for its comments. A process whose readers are moved is the
+    guard: it receives nothing of what it sends itself, which would cost as much as sending it.
 
     Raises:
         RosError: with the reason, if it cannot be read, or puts one of the topics into a partition
@@ -58,14 +61,42 @@ def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partit
             profile.attrib.pop("is_default_profile", None)
             profile.set("profile_name", topic)
             profiles.append(profile)
-        properties = _below(_below(profile, "propertiesPolicy"), "properties")
-        if any((element.findtext("name") or "").strip() == _PARTITIONS for element in properties):
+        if _has_property(profile, _PARTITIONS):
             raise RosError(f"it puts {topic} into a partition itself")
-        added = ET.SubElement(properties, "property")
-        ET.SubElement(added, "name").text = _PARTITIONS
-        ET.SubElement(added, "value").text = partitions
+        _add_property(profile, _PARTITIONS, partitions)
+    if kind == "data_reader":
+        _ignore_own_writers(profiles)
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _ignore_own_writers(profiles: ET.Element) -> None:
+    """Have the process's readers match no writer of the process."""
+    participant = next(
+        (
+            element
+            for element in profiles.iter("participant")
+            if element.get("is_default_profile") == "true"
+        ),
+        None,
+    )
+    if participant is None:
+        attributes = {"profile_name": "tfcompose", "is_default_profile": "true"}
+        participant = ET.SubElement(profiles, "participant", attributes)
+    rtps = _below(participant, "rtps")
+    if not _has_property(rtps, _IGNORES_ITSELF):
+        _add_property(rtps, _IGNORES_ITSELF, "true")
+
+
+def _has_property(entity: ET.Element, name: str) -> bool:
+    properties = _below(_below(entity, "propertiesPolicy"), "properties")
+    return any((element.findtext("name") or "").strip() == name for element in properties)
+
+
+def _add_property(entity: ET.Element, name: str, value: str) -> None:
+    added = ET.SubElement(_below(_below(entity, "propertiesPolicy"), "properties"), "property")
+    ET.SubElement(added, "name").text = name
+    ET.SubElement(added, "value").text = value
 
 
 def _below(parent: ET.Element, name: str) -> ET.Element:

@@ -5,12 +5,18 @@ Who first writes to an idle one may wait for 333 ms.
 
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
 from tests.support import processes
+from tfcompose.launcher.fastdds_profile import with_partitions
 from tfcompose.model.plan import Discovery, RosSettings
-from tfcompose.tf.ros.environment import child_environment
+from tfcompose.tf.ros.environment import (
+    FASTDDS_PROFILE_LOCALHOST,
+    PROFILE_VARIABLES,
+    child_environment,
+)
 
 pytestmark = pytest.mark.ros
 
@@ -62,3 +68,34 @@ def test_what_everybody_sends_has_a_port_of_its_own_at_a_strict_guard(domain: ob
     assert domain
     env = child_environment(os.environ, RosSettings(discovery="localhost"), own=True)
     assert processes.run([sys.executable, "-c", APART], env=env, check=True).stdout == "1\n"
+
+
+#: Says whom a strict guard's reader hears: its own process, another one.
+OWN_AND_ANOTHER = """
+import time
+from tfcompose.tf.ros.node import PublicTFReader, TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import SentTransform, encode
+data = encode([SentTransform(1, "odom", "base", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+with open_node("guard", "/") as node, open_node("another", "/") as other:
+    reader = PublicTFReader(node, "/tf", static=False)
+    own, another = (TFPublisher(each, static=False) for each in (node, other))
+    heard, deadline, further = set(), time.monotonic() + 30, 5
+    while further and time.monotonic() < deadline:
+        for publisher in (own, another):
+            publisher.publish(data)
+        time.sleep(0.05)
+        heard |= {received.gid for received in reader.take()}
+        further -= another.raw_gid in heard
+    print(own.raw_gid in heard, another.raw_gid in heard)
+    reader.close()
+"""
+
+
+def test_what_a_strict_guard_relays_does_not_return_to_it(domain: object, tmp_path: Path) -> None:
+    assert domain
+    profile = tmp_path / "guard.xml"
+    topics = ("/tf", "/tf_static")
+    profile.write_text(with_partitions(FASTDDS_PROFILE_LOCALHOST, "data_reader", topics, "tfc_r"))
+    env = os.environ | dict.fromkeys(PROFILE_VARIABLES, str(profile))
+    output = processes.run([sys.executable, "-c", OWN_AND_ANOTHER], env=env, check=True).stdout
+    assert output == "False True\n"

@@ -17,7 +17,9 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Literal
+from weakref import WeakKeyDictionary
 
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
@@ -29,6 +31,7 @@ from tfcompose.tf.ros.processes import has_ended
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from rclpy.context import Context
     from rclpy.node import Node
     from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -47,6 +50,9 @@ SHOWN_WITHIN_S = 0.5
 #: The names of so many publishers and listeners are remembered.
 MOST_NAMES = 10_000
 
+#: Sizes of a wait set: subscriptions, guard conditions, timers, clients, services, events.
+_ONE_CONDITION = (0, 1, 0, 0, 0, 0)
+
 _says_who: dict[str, bool] = {}
 #: By their ids, the nodes of publishers and listeners that had a name, the last to have it last. A
 #: participant that DDS had given up, as after a gap in the network, returns with its ids, and
@@ -54,6 +60,7 @@ _says_who: dict[str, bool] = {}
 _names: dict[bytes, str] = {}
 #: Where rmw_zenoh's tokens are asked instead of rclpy, the one graph of them.
 _tokens: list[RobotGraph] = []
+_changes: WeakKeyDictionary[Context, GraphChanges] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +80,38 @@ class GraphPublisher:
     durability: Literal["volatile", "transient_local"]
     reliability: Literal["reliable", "best_effort"]
     type: str
+
+
+class GraphChanges:
+    """Counts the changes of the graph that a node discovers.
+
+    rmw triggers one condition for all changes of a context, and a wait takes the trigger away: get
+    the one of a context by ``graph_changes``.
+    """
+
+    def __init__(self, node: Node) -> None:
+        library = rcl()
+        self._condition = library.rcl_node_get_graph_guard_condition(node.handle.pointer)
+        self._wait_set = _rclpy.WaitSet(*_ONE_CONDITION, node.context.handle)
+        self._add = library.rcl_wait_set_add_guard_condition
+        self._count = 0
+
+    def count(self) -> int:
+        """Return how many times a change was found until now; it waits for nothing."""
+        self._wait_set.clear_entities()
+        if _tokens or self._add(self._wait_set.pointer, self._condition, None):
+            self._count += 1  # nothing says whether it changed
+            return self._count
+        self._wait_set.wait(0)
+        self._count += self._wait_set.is_ready("guard_condition", 0)
+        return self._count
+
+
+def graph_changes(node: Node) -> GraphChanges:
+    """Return what counts the changes of the graph in the node's context."""
+    if node.context not in _changes:
+        _changes[node.context] = GraphChanges(node)
+    return _changes[node.context]
 
 
 def writers(node: Node, topic: str) -> list[GraphPublisher]:
@@ -346,6 +385,9 @@ def rcl() -> ctypes.CDLL:
     library.rcutils_reset_error.argtypes = ()
     library.rcutils_reset_error.restype = None
     library.rcl_take_serialized_message.argtypes = (ctypes.c_void_p,) * 4
+    library.rcl_node_get_graph_guard_condition.restype = ctypes.c_void_p
+    library.rcl_node_get_graph_guard_condition.argtypes = (ctypes.c_void_p,)
+    library.rcl_wait_set_add_guard_condition.argtypes = (ctypes.c_void_p,) * 3
     library.rcl_node_get_rmw_handle.restype = ctypes.c_void_p
     library.rcl_node_get_rmw_handle.argtypes = (ctypes.c_void_p,)
     library.rmw_create_subscription.restype = ctypes.c_void_p

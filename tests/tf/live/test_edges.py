@@ -55,6 +55,39 @@ def test_rate_jitter_gaps_and_delays_are_those_of_the_standard_library() -> None
     assert observed.data_age_s == pytest.approx(delays[-1] / S)
 
 
+@pytest.mark.parametrize("pause_s", [6, 25])
+def test_after_a_pause_longer_than_the_window_the_rate_is_at_once_that_since_it(
+    pause_s: int,
+) -> None:
+    observer, at = TreeObserver(window_s=5.0), 0
+
+    def send(seconds: float, hertz: int = 20) -> None:
+        nonlocal at
+        for _ in range(round(seconds * hertz)):
+            at += S // hertz
+            take(observer, "odom base_link", at)
+
+    send(8.0)
+    at += pause_s * S - S // 20
+    send(1.0)
+    timing = only(observer, at).timing
+    assert timing.rate == pytest.approx(20)
+    assert timing.longest_gap_s == pytest.approx(pause_s)
+    assert timing.since_gap_s == pytest.approx(0.95)
+    assert (only(observer, at + 2 * S).timing.rate or 20) < 10, "it falls while nothing comes"
+    send(4.5)
+    assert only(observer, at).timing.longest_gap_s == pytest.approx(0.05)
+
+
+def test_an_edge_that_comes_less_often_than_the_window_is_long_has_its_rate() -> None:
+    observer = TreeObserver(window_s=2.0)
+    for at in range(0, 100 * S, 10 * S):
+        take(observer, "map odom", S + at)
+    timing = only(observer, 91 * S).timing
+    assert timing.rate == pytest.approx(0.1)
+    assert timing.longest_gap_s == pytest.approx(10)
+
+
 def test_a_window_forgets_what_was_before_it_and_a_rate_falls_while_nothing_comes() -> None:
     observer = TreeObserver(window_s=2.0)
     at = 0

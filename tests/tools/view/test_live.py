@@ -20,7 +20,7 @@ from tfcompose.model.robot import Robot
 from tfcompose.tf.live.edges import TreeObserver
 from tfcompose.tf.live.publishers import Publisher
 from tfcompose.tools.view.forest import FrameForest, pose_of, row_of
-from tfcompose.tools.view.live import FOUND_S, LiveTree
+from tfcompose.tools.view.live import FOUND_S, OVER_S, LiveTree
 
 TEXT = """
 tfcompose: 1
@@ -197,6 +197,24 @@ def test_a_silent_edge_is_red() -> None:
     judgement = live.tree.judge(8.0)
     assert judgement.wrong == {"base_link"}
     assert {one.code for one in judgement.found} == {"TF804"}
+
+
+@pytest.mark.parametrize("silence_s", [2.0, 25.0])
+def test_a_silence_that_is_over_is_red_for_some_seconds_only(silence_s: float) -> None:
+    live = Live()
+    live.run(8.0)
+
+    def send(seconds: float, begun_s: float) -> float:
+        for tick in range(round(seconds * 20)):
+            live.send(DRIVE, begun_s + tick / 20, ("odom", "base_link", Pose((1, 0, 0))))
+        return begun_s + seconds
+
+    at_s = send(OVER_S - 0.5, 8.0 + silence_s)
+    [found] = live.tree.judge(at_s).found
+    assert found.code == "TF804"
+    assert live.tree.judgement.wrong == {"base_link"}
+    at_s = send(1.0, at_s)
+    assert not live.tree.judge(at_s).found
 
 
 def test_what_may_still_come_is_not_missing() -> None:

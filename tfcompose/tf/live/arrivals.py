@@ -10,6 +10,9 @@ from math import sqrt
 
 #: tf2's buffers keep 10 s: a stamp that is farther off cannot be looked up together with the rest.
 KEPT_NS = 10_000_000_000
+#: A gap that is longer than the window, and than this many usual ones, is a pause: rates begin
+#: anew after it.
+PAUSE = 10.0
 
 
 @dataclass(slots=True)
@@ -21,17 +24,19 @@ class _Sums:
     gaps_ns: int = 0
     squares: float = 0.0  # of gaps in seconds
     longest_ns: int = 0
+    longest_ended_ns: int = 0
     delays: int = 0
     delays_ns: int = 0
     least_ns: int = 0
     most_ns: int = 0
 
-    def gap(self, gap_ns: int) -> None:
+    def gap(self, gap_ns: int, at_ns: int) -> None:
         self.gaps += 1
         self.gaps_ns += gap_ns
         gap_s = gap_ns * 1e-9
         self.squares += gap_s * gap_s
-        self.longest_ns = max(self.longest_ns, gap_ns)
+        if gap_ns >= self.longest_ns:
+            self.longest_ns, self.longest_ended_ns = gap_ns, at_ns
 
     def delay(self, delay_ns: int) -> None:
         if self.delays == 0:
@@ -45,13 +50,15 @@ class _Sums:
 
     def plus(self, other: _Sums) -> _Sums:
         """Return both together."""
+        longest = max(self, other, key=lambda each: (each.longest_ns, each.longest_ended_ns))
         spans = [(each.least_ns, each.most_ns) for each in (self, other) if each.delays]
         return _Sums(
             self.begun_ns,
             self.gaps + other.gaps,
             self.gaps_ns + other.gaps_ns,
             self.squares + other.squares,
-            max(self.longest_ns, other.longest_ns),
+            longest.longest_ns,
+            longest.longest_ended_ns,
             self.delays + other.delays,
             self.delays_ns + other.delays_ns,
             min((low for low, _ in spans), default=0),
@@ -67,6 +74,7 @@ class Timing:
         rate: arrivals a second, in hertz; it falls while nothing comes.
         jitter_s: the standard deviation of the time between two arrivals.
         longest_gap_s: the longest time between two arrivals.
+        since_gap_s: how long ago that ended.
         delay_s: the mean of arrival minus stamp; negative: stamped ahead of the receiver's clock.
         least_delay_s: the least of these.
         most_delay_s: the largest of these.
@@ -75,6 +83,7 @@ class Timing:
     rate: float | None = None
     jitter_s: float | None = None
     longest_gap_s: float | None = None
+    since_gap_s: float | None = None
     delay_s: float | None = None
     least_delay_s: float | None = None
     most_delay_s: float | None = None
@@ -83,6 +92,9 @@ class Timing:
 @dataclass(slots=True)
 class Arrivals:
     """Counts arrivals over the last one to two ``window_ns``, or over all if that is 0.
+
+    A pause that was longer than the window counts as the longest gap for one window, and in
+    nothing else.
 
     Of arrivals in the first ``settle_ns`` only the number counts: a new subscriber gets at once
     what was kept for it.
@@ -94,6 +106,8 @@ class Arrivals:
     last_ns: int = 0
     _now: _Sums = field(default_factory=_Sums)
     _before: _Sums = field(default_factory=_Sums)
+    _pause_ns: int = 0
+    _resumed_ns: int = 0
 
     def arrived(self, at_ns: int, delay_ns: int | None) -> None:
         """Note an arrival, and how old its stamp was where that is known."""
@@ -105,12 +119,24 @@ class Arrivals:
             return
         else:
             self.settle_ns = 0
-            if self.window_ns and at_ns - self._now.begun_ns > self.window_ns:
-                self._before, self._now = self._now, _Sums(at_ns)
-            self._now.gap(max(0, at_ns - self.last_ns))
+            self._take_gap(max(0, at_ns - self.last_ns), at_ns)
         self.last_ns = at_ns
         if delay_ns is not None and not self.settle_ns:
             self._now.delay(delay_ns)
+
+    def _take_gap(self, gap_ns: int, at_ns: int) -> None:
+        if self.window_ns and at_ns - self._now.begun_ns > self.window_ns:
+            if self._is_pause(gap_ns):
+                self._before, self._now = _Sums(), _Sums(at_ns)
+                self._pause_ns, self._resumed_ns = gap_ns, at_ns
+                return
+            self._before, self._now = self._now, _Sums(at_ns)
+        self._now.gap(gap_ns, at_ns)
+
+    def _is_pause(self, gap_ns: int) -> bool:
+        sums = self._before.plus(self._now)
+        is_unusual = gap_ns * sums.gaps > PAUSE * sums.gaps_ns
+        return gap_ns > self.window_ns and is_unusual
 
     def resumed(self, at_ns: int) -> None:
         """Note an arrival after a pause that is no gap."""
@@ -130,15 +156,21 @@ class Arrivals:
                 sums.least_ns * 1e-9,
                 sums.most_ns * 1e-9,
             )
+        longest_ns, ended_ns = sums.longest_ns, sums.longest_ended_ns
+        if self._pause_ns and now_ns - self._resumed_ns <= self.window_ns:
+            longest_ns, ended_ns = self._pause_ns, self._resumed_ns
+        longest: tuple[float | None, float | None] = (None, None)
+        if ended_ns:
+            longest = (longest_ns * 1e-9, (now_ns - ended_ns) * 1e-9)
         if not sums.gaps:
-            return Timing(None, None, None, *delays)
+            return Timing(None, None, *longest, *delays)
         mean_s = sums.gaps_ns / sums.gaps * 1e-9
         open_gap_ns = max(0, now_ns - self.last_ns - sums.longest_ns)
         total_s = (sums.gaps_ns + open_gap_ns) * 1e-9
         return Timing(
             sums.gaps / total_s if total_s > 0 else None,
             sqrt(max(0.0, sums.squares / sums.gaps - mean_s * mean_s)) if sums.gaps > 1 else None,
-            sums.longest_ns * 1e-9,
+            *longest,
             *delays,
         )
 

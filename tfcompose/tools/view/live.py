@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 #: Publishers that were there before are found within this time; until then nothing is missing.
 FOUND_S = 2.5
 _MISSING = frozenset({"TF804", "TF811"})
+#: How long a silence that is over is shown after it.
+OVER_S = 3.0
 
 
 class LiveTree(ShownTree):
@@ -104,8 +106,13 @@ class LiveTree(ShownTree):
 def _counts(difference: Difference, listened_s: float) -> bool:
     """Return whether it is so now.
 
-    Neither of somebody who has left, nor of what may still come.
+    Neither of a publisher that has left, nor of what may still come, nor of a silence that ended
+    a while ago.
     """
+    if difference.over and difference.live is not None:
+        since_s = difference.live.timing.since_gap_s
+        if since_s is not None and since_s > OVER_S:
+            return False
     if (
         difference.fault is not None
         and difference.live is not None

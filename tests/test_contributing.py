@@ -38,6 +38,7 @@ NEW = {
     "tfcompose/data/presets/hokuyo/uam-05lp.yaml",
     "tfcompose/cli/commands/frames.py",
     "tfcompose/tools/exporters/procfile.py",
+    "tests/benchmarks/suite/tree.py",
 }
 
 

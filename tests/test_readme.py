@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tests.benchmarks import results
+from tests.benchmarks import pages, record
 from tests.support import pictures, processes
 from tests.support.cli import tfcompose_in
 from tfcompose.__main__ import PROCESSES
@@ -25,6 +25,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS, TOPICS = all_commands(), topics()
 FOLDERS = (FOLDER, *(tool.topic_folder for tool in shipped().tools))
 PAGES = {file.stem: file.read_text("utf-8") for folder in FOLDERS for file in folder.glob("*.md")}
+RECORD = record.read()
 EVERYTHING = "\n".join((README, *PAGES.values()))
 
 
@@ -255,21 +256,18 @@ def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
     assert all("pip install -c constraints.txt -e " in command for command in commands)
 
 
-def test_its_figures_are_those_that_benchmarks_wrote() -> None:
+def test_its_tables_are_those_of_the_record() -> None:
     for text in (README, *PAGES.values()):
-        assert results.rewritten(text) == text, "python -m tests.benchmarks.results --write"
+        assert pages.with_tables(text, RECORD) == text, "python -m tests.benchmarks.pages"
 
 
-def test_every_file_of_figures_is_printed_and_says_where_it_is_from() -> None:
-    files = {file.stem for file in results.FOLDER.glob("*.json")}
-    assert files == results.named(EVERYTHING)
-    for name in files:
-        found = results.recorded(name)
-        assert (ROOT / "tests" / "benchmarks" / f"bench_{name}.py").is_file()
-        assert found["command"] == f"python -m tests.benchmarks.bench_{name} --record"
-        assert re.fullmatch(r"\d{4}-\d\d-\d\d", found["date"])
-        assert found["load"] >= 0
-        assert {"processor", "cores", "memory_gb", "system", "python"} == found["machine"].keys()
+def test_every_recorded_benchmark_is_printed_and_says_where_it_is_from() -> None:
+    assert pages.quoted(EVERYTHING) >= RECORD.keys()
+    for name, result in RECORD.items():
+        assert result.command == f"python -m tests.benchmarks --only {name}"
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", result.date)
+        assert min(result.load) >= 0
+        assert {"processor", "cores", "memory_gb", "system", "python"} == result.machine.keys()
 
 
 #: Measures of time, memory and processors, as prose and tables write them; what an example prints
@@ -281,7 +279,7 @@ SET = {"8 MB", "1 MB", "64 MB", "100 ms"}
 
 def test_no_other_figure_is_printed() -> None:
     prose = re.sub(r"^```.*?^```", "", EVERYTHING, flags=re.MULTILINE | re.DOTALL)
-    recorded = "".join(str(results.recorded(name)["rows"]) for name in results.named(EVERYTHING))
+    recorded = "".join(map(pages.tables_of, (README, *PAGES.values())))
     assert [
         figure
         for figure in re.findall(FIGURE, prose)

@@ -89,7 +89,7 @@ def add_trust(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--trust",
         action="store_true",
-        help="run xacro and launch files of your own without the sandbox: see help sandbox",
+        help="run your own xacro and launch files without the sandbox; see help sandbox",
     )
 
 
@@ -121,7 +121,7 @@ def add_frames(parser: ArgumentParser) -> None:
 
 
 def add_robot(
-    parser: ArgumentParser, default: str = "the one in this ROS domain, or of ./robot.yaml"
+    parser: ArgumentParser, default: str = "the one in this ROS domain, or that of ./robot.yaml"
 ) -> None:
     """Add --robot."""
     parser.add_argument(
@@ -160,9 +160,7 @@ def add_tolerance(parser: ArgumentParser) -> None:
         type=tolerance,
         default=TOLERANCE,
         metavar="T",
-        help=(
-            f"how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: {TOLERANCE}"
-        ),
+        help=(f"allowed deviation: 2mm, 0.5deg, or both as 2mm,0.5deg; default: {TOLERANCE}"),
     )
 
 

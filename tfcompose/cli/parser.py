@@ -234,8 +234,8 @@ def help_text() -> str:
     return (
         "usage: tfcompose COMMAND [OPTION …]\n\n"
         "One YAML file says which frames a robot has and who publishes each TF edge.\n"
-        "tfcompose checks it, builds it, starts it, and names any node that publishes\n"
-        "an edge owned by another.\n\n"
+        "tfcompose checks it, builds it, starts it, and reports any node that\n"
+        "publishes an edge it does not own.\n\n"
         + "\n".join(sections)
         + "\noptions:\n  -V, --version  print the version\n"
         "  -h, --help     print this help; after a command: its options\n\n"

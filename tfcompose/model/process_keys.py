@@ -534,7 +534,7 @@ NODE_KEYS = (
     ProcessKey(
         name="log_level",
         type=LogLevel,
-        help="the level of its nodes' loggers",
+        help="the log level of its nodes",
         to=PROGRAM,
         is_shared=True,
         shown=_nothing,
@@ -562,7 +562,7 @@ SURROUNDING_KEYS = (
     ProcessKey(
         name="cwd",
         type=Folder,
-        help="the folder that it runs in, relative to this file; default: where up is called",
+        help="its working directory, relative to this file; default: that of up",
         examples=("maps",),
         to=PROGRAM,
         is_shared=True,
@@ -573,7 +573,7 @@ SURROUNDING_KEYS = (
         name="output",
         type=OutputPlace,
         default="both",
-        help="where its output goes: to the terminal of up and into its log, or to one of them",
+        help="destination of its output: the terminal of up, its log, or both",
         to=STARTED,
         shown=_output_lines,
         launch=LaunchDialect(
@@ -584,7 +584,7 @@ SURROUNDING_KEYS = (
         name="emulate_tty",
         type=bool,
         default=False,
-        help="true: it writes to a pseudo-terminal, line by line and in colours",
+        help="true: it writes to a pseudo-terminal, by line and in colour",
         to=PROGRAM,
         shown=_terminal_lines,
         launch=LaunchDialect(
@@ -598,8 +598,8 @@ SUPERVISION_KEYS = (
         name="required",
         type=bool,
         help=(
-            "true: its end stops everything, unless another process waits until it is done;"
-            " false: the rest goes on when it fails; default: its failure stops everything"
+            "true: the robot stops when it exits, unless another process waits until it is "
+            "done; false: the robot goes on if it fails; default: the robot stops if it fails"
         ),
         to=KEPT_ALIVE,
         shown=_required_lines,
@@ -617,7 +617,7 @@ SUPERVISION_KEYS = (
         name="restart",
         type=RestartPolicy,
         default="no",
-        help="when it is started again after it has ended",
+        help="when to restart it",
         to=KEPT_ALIVE,
         is_shared=True,
         habits=(("respawn", "restart: on-failure, or always, starts it again"),),
@@ -636,7 +636,7 @@ SUPERVISION_KEYS = (
     ProcessKey(
         name="max_restarts",
         type=Integer(0, 1_000_000),
-        help="how often in a row it is started again before it is given up",
+        help="restarts in a row before tfcompose gives up",
         examples=(5,),
         to=KEPT_ALIVE,
         is_shared=True,
@@ -654,8 +654,7 @@ SUPERVISION_KEYS = (
     ProcessKey(
         name="restart_delay",
         type=Seconds,
-        help="how long after its end it is started again; default: 1 s, doubled each time, up to"
-        " 30 s",
+        help="delay of a restart; default: 1 s, doubled each time, up to 30 s",
         to=KEPT_ALIVE,
         is_shared=True,
         habits=(("respawn_delay", "how long after its end is restart_delay: 2 s"),),
@@ -672,7 +671,7 @@ SUPERVISION_KEYS = (
         name="prefix",
         type=tuple[str, ...],
         default=(),
-        help="a program that runs it, with its arguments: gdb, valgrind, nice, …",
+        help="a wrapper command with its arguments: gdb, valgrind, nice, …",
         examples=(["nice", "-n", "10"],),
         to=PROGRAM,
         habits=(("launch_prefix", "a program that runs it is prefix: [nice, -n, '10']"),),
@@ -687,7 +686,7 @@ SUPERVISION_KEYS = (
     ProcessKey(
         name="schedule",
         type=Schedule,
-        help="its processors and real-time priority",
+        help="its CPUs and real-time priority",
         examples=({"cpus": [2, 3], "priority": 80},),
         to=NOT_EXTERNAL,
         is_shared=True,
@@ -704,8 +703,8 @@ SUPERVISION_KEYS = (
     ProcessKey(
         name="oom_score_adj",
         type=Integer(-1000, 1000),
-        help="which processes the kernel ends first when memory runs out: 1000 first, -1000 never;"
-        " default: as the launcher",
+        help="preference of the kernel to kill it if memory runs out: 1000 first, -1000 never; "
+        "default: the launcher's",
         examples=(500,),
         to=NOT_EXTERNAL,
         is_shared=True,
@@ -717,7 +716,7 @@ SUPERVISION_KEYS = (
     ProcessKey(
         name="open_files",
         type=Integer(16, 2**30),
-        help="how many files, sockets and pipes it may have open; default: as the launcher",
+        help="the most files, sockets and pipes it may have open; default: the launcher's",
         examples=(4096,),
         to=NOT_EXTERNAL,
         is_shared=True,
@@ -730,7 +729,7 @@ SUPERVISION_KEYS = (
     ProcessKey(
         name="stop",
         type=StopRule,
-        help="how it is stopped",
+        help="how to stop it",
         examples=({"signal": "SIGTERM", "timeout": "5 s"},),
         to=ENDED,
         is_shared=True,
@@ -759,7 +758,7 @@ EXTRA_ARGUMENTS = ProcessKey(
     name="extra_arguments",
     type=dict[str, Any],
     default={},
-    help="what the container is told about the component",
+    help="options for the container, about the component",
     examples=({"use_intra_process_comms": True},),
     to=LOADED,
     shown=_extra_lines,

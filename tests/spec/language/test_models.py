@@ -178,7 +178,7 @@ def test_thousands_of_faults_are_all_found_with_two_readings(
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ("sensors", ["sensors on their mounts", "## Sensor", "`place`"]),
+        ("sensors", ["sensors and their mounts", "## Sensor", "`place`"]),
         ("sensors.place", ["## sensors.NAME.place", "`camera_color_optical_frame`"]),
         ("sensors.front_camera.place", ["## sensors.NAME.place"]),
         ("place", ["## sensors.NAME.place", "## parts.NAME.place"]),

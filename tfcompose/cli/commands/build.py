@@ -1,7 +1,7 @@
-"""Write the URDF, the plan and all other files, or none of them.
+"""Write the URDF, the plan and other files, or none of them.
 
 Write plan.json, URDF and xacro files, tree.txt, tree.svg and the parameter files of drivers and
-nodes. If one of them cannot be written, none is.
+nodes, or none of them on an error.
 """
 
 from __future__ import annotations
@@ -25,16 +25,15 @@ def arguments(parser: ArgumentParser) -> None:
         choices=("package", "file", "relative"),
         default="as-written",
         help=(
-            "how to address meshes: package://…, file:///…, or relative to DIR; default: as "
-            "written"
+            "addresses of meshes: package://…, file:///…, or relative to DIR; default: as in "
+            "the source"
         ),
     )
     parser.add_argument(
         "--read-back",
         action="store_true",
-        help="parse the URDF again with yourdfpy, and write nothing if links, joints, poses, "
-        "limits, masses, shapes or "
-        "materials differ from the robot's; needs tfcompose[view]",
+        help="parse the URDF with yourdfpy, and write nothing if its links, joints, poses, "
+        "limits, masses, shapes or materials differ from the robot; needs tfcompose[view]",
     )
 
 

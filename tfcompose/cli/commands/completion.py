@@ -1,4 +1,4 @@
-"""Print what completes commands in bash, zsh or fish.
+"""Print a completion script for bash, zsh or fish.
 
 Print a script for the shell. It completes commands, options and their values, presets, codes,
 profiles, frames of the robot file, and robots and processes that run: eval "$(tfcompose completion

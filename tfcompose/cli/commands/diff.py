@@ -1,7 +1,7 @@
 """Show what moved or changed owner between two robot files.
 
-Print what moved from OLD to NEW, in millimetres and degrees, and which frames were added or
-removed, or got another parent or owner. Exit code 1 if anything differs.
+Print the frames that moved between OLD and NEW, in millimetres and degrees, and frames that were
+added, removed, or got another parent or owner. Exit 1 on a difference.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Diagnose the running tree: what is wrong, and what to do.
+"""Diagnose the running tree.
 
-Listen to the running system for a few seconds and report what is wrong: disconnected trees, loops,
-two publishers of one edge, stamps that no lookup can match, low rates, frames that no listener
+Listen to the running system for a few seconds and report problems: disconnected trees, loops, two
+publishers of one edge, stamps that no lookup can match, low rates, frames that no listener
 receives, a silent /clock, missing joint states, settings that prevent discovery. Each finding
-names the node and the numbers. It also checks what to expect, if a robot file or a built plan is
-given, or a robot of tfcompose runs in this ROS domain. Ctrl-C ends it early and prints what was
-found.
+names the node and the numbers. With a robot file, a built plan, or a robot of tfcompose in this
+ROS domain, also check for the expected edges. Ctrl-C ends it early and prints the findings so
+far.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def arguments(parser: ArgumentParser) -> None:
         "file",
         nargs="?",
         metavar="FILE|PLAN",
-        help="expected tree; default: of the robot that runs in this ROS domain",
+        help="the expected tree; default: the robot that runs in this ROS domain",
     )
     add_variant(parser)
     add_for(parser, "listen for S seconds; default: 5", 5.0)

@@ -1,7 +1,7 @@
 """Stop a running robot.
 
-Stop everything in reverse order of the start, and wait until it has ended. --leftovers instead
-stops processes that an earlier run of the robot left behind.
+Stop the robot's processes in reverse order, and wait until they have ended. With --leftovers,
+stop processes that an earlier run left behind.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Print the live pose of frame B in frame A.
 
-Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch yaw
-about fixed axes in radians and degrees. If there is none, say why and exit 1. Without --once it
-repeats until Ctrl-C. With --bag it reads a recording: with --once the first pose, with --at the
-one at that time.
+Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch
+yaw about fixed axes in radians and degrees. If there is no pose, say why and exit 1. Without
+--once, repeat until Ctrl-C. With --bag, read a recording: with --once the first pose, with --at
+the pose at that time.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Print past events of a running robot, then follow.
 
-Print all events since the start, then each new one as it comes, until the robot ends.
+Print all events since the start, then new events until the robot ends.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Explain a code, or the chain between two frames.
 
-Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, given two
-frames of FILE, show the chain from A to B: each edge with its owner and pose, where each of its
-values comes from, and what it replaced.
+Explain a code (TF301) or a rule's name: the problem, its effect and its fix. Or show the chain
+between two frames of FILE: each edge with its owner and pose, the location of each value, and of
+the value it replaced.
 """
 
 from __future__ import annotations

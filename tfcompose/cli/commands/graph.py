@@ -2,8 +2,8 @@
 
 Draw the tree: frames coloured by owner, fixed and moving edges, each sensor in a box. The suffix
 of the file selects the format: .svg, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or
---bag, draw the published tree, coloured by publisher, with second parents and loops as they are,
-and with FILE also what is missing.
+--bag, draw the published tree, coloured by publisher, including second parents and loops. With
+FILE, also draw missing frames.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--live",
         action="store_true",
-        help="draw the tree that is published now, with FILE also what is missing",
+        help="draw the tree that is published now; with FILE, also missing frames",
     )
     add_bag(parser, "draw the tree of a recording")
     add_for(parser, "with --live: observe for S seconds; default: 3")
@@ -69,14 +69,14 @@ def arguments(parser: ArgumentParser) -> None:
         choices=("auto", "right", "down", "columns"),
         default="auto",
         help=(
-            "where children are; default: auto, which is right unless that is too wide or too "
-            "tall for a page"
+            "direction from parent to child; default: auto: right, unless the page would be "
+            "too wide or too tall"
         ),
     )
     parser.add_argument(
         "--collapse",
         action="store_true",
-        help="draw of each sensor only its mount and what leads to other frames",
+        help="for each sensor, draw only its mount and the frames between it and other frames",
     )
 
 

@@ -1,7 +1,7 @@
-"""Write a robot file to begin with.
+"""Write a first robot file.
 
-Write a small, commented robot file that lints and starts at once, and print the next commands.
-Nothing that is there is overwritten.
+Write a small, commented robot file, and print the next commands. The file has no findings and can
+be started at once. Existing files are not overwritten.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--schema",
         action="store_true",
-        help=f"also write {SCHEMA}, with which editors complete and check the file",
+        help=f"also write {SCHEMA}, for completion and checks in editors",
     )
     parser.add_argument("--list", action="store_true", help="list the templates and exit")
 

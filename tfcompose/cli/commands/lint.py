@@ -1,7 +1,7 @@
 """Check robot files and report every problem; needs no ROS.
 
-Report every problem in robot files, with its place. Each file is checked alone and with each of
-its profiles, and alone in the combinations of values that its args can have.
+Report every problem in robot files, with its location. Check each file without a profile, with
+each of its profiles, and with the combinations of values of its args.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def arguments(parser: ArgumentParser) -> None:
         dest="urdfs",
         help="check FILE as a URDF or xacro file, whatever its suffix; repeatable",
     )
-    add_variant(parser, "check only this combination")
+    add_variant(parser, "check only with this profile")
     add_format(parser, "json", "sarif", "github", "junit")
     parser.add_argument(
         "--fix", action="store_true", help="apply unambiguous fixes to the named files"
@@ -68,7 +68,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--diff",
         action="store_true",
-        help="print what --fix would change, and write nothing; exit code 1 if anything",
+        help="print the changes of --fix, and write nothing; exit 1 if there are any",
     )
     parser.add_argument(
         "--fail-on",
@@ -83,8 +83,8 @@ def arguments(parser: ArgumentParser) -> None:
         default=[],
         metavar="CODES",
         help=(
-            "report only these codes, or codes that begin so: TF401,TF7; what prevents a build "
-            "is always reported"
+            "report only these codes or prefixes (TF401,TF7); errors that prevent a build are "
+            "always reported"
         ),
     )
     parser.add_argument(
@@ -98,7 +98,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--all",
         action="store_true",
-        help=f"print each finding, not {MOST_OF_ONE_CODE} of one code of a file and how many more",
+        help=f"print all findings, not only the first {MOST_OF_ONE_CODE} per code and file",
     )
     parser.add_argument(
         "--skip-foreign",
@@ -109,8 +109,7 @@ def arguments(parser: ArgumentParser) -> None:
         "--untrusted",
         action="store_true",
         help=(
-            "for files of strangers, as in CI: read nothing but a robot's own tree, and no "
-            "environment"
+            "for files of strangers, as in CI: read only the robot's own tree, and no environment"
         ),
     )
     parser.add_argument(

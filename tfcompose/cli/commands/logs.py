@@ -1,8 +1,7 @@
-"""Print the logs of a robot's processes, also after it has ended.
+"""Print the logs of a robot's processes, also after its end.
 
-Print the logs of the robot's run, or of its last one where it has ended, oldest line first. Logs
-are kept on disk and rotated, those of earlier runs too. Lines of the launcher itself are those of
-tfcompose.
+Print the logs of the current run, or of the last run if the robot has ended, oldest line first.
+Logs of earlier runs are kept too, and rotated. The launcher's own lines have the name tfcompose.
 """
 
 from __future__ import annotations
@@ -52,8 +51,8 @@ def arguments(parser: ArgumentParser) -> None:
         "--since",
         type=since,
         metavar="TIME",
-        help="begin so long ago (90s, 10m, 2h, 3d) or at a time (14:03, 2026-11-26T14:03), in "
-        "earlier runs too",
+        help="begin this long ago (90s, 10m, 2h, 3d) or at this time (14:03, 2026-11-26T14:03), "
+        "also in earlier runs",
     )
     past.add_argument("--previous", action="store_true", help="print the run before this one")
     add_robot(parser)

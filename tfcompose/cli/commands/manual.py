@@ -1,8 +1,8 @@
 """Explain a topic or a command, or write the whole documentation as one HTML file.
 
-Print the page of a topic, such as language or guard; the options of a command, with its page; or
-what a key of a robot file means: help sensors, help sensors.place. Without a word, list commands
-and topics.
+Print the page of a topic, such as language or guard; the options and the page of a command; or
+the meaning of a key of the robot file: help sensors, help sensors.place. Without an argument,
+list commands and topics.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("word", nargs="?", metavar="TOPIC|COMMAND|KEY", help="what to explain")
+    parser.add_argument(
+        "word", nargs="?", metavar="TOPIC|COMMAND|KEY", help="a topic, a command or a key"
+    )
     parser.add_argument(
         "--html", metavar="FILE", help="write all topics and commands to FILE, as one page"
     )

@@ -1,11 +1,11 @@
-"""Show who publishes each live edge, how often, how evenly and how late.
+"""Show publisher, rate, jitter and delay of each live edge.
 
 Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the
 standard deviation of the time between messages), longest gap, age of the newest stamp, and delay
 (arrival minus stamp), over the last 5 to 10 s, or over everything with --for or --bag. On a
-terminal the table refreshes in place until Ctrl-C; into a pipe each table follows the last. With A
-and B only the edges between them are shown, in their order, and the net delay: how old the newest
-pose of B in A is.
+terminal the table refreshes in place until Ctrl-C; into a pipe each table follows the last. With
+A and B, show only the edges between them, in order, and the net delay: the age of the newest pose
+of B in A.
 """
 
 from __future__ import annotations

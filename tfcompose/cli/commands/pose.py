@@ -1,7 +1,7 @@
 """Print the pose of frame B in frame A, from the robot file alone.
 
-Print the pose of B in A from the robot file alone. Moving frames are taken at their nominal pose,
-joints at 0.
+Print the pose of B in A from the robot file. Moving frames are at their nominal pose, joints at
+0.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""List the known sensors and nodes, or show one in full.
+"""List the presets of sensors and nodes, or show one.
 
-List the presets of sensors by vendor, and of nodes that publish TF by package; or show one. Of a
-sensor: its frames with their values, which of them its driver publishes and the switch for that,
-the frame of each message. Of a node: which edges it publishes, the parameters that name their
-frames, and its switch. And where the figures are from.
+List the presets of sensors and of nodes that publish TF, or show one. A sensor's page has its
+frames and their poses, the frames that its driver publishes, the parameter that turns this off,
+and the frame of each message. A node's page has the edges it publishes, the parameters for frame
+names, and the parameter that turns it off. Both name the sources of the numbers.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="?",
         metavar="NAME",
         help=(
-            "a preset; or a vendor, package, kind, part of a name or a word of what it is, to list"
-            " only those"
+            "a preset to show; or a vendor, package, kind, part of a name or a word from the "
+            "description, to list the presets that match"
         ),
     )
     parser.add_argument(

@@ -39,7 +39,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--fail-on",
         choices=tuple(_LEVELS),
-        help="exit 1 where no robot runs (absent), or where one has a warning or an error too",
+        help="absent: exit 1 if no robot runs; warning, error: also if a robot has one",
     )
 
 

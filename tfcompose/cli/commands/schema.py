@@ -1,8 +1,8 @@
 """Print the language as JSON Schema, or as a reference.
 
-Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors
-and nodes, of plan.json, or of a file that a tool reads, such as fleet.yaml. With --reference print
-every key of the language as Markdown instead.
+Print a JSON Schema for editors and CI: for robot files, overlays, presets of sensors or nodes,
+plan.json, or a file of a tool, such as fleet.yaml. With --reference, print every key as Markdown
+instead.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ START = ProcessCommand(
     "starting",
     """Start processes that were stopped or have ended.
 
-Start processes of a running robot that were stopped, have ended, or wait for their restart.
+    Start processes of a running robot that were stopped, have ended, or wait for a restart.
 """,
 )
 STOP = ProcessCommand(

@@ -1,9 +1,9 @@
-"""Print the tree with kinds, owners and poses, or as it is published.
+"""Print the tree with kinds, owners and poses, or the published tree.
 
 Print each frame with the kind, owner, rate and pose of its edge. With --live or --bag, print the
-published tree: each frame with the kind, the publishing node, rate and age of the newest stamp,
-and with FILE also the owner and whether the frame is expected, unexpected or missing. Disconnected
-trees follow each other.
+published tree: each frame with the kind, publishing node, rate and age of its edge. With FILE,
+also print the owner, and mark each frame as expected, unexpected or missing. Disconnected trees
+are printed one after another.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Start a robot, or a built plan, and guard its TF tree.
 
 Build a robot and start it, or start a built plan. On a terminal, show a live view of processes,
-edges and findings; ? lists its keys. Elsewhere, or with --no-live, print which edges are live, who
-owns them, and when the tree is complete, with the lines of each process. Ctrl-C, SIGTERM and
-SIGHUP end everything, with exit code 0; before anything is started, with that of the signal, such
-as 130 for Ctrl-C. If a node already publishes an edge, refuse and name it. If the robot runs
-already, restart only what differs in the new plan.
+edges and findings; ? lists its keys. Elsewhere, or with --no-live, print the output of each
+process, live edges with their owners, and when the tree is complete. Ctrl-C, SIGTERM and SIGHUP
+stop the robot with exit code 0, or, before anything has started, with that of the signal, such as
+130 for Ctrl-C. If a node already publishes an edge, name it and start nothing. If the robot runs
+already, restart only the processes that differ.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--update",
         action="store_true",
-        help="bring the robot that runs to this plan, and start none if it does not",
+        help="apply this plan to the running robot; start none if it does not run",
     )
     parser.add_argument(
         "--build-dir",
         metavar="DIR",
-        help="with --update: where the plan's paths begin; default: beside the plan",
+        help="with --update: the folder for the plan's relative paths; default: that of the plan",
     )
     parser.add_argument(
         "--timeout",
@@ -64,40 +64,42 @@ def arguments(parser: ArgumentParser) -> None:
         "--host",
         metavar="NAME",
         help=(
-            "start this host's share and expect the rest elsewhere; default: this machine, if "
-            "the robot names it"
+            "start the processes of this host and expect the others elsewhere; default: this "
+            "machine, if the robot names it"
         ),
     )
     parser.add_argument(
         "--no-live",
         dest="live",
         action="store_false",
-        help="print lines, as into a pipe, instead of the live view of a terminal",
+        help="print lines instead of the live view",
     )
     parser.add_argument(
         "--events",
         metavar="FILE",
         help=(
             "write each event to this file or named pipe, as one JSON object per line; the robot"
-            " ends with the reader of a pipe"
+            " stops when the reader closes the pipe"
         ),
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="print what would be started and exit"
+        "--dry-run",
+        action="store_true",
+        help="print commands, environment, parameters and edges; start nothing",
     )
     parser.add_argument(
         "--guard",
         choices=("off", "watch", "strict"),
         help=(
-            "off: report live edges, no checks; strict: hold back what a process does not own; "
-            "default: the file's"
+            "off: report live edges, no checks; strict: block edges that a process does not "
+            "own; default: as in the file"
         ),
     )
     parser.add_argument(
         "--settle",
         type=not_negative,
         metavar="S",
-        help="how long to look for conflicting publishers first; default: 0.5",
+        help="seconds to look for conflicting publishers first; default: 0.5",
     )
     parser.add_argument(
         "--for",
@@ -105,8 +107,8 @@ def arguments(parser: ArgumentParser) -> None:
         type=positive,
         metavar="S",
         help=(
-            "end S seconds after the settle time; exit 1 if the tree was not complete or an "
-            "error was found"
+            "stop S seconds after the settle time; exit 1 if the tree was not complete or "
+            "there was an error"
         ),
     )
 

@@ -1,10 +1,10 @@
-"""Compare a robot file with what is published, live or in a bag.
+"""Compare a robot file with the published tree, live or in a bag.
 
 Compare each edge of FILE (a robot, or a built plan.json) with the running tree or a bag: missing,
 not declared, under another parent, with another value, on the wrong topic, silent, too slow, from
-another publisher. Exit code 0 if all is as expected, 1 if not, 2 if a file or a bag cannot be
-read. Frames inside a sensor that its driver publishes may be off by as much as a calibration moves
-them; more is a warning.
+another publisher. Exit 0 if all edges are as expected, 1 if not, 2 if a file or a bag cannot be
+read. If a driver publishes the frames inside its sensor, they may be off by a calibration; a
+larger deviation is a warning.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--running",
         action="store_true",
-        help="expect the edges of the robot that runs in this ROS domain, as without FILE",
+        help="expect the edges of the robot that runs in this ROS domain; fail if none runs",
     )
     parser.add_argument(
         "--live", action="store_true", help="use the running tree (default unless --bag is given)"

@@ -1,8 +1,8 @@
 """Wait until a running robot has ended, or is ready.
 
-Wait until the robot has ended, and return its exit code. With --ready, wait instead until every
-process is ready, every edge live and the guard sees no error, and report what is missing or wrong
-after the timeout.
+Wait until the robot has ended, and return its exit code. With --ready, wait until every process
+is ready, every edge is live and the guard sees no error. After the timeout, report missing edges,
+processes and errors.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--ready",
         action="store_true",
-        help="wait until every process is ready, every edge live, and no error is seen",
+        help="wait until every process is ready, every edge is live, and there is no error",
     )
     parser.add_argument("--timeout", type=positive, metavar="S", help="exit 1 after S seconds")
 

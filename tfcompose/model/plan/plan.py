@@ -101,7 +101,7 @@ class SourceLine(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EdgePattern:
-    """Edges by the names of their frames, in which ``*`` and ``?`` are wildcards."""
+    """Edges by frame names; ``*`` and ``?`` are wildcards."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -143,7 +143,7 @@ class PlanEdge:
     joint: PlanJoint | None = None
     #: The other parents that the owner may attach the child to.
     switched: tuple[str, ...] = ()
-    #: False where only the owner knows the child's pose.
+    #: False if only the owner knows the child's pose.
     pose_known: bool = True
 
     @property
@@ -196,7 +196,7 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A stand-in for an owner: a body on a circle, one at rest, or joint states."""
+    """A simulation of an owner: a body on a circle, one at rest, or joint states."""
 
     kind: SimulationKind
     #: In hertz.
@@ -256,7 +256,7 @@ class Driven:
 
     sensor: str
     preset: str
-    #: Whether the driver owns the frames inside the sensor.
+    #: True: the driver owns the frames inside the sensor.
     publishes: bool
     #: Parameters or arguments that keep the driver from publishing edges it does not own.
     switch: dict[str, ParameterValue] = field(default_factory=dict)
@@ -297,7 +297,7 @@ class PlanProcess:
     restart: RestartPolicy = "no"
     #: None: the launcher's default.
     max_restarts: int | None = None
-    #: True: the plan ends with the process; None: when it fails; False: neither.
+    #: True: the robot stops when the process exits; None: when it fails; False: never.
     required: bool | None = None
     stop: StopRule = field(default_factory=StopRule)
     log_level: LogLevel | None = None
@@ -324,7 +324,7 @@ class PlanProcess:
     schedule: Schedule | None = None
     component: Component | None = None
     output: OutputPlace = "both"
-    #: Whether it writes to a pseudo-terminal.
+    #: True: it writes to a pseudo-terminal.
     emulate_tty: bool = False
     #: As in proc_pid_oom_score_adj(5); None: the launcher's.
     oom_score_adj: int | None = None
@@ -368,32 +368,32 @@ def known_at_launch(value: Any) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
-    """What all processes share."""
+    """ROS settings of all processes."""
 
     namespace: str = documented(
         "", "the namespace of nodes and topics without a leading slash", "robot1"
     )
     domain_id: int | None = documented(None, "the ROS domain; default: the environment's", 7)
     discovery: Discovery | None = documented(
-        None, "how far discovery reaches; default: the environment's"
+        None, "the range of discovery; default: the environment's"
     )
     rmw: Rmw | None = documented(
         None, "the middleware of all processes; default: the environment's", "zenoh"
     )
     distro: Distro | None = documented(
         None,
-        "the release of ROS that they are from; default: the environment's",
+        "the ROS release; default: the environment's",
         "kilted",
     )
     router: str | None = documented(
         None,
-        "with rmw: zenoh, where every process reaches the router; default: port 7447 of its own"
-        " computer",
+        "with rmw: zenoh, the router's address for every process; default: port 7447 of its "
+        "own computer",
         "tcp/10.0.0.2:7447",
     )
     clock: Clock = documented("wall", "one clock for the whole plan; sim: the time of /clock")
     frame_prefix: str = documented(
-        "", "written in front of every frame as it is, with its slash", "robot1/"
+        "", "prefix of every frame name, including its slash", "robot1/"
     )
     shared_frames: tuple[str, ...] = documented((), "frames that never get the prefix", ["map"])
 
@@ -415,28 +415,26 @@ class PlanHost:
 
 @dataclass(frozen=True, slots=True)
 class GuardPolicy:
-    """What watches the live tree."""
+    """The checks of the live tree."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     mode: GuardMode = documented(
-        "watch", "strict: what a process of the plan sends and does not own is held back"
+        "watch", "strict: also block edges that a process of the plan sends but does not own"
     )
-    unknown_edges: UnknownEdges = documented(
-        "warn", "what to do about an edge that nobody declared"
-    )
+    unknown_edges: UnknownEdges = documented("warn", "severity of an undeclared edge")
     on_violation: OnViolation = documented(
         "report",
-        "stop-offender: stop the plan's own process that is proven to have done it; stop: stop"
-        " everything",
+        "stop-offender: stop the process of the plan that is proven to have caused the error; "
+        "stop: stop the robot",
     )
     allow: tuple[EdgePattern, ...] = documented(
         (), "edges that need no declaration", [{"child": "tag36h11:*"}]
     )
     fence: FenceWay = documented(
         "auto",
-        "how strict fences processes off: by a DDS partition, which needs Fast DDS, or by"
-        " remapping /tf and /tf_static",
+        "how a strict guard separates processes: by a DDS partition (Fast DDS only), or by "
+        "remapping /tf and /tf_static",
     )
 
 
@@ -472,15 +470,15 @@ _NO_NAME = re.compile(r"\W")
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Everything that ``tfcompose up`` needs, with nothing left to compile."""
+    """A compiled robot: everything that ``tfcompose up`` needs."""
 
     version: Literal[3] = field(default=VERSION, kw_only=True)
     robot: str
     spec_digest: str
     description: str = field(default=DESCRIPTION, kw_only=True)
     base: str | None
-    #: The machine that starts its share of the processes, those that are not ``external``. None:
-    #: the whole plan; empty: the share of the machine that the plan does not name.
+    #: The host whose processes, those that are not ``external``, this plan starts. None: all;
+    #: empty: the processes without a host.
     host: str | None = field(default=None, kw_only=True)
     ros: RosSettings
     edges: tuple[PlanEdge, ...]

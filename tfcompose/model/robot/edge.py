@@ -33,7 +33,7 @@ FREE: tuple[JointType, ...] = ("floating", "planar")
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What a joint can do: rad or m, N m or N, rad/s or m/s."""
+    """The limits of a joint: rad or m, N m or N, rad/s or m/s."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -47,7 +47,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Dynamics:
-    """What slows a joint down: N m s/rad and N m, or N s/m and N."""
+    """Damping and friction of a joint: N m s/rad and N m, or N s/m and N."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -57,12 +57,12 @@ class Dynamics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyController:
-    """Where a controller begins to hold a joint back before its limits, and how hard."""
+    """Soft limits of a joint, and gains for a controller that enforces them."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    soft_lower_limit: JointPosition = documented(0.0, "where the lower soft limit begins")
-    soft_upper_limit: JointPosition = documented(0.0, "where the upper soft limit begins")
+    soft_lower_limit: JointPosition = documented(0.0, "the lower soft limit")
+    soft_upper_limit: JointPosition = documented(0.0, "the upper soft limit")
     k_position: Number = documented(
         0.0, "the gain from position to velocity inside the soft limits"
     )
@@ -71,12 +71,12 @@ class SafetyController:
 
 @dataclass(frozen=True, slots=True)
 class ReferencePositions:
-    """Where a joint's reference switch changes; URDF calls it calibration."""
+    """The positions at which a joint's reference switch changes; URDF's calibration."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    rising: JointPosition | None = documented(None, "where the switch goes on")
-    falling: JointPosition | None = documented(None, "where the switch goes off")
+    rising: JointPosition | None = documented(None, "the position at which the switch goes on")
+    falling: JointPosition | None = documented(None, "the position at which the switch goes off")
 
 
 #: Limits of joints may be rounded by as much: 1.57 rad for 90 deg; rad or m.

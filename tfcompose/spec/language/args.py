@@ -92,23 +92,23 @@ Scalar = Annotated[Any, BeforeValidator(_scalar, str | float | bool)]
 
 
 class ArgSpec(Checked):
-    """A value that is given when the robot is built: NAME:=VALUE.
+    """A build-time argument: NAME:=VALUE.
 
-    Without a default it has to be given.
+    Without a default it is required.
     """
 
     type: ArgType | None = key(
-        None, "default: what default, or the first of choices, is; else string", "int"
+        None, "default: the type of default or of the first choice; otherwise string", "int"
     )
-    default: Scalar | None = key(None, "its value where none is given", 2, "30 cm", False)
-    choices: tuple[Scalar, ...] = key((), "the values that it can have", ["velodyne", "ouster"])
-    min: Scalar | None = key(None, "the least that it can be", 0)
-    max: Scalar | None = key(None, "the most that it can be", 8)
+    default: Scalar | None = key(None, "the value if none is set", 2, "30 cm", False)
+    choices: tuple[Scalar, ...] = key((), "the allowed values", ["velodyne", "ouster"])
+    min: Scalar | None = key(None, "the smallest allowed value", 0)
+    max: Scalar | None = key(None, "the largest allowed value", 8)
     description: Text | None = key(
-        None, "what it is for; --show-args prints it", "how many cameras there are"
+        None, "its purpose; --show-args prints it", "how many cameras there are"
     )
     env: VariableName | None = key(
-        None, "the environment variable that gives it where the command line does not", "CAMERAS"
+        None, "the environment variable that sets it if the command line does not", "CAMERAS"
     )
 
     @property

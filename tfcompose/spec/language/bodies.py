@@ -14,17 +14,17 @@ from tfcompose.spec.load import Path
 
 
 class Cylinder(Spec):
-    """A cylinder along z, its middle at the origin."""
+    """A cylinder along z, centred at the origin."""
 
     radius: Size = key(..., "the radius")
     length: Size = key(..., "the length along z")
 
 
 class Capsule(Spec):
-    """A cylinder along z with a half sphere on either end, its middle at the origin."""
+    """A cylinder along z with a half sphere at each end, centred at the origin."""
 
     radius: Size = key(..., "the radius of the cylinder and of its ends")
-    length: Size = key(..., "the length of the cylinder alone: the capsule is two radii longer")
+    length: Size = key(..., "the length of the cylinder only; the capsule is two radii longer")
 
 
 class Sphere(Spec):
@@ -38,19 +38,19 @@ class Mesh(Spec):
 
     uri: Text = key(
         ...,
-        "package://…, file://…, or a path relative to the file that names it",
+        "package://…, file://…, or a path relative to this file",
         "package://my_robot/meshes/base.stl",
         "meshes/base.stl",
     )
     scale: Scale = key(
-        (1.0, 1.0, 1.0), "metres in one unit of the file; or along x, y and z", 0.001
+        (1.0, 1.0, 1.0), "metres per unit of the file; or one value each for x, y and z", 0.001
     )
 
 
 class MaterialSpec(Spec):
     """A colour or a texture, and its name.
 
-    The name alone refers to the material that has it elsewhere.
+    A name without a colour refers to a material defined elsewhere.
     """
 
     name: Name | None = key(None, "its name; default: named after the colour", "blue")
@@ -66,7 +66,7 @@ SHAPES = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
 
 
 class ShapeSpec(Posed):
-    """One shape and where it is in its link: a box, cylinder, sphere, capsule or mesh."""
+    """One shape and its pose in the link: a box, cylinder, sphere, capsule or mesh."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
         *Posed.EXCLUSIVE,
@@ -75,14 +75,13 @@ class ShapeSpec(Posed):
     )
 
     box: Sizes | None = key(
-        None, "a box of these lengths along x, y and z, its middle at the origin", [0.5, 0.4, 0.15]
+        None, "a box of these lengths along x, y and z, centred at the origin", [0.5, 0.4, 0.15]
     )
     cylinder: Cylinder | None = key(None, "a cylinder along z", {"radius": 0.1, "length": "5 cm"})
     sphere: Sphere | None = key(None, "a sphere", {"radius": 0.1})
     capsule: Capsule | None = key(
         None,
-        "a cylinder along z with round ends; in URDF a cylinder and two spheres, which every"
-        " reader takes",
+        "a cylinder along z with round ends; in URDF a cylinder and two spheres, for every reader",
         {"radius": 0.1, "length": 0.3},
     )
     mesh: Annotated[Mesh, short("uri", Mesh)] | None = key(
@@ -90,7 +89,7 @@ class ShapeSpec(Posed):
     )
     color: Colour | None = key(
         None,
-        "red, green, blue and, if need be, opacity, from 0 to 1; or a name",
+        "red, green, blue and optionally opacity, from 0 to 1; or a name",
         [0, 0, 1],
         "blue",
     )
@@ -127,13 +126,13 @@ MASSES = frozenset({"mass", "density"})
 class InertialSpec(Rotated):
     """A link's mass and its distribution.
 
-    The pose is that of the centre of mass, by default that of the shapes.
+    The pose is that of the centre of mass; by default the centre of the shapes.
     """
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*Rotated.EXCLUSIVE, MASSES)
 
     xyz: Xyz | None = key(
-        None, "position of the centre of mass; default: that of the shapes", [0, 0, 0.05]
+        None, "position of the centre of mass; default: the centre of the shapes", [0, 0, 0.05]
     )
     mass: Mass | None = key(None, "the mass of the whole link", "10 kg")
     density: Density | None = key(
@@ -165,13 +164,11 @@ Collision = Annotated[
 
 
 class LinkSpec(MountKeys):
-    """A body, in URDF's words. With a parent it has a fixed edge."""
+    """A body, with URDF's terms. With a parent, it has a fixed edge."""
 
-    visual: Shapes = key(
-        (), "the shape that is seen, or a list of them", {"box": [0.5, 0.4, 0.15]}
-    )
+    visual: Shapes = key((), "the visible shape, or a list of shapes", {"box": [0.5, 0.4, 0.15]})
     collision: Collision = key(
-        (), "the shape that collides, or a list of them; same: those of visual", "same"
+        (), "the shape for collisions, or a list of shapes; same: those of visual", "same"
     )
     inertial: InertialSpec | None = key(None, "the mass and its distribution", {"mass": "10 kg"})
 

@@ -35,24 +35,24 @@ HostName = Annotated[
 
 
 class HostSpec(Entry):
-    """A computer: how ssh reaches it, and what runs tfcompose there."""
+    """A computer: its address for ssh, and its Python with tfcompose."""
 
     ssh: SshAddress | None = key(
         None,
-        "user@address, or a name of ~/.ssh/config; default: the host's name",
+        "user@address, or a name in ~/.ssh/config; default: the name of the host",
         "pi@192.168.1.20",
     )
     port: Annotated[int, Strict(), Field(ge=1, le=65535), Integral] | None = key(
-        None, "the port of ssh; default: as ~/.ssh/config says, or 22", 2222
+        None, "the ssh port; default: as in ~/.ssh/config, or 22", 2222
     )
     python: Text | None = key(
         None,
-        "the Python there that has tfcompose; default: python3",
+        "the Python with tfcompose on the host; default: python3",
         "/opt/robot/.venv/bin/python",
     )
-    setup: OneOrMore = key((), "files there that are sourced first", "/opt/ros/jazzy/setup.bash")
+    setup: OneOrMore = key((), "files on the host to source first", "/opt/ros/jazzy/setup.bash")
     node_selector: dict[str, Text] = key(
         {},
-        "labels of its node in Kubernetes; default: kubernetes.io/hostname: NAME",
+        "labels of its Kubernetes node; default: kubernetes.io/hostname: NAME",
         {"robot.example.com/computer": "brain"},
     )

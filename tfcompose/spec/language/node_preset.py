@@ -24,69 +24,63 @@ Off = Annotated[
 
 
 class Fact(Spec):
-    """Where the figures of a preset are from."""
+    """A source of the numbers in a preset."""
 
     repository: Text = key(..., "the repository", "github.com/IntelRealSense/realsense-ros")
     path: Text = key(..., "the file in it", "realsense2_description/urdf/_d435i.urdf.xacro")
     commit: Text = key(..., "the commit that was read")
-    about: Text = key("", "what is from there, if not everything; whether it is not the vendor's")
+    about: Text = key(
+        "", "the values from this source, if not all; and whether it is not the vendor's"
+    )
 
 
 class ClaimSpec(Spec):
-    """An edge that a node publishes by default, and the parameters that stop it."""
+    """An edge that a node publishes by default, with the parameters that turn it off."""
 
     parent: Text = key(..., "the parent frame", "odom")
     child: Text = key(..., "the child frame", "base_link")
     off: Off = key(
         ...,
-        "the parameters that stop it; none where there are none",
+        "the parameters that turn it off, or none",
         {"publish_tf": False},
         NO_SWITCH,
     )
-    on: Parameters = key({}, "the parameters that start it", {"publish_tf": True})
-    by_default: Boolean = key(
-        True, "false: it publishes the edge only where a parameter turns that on"
-    )
+    on: Parameters = key({}, "the parameters that turn it on", {"publish_tf": True})
+    by_default: Boolean = key(True, "false: it publishes the edge only if a parameter turns it on")
     static: Boolean = key(False, "true: it sends the edge on /tf_static")
-    chosen_by: Parameters = key(
-        {}, "the parameters that choose this edge among several", {"two_d_mode": True}
-    )
+    chosen_by: Parameters = key({}, "the parameters that select this edge", {"two_d_mode": True})
 
 
 class Role(Spec):
-    """A frame whose name a node takes from a parameter."""
+    """A frame whose name is a parameter of the node."""
 
     parameter: Text | None = key(
-        None, "the parameter that holds its name; default: it cannot be changed"
+        None, "the parameter with its name; left out if it cannot be changed"
     )
     instead: Text | None = key(
-        None, "the parameter that holds the name of the published frame, where it is set"
+        None, "the parameter with the name of the published frame, if it is set"
     )
     default: Text = key(..., "the name without the parameter", "odom")
 
 
 class NodePresetSpec(Spec):
-    """A node that publishes TF: its edges, their name parameters, and its switch."""
+    """A node that publishes TF: its edges, their frame names, and the way to turn it off."""
 
     preset: Literal[1] = key(..., "the version of this language", 1)
-    node: Text = key(..., "the node's own name", "slam_toolbox")
+    node: Text = key(..., "the usual name of the node", "slam_toolbox")
     package: Text = key(..., "its package", "slam_toolbox")
     executable: Text = key(
-        "", "the executable that starts it; none where another program does", "ekf_node"
+        "", "the executable that starts it; left out if another program does", "ekf_node"
     )
-    about: Text = key(..., "what it is, in a sentence")
-    frames: dict[str, Role] = key({}, "the parameter that names the frame of each role")
+    about: Text = key(..., "a description in one sentence")
+    frames: dict[str, Role] = key({}, "the parameter with the frame name of each role")
     publishes: tuple[ClaimSpec, ...] = key(..., "the edges that it publishes")
     one_of: Boolean = key(False, "true: it publishes one of the edges, never two")
-    set: Parameters = key(
-        {}, "parameters without which its frames would not have the names that it is given"
-    )
-    rate: Text = key("", "the parameter that says how often it sends, in Hz", "frequency")
-    period: Text = key("", "the same, where it is a time in s", "transform_publish_period")
-    hint: Text = key(
-        "", "where its switch is, if it is not among the parameters that can be given at the start"
-    )
-    source: tuple[Fact, ...] = key(..., "where this was read")
+    set: Parameters = key({}, "parameters that are required for its frame names to apply")
+    rate: Text = key("", "the parameter with its rate, in Hz", "frequency")
+    period: Text = key("", "the parameter with its period, in s", "transform_publish_period")
+    hint: Text = key("", "how to turn it off, if no start parameter does")
+    source: tuple[Fact, ...] = key(..., "the sources")
 
     def rate_in(self, params: dict[str, Any]) -> tuple[str, float]:
         """Return the parameter that says how often the node sends, and that in Hz.

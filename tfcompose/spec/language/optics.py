@@ -77,71 +77,72 @@ def _metres(value: Any) -> float | None:
 
 
 class OpticsSourceSpec(Spec):
-    """Where values are from."""
+    """A source of values."""
 
-    of: tuple[Text, ...] = key(..., "the keys that it gives", ["horizontal", "vertical"])
+    of: tuple[Text, ...] = key(
+        ..., "the keys with values from this source", ["horizontal", "vertical"]
+    )
     where: Text = key(
         ..., "the document, or the repository and the commit", "data sheet of May 2020, table 4.3"
     )
     quality: Literal["vendor_file", "datasheet", "secondary", "derived"] = key(
         ...,
-        "the vendor's own file or data sheet; secondary: others about it; derived: computed from"
-        " other keys",
+        "the vendor's file or data sheet; secondary: from a third party; derived: computed "
+        "from other keys",
     )
 
 
 class OpticsSpec(Checked):
-    """What one stream sees. What is left out is not known."""
+    """The field of view of a stream. Keys that are left out are unknown."""
 
     frame: Text | None = key(
-        None, "the frame that it is in, of those of the sensor", "{name}_depth_optical_frame"
+        None, "the frame of the stream, one of the sensor's frames", "{name}_depth_optical_frame"
     )
     kind: OpticsKind | None = key(
         None,
-        "a camera looks along z of the frame, x right, y down; the others along x, z up; default:"
-        " as the sensor",
+        "a camera looks along z of the frame, with x right and y down; others look along x, "
+        "with z up; default: the kind of the sensor",
     )
     projection: Projection | None = key(
-        None, "pinhole, or fisheye, of which diagonal is the image circle"
+        None, "pinhole; or fisheye, where diagonal is the image circle"
     )
     backward: Boolean | None = key(None, "true: the camera looks along -z of its frame, with y up")
     horizontal: AngleOfView | None = key(
         None,
-        "the whole angle, or [from, to], to the left positive",
+        "the full angle, or [from, to], positive to the left",
         "87 deg",
         ["-135 deg", "135 deg"],
     )
     vertical: AngleOfView | None = key(
         None,
-        "the whole angle, or [from, to], up positive; 0 for a scanner in one plane",
+        "the full angle, or [from, to], positive up; 0 for a 2D scanner",
         "58 deg",
         ["-25 deg", 0.26],
     )
     diagonal: Annotated[Angle, AfterValidator(_is_angle)] | None = key(
-        None, "the whole angle", "95 deg"
+        None, "the full angle", "95 deg"
     )
     resolution: Pixels | None = key(None, "width and height of the image in pixels", [1280, 720])
     near: Length | None = key(
-        None, "the least distance: along z for a camera, else along the ray", 0.28
+        None, "the smallest distance: along z for a camera, otherwise along the ray", 0.28
     )
     far: Size | None = key(None, "the largest distance, at the best reflectivity", 10)
-    channels: _Count | None = key(None, "how many beams one above the other", 16)
+    channels: _Count | None = key(None, "the number of beams, one above the other", 16)
     elevations: tuple[Angle, ...] | None = key(
-        None, "that of each channel, up positive", ["-15 deg", "15 deg"]
+        None, "the elevation of each channel, positive up", ["-15 deg", "15 deg"]
     )
-    samples: _Count | None = key(None, "how many there are in one scan or one turn", 1081)
+    samples: _Count | None = key(None, "samples per scan or per revolution", 1081)
     rate: Rate | None = key(None, "the largest rate", "30 Hz")
     shutter: Shutter | None = key(None, "of a camera")
-    baseline: Size | None = key(
-        None, "how far apart the two imagers are that depth is computed from", "5 cm"
-    )
+    baseline: Size | None = key(None, "the distance of the two imagers of a stereo camera", "5 cm")
     active: Boolean | None = key(
         None,
-        "true: it sends light or sound, such as an infrared pattern; default: all but cameras do",
+        "true: it emits light or sound, such as an infrared pattern; default: true except for "
+        "cameras",
     )
     source: tuple[OpticsSourceSpec, ...] | None = key(
         None,
-        "where values are from",
+        "sources of the values",
         [{"of": ["near"], "where": "measured", "quality": "secondary"}],
     )
 

@@ -101,17 +101,17 @@ class AxisAngle(Spec):
 
 
 class LookAngles(Checked):
-    """A direction by the angles that lead to it from straight ahead."""
+    """A direction, as angles from straight ahead."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
         frozenset({"up", "down"}),
         frozenset({"left", "right"}),
     )
 
-    up: Angle | None = key(None, "how far the direction points up")
-    down: Angle | None = key(None, "how far the direction points down")
-    left: Angle | None = key(None, "how far the direction points left")
-    right: Angle | None = key(None, "how far the direction points right")
+    up: Angle | None = key(None, "angle up")
+    down: Angle | None = key(None, "angle down")
+    left: Angle | None = key(None, "angle to the left")
+    right: Angle | None = key(None, "angle to the right")
     roll: Angle = key(0.0, "roll about the viewing direction, right-handed")
 
     @property
@@ -179,8 +179,8 @@ class Rotated(Checked):
     )
     look: Look | None = key(
         None,
-        "where x points, or the lens of an optical frame: a direction, or angles from straight"
-        " ahead",
+        "where the x axis, or the lens of an optical frame, points: a direction, or angles "
+        "from straight ahead",
         "down",
         {"down": "15 deg"},
     )
@@ -204,7 +204,7 @@ class Rotated(Checked):
 
 
 class Posed(Rotated):
-    """A pose: where the child is, in its parent."""
+    """The pose of the child in its parent."""
 
     xyz: Xyz = key((0.0, 0.0, 0.0), "position: x forward, y left, z up", [0.2, 0, "30 cm"])
 
@@ -229,16 +229,16 @@ class EdgeKeys(Posed, Entry):
 
     parent: Parents | None = key(
         None,
-        "the parent frame; a list for one that changes between them, as with a tool changer",
+        "the parent frame; or a list of possible parents, as for a tool changer",
         "base_link",
     )
     relative_to: Text | None = key(
-        None, "the frame in which the pose is given; the parent stays the parent", "base_link"
+        None, "the frame in which the pose is given, if it is not the parent", "base_link"
     )
     owner: Text | None = key(None, "the process that publishes this edge", "base_drive")
-    rate: Rate | None = key(None, "how often the owner sends it", "50 Hz")
+    rate: Rate | None = key(None, "the rate at which the owner sends it", "50 Hz")
     static: Boolean | None = key(
-        None, "true: the owner, which is not tfcompose, sends it on /tf_static", True
+        None, "true: the owner, another process than tfcompose's, sends it on /tf_static", True
     )
 
 
@@ -249,29 +249,29 @@ CalibrationFormat = Literal[
 
 
 class CalibrationLimit(Spec):
-    """How far a calibration may be from the pose that is written beside it."""
+    """The largest deviation of a calibration from the nominal pose."""
 
     xyz: Length = key(0.05, "the largest distance", "5 cm")
     rot: Angle = key(math.radians(5), "the largest angle", "5 deg")
 
 
 class CalibrationSpec(Spec):
-    """A measured pose, in a file. The pose beside it is the nominal one."""
+    """A measured pose, in a file. The pose in the robot file is the nominal one."""
 
-    file: Text = key(
-        ..., "the file, relative to the file that names it", "calibration/sensors.yaml"
-    )
+    file: Text = key(..., "the file, relative to this file", "calibration/sensors.yaml")
     format: Literal["auto", CalibrationFormat] = key("auto", "the format of the file", "kalibr")
     parent: Text | None = key(
-        None, "the entry's parent in that file; default: the parent of this frame", "tool0"
+        None, "the parent in the calibration file; default: the parent of this frame", "tool0"
     )
     child: Text | None = key(
         None,
-        "the entry's child in that file; default: this frame, or one of the sensor's",
+        "the child in the calibration file; default: this frame, or a frame of the sensor",
         "camera_link",
     )
     limit: CalibrationLimit = key(
-        CalibrationLimit(), "how far from nominal is too far", {"xyz": "5 cm", "rot": "5 deg"}
+        CalibrationLimit(),
+        "the largest deviation from the nominal pose",
+        {"xyz": "5 cm", "rot": "5 deg"},
     )
 
 
@@ -285,7 +285,7 @@ class MountKeys(EdgeKeys):
 
     calibration: Calibration | None = key(
         None,
-        "a file with the measured pose; the pose beside it is the nominal one",
+        "a file with the measured pose; the pose in this entry is the nominal one",
         "calibration/hand_eye.yaml",
     )
     joint: Text | None = key(

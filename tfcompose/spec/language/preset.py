@@ -41,25 +41,23 @@ SensorKind = Literal[
     "camera", "stereo", "rgbd", "lidar2d", "lidar3d", "imu", "gnss", "radar", "ultrasonic"
 ]
 _WHEN = (
-    "the value of each option that it takes, or for a set one that it holds; tf: driver or"
-    " tfcompose; all must hold"
+    "required values of options (for a set: a required member), and of tf: driver or "
+    "tfcompose; all must match"
 )
 
 
 class PresetOption(Spec):
-    """A choice that the user has."""
+    """An option for the user."""
 
-    type: Literal["set", "bool", "text", "choice"] = key(..., "what kind of value it takes", "set")
-    values: tuple[Text, ...] = key((), "what a set may hold", ["color", "depth"])
-    variants: dict[str, Parameters] = key(
-        {}, "of a choice: what each value merges over the preset"
-    )
-    default: Anything = key(None, "its value where none is given", ["color", "depth"])
-    about: Text = key("", "what it does")
+    type: Literal["set", "bool", "text", "choice"] = key(..., "the kind of value", "set")
+    values: tuple[Text, ...] = key((), "the allowed members of a set", ["color", "depth"])
+    variants: dict[str, Parameters] = key({}, "for a choice: the overlay of each value")
+    default: Anything = key(None, "the value if none is set", ["color", "depth"])
+    about: Text = key("", "its effect")
 
 
 class ByDriver(Rotated):
-    """What differs when the driver publishes the frame; what is left out is the same."""
+    """Differences if the driver publishes the frame; keys that are left out are the same."""
 
     parent: Text = key(..., "the parent frame", "{name}_link")
     xyz: Xyz | None = key(None, "position in that parent", [0, 0.0148, 0])
@@ -78,12 +76,12 @@ class PresetFrame(Rotated):
     )
     nominal: Boolean = key(False, "true: calibration or the device overrides the value")
     driver: Literal["static", "dynamic"] | None = key(
-        None, "the driver publishes this edge, on /tf_static or /tf, unless it is switched off"
+        None, "how the driver publishes this edge by default: static on /tf_static, dynamic on /tf"
     )
-    by_driver: ByDriver | None = key(None, "what differs when the driver publishes it")
+    by_driver: ByDriver | None = key(None, "differences if the driver publishes it")
     when: Parameters = key({}, _WHEN, {"streams": "depth"})
     other_axes: Boolean = key(
-        False, "true: its name does not say whether it is optical, or says it wrongly"
+        False, "true: its name does not show, or misstates, whether it is optical"
     )
     about: Text = key("", "what it is")
 
@@ -91,45 +89,43 @@ class PresetFrame(Rotated):
 class Body(Spec):
     """The sensor's body, on one of its frames."""
 
-    frame: Text = key(..., "the frame that it is on", "{name}_link")
+    frame: Text = key(..., "the frame of the body", "{name}_link")
     shape: ShapeSpec = key(..., "its shape", {"box": [0.025, 0.09, 0.025]})
     mass: Mass | None = key(
-        None, "where the vendor's is credible; the inertia is computed", "72 g"
+        None, "the mass, if the vendor's value is credible; the inertia is computed", "72 g"
     )
 
 
 class PresetOptics(OpticsSpec):
-    """What one stream sees. It is there where its frame is."""
+    """The field of view of a stream. It exists if its frame exists."""
 
     frame: Text = key(..., "the frame that it is in", "{name}_depth_optical_frame")
     when: Parameters = key({}, _WHEN, {"streams": "depth"})
 
 
 class Chosen(Spec):
-    """A value that an option decides: the option's own, if given.
+    """A value that depends on an option: the value of the option, if it is set.
 
     Or one of two, by a condition.
     """
 
     option: Text | None = key(
-        None, "the option whose value it is; without one the parameter is left out", "serial"
+        None, "the option with the value; if it is not set, the parameter is omitted", "serial"
     )
     when: Parameters | None = key(None, _WHEN, {"streams": "depth"})
-    value: Anything = key(True, "the value when the condition holds")
-    otherwise: Anything = key(False, "the value when it does not")
+    value: Anything = key(True, "the value if the condition is true")
+    otherwise: Anything = key(False, "the value if the condition is false")
 
 
 class DriverClaim(Spec):
     """An edge outside the sensor that its driver publishes by default.
 
-    Switched off, unless the driver owns it.
+    tfcompose turns it off unless the driver owns the edge.
     """
 
     parent: Text = key(..., "the parent frame", "map")
     child: Text = key(..., "the child frame", "odom")
-    off: Parameters = key(
-        ..., "the parameters that keep the driver from it", {"publish_tf": False}
-    )
+    off: Parameters = key(..., "the parameters that turn it off", {"publish_tf": False})
     about: Text = key("", "what it is")
 
 
@@ -148,46 +144,48 @@ class PresetProcess(Spec):
         None, "a node, which takes a parameter file", "realsense2_camera_node"
     )
     launch: Text | None = key(
-        None, "or a launch file of the package, which takes arguments", "launch/rs_launch.py"
+        None, "a launch file of the package, which takes arguments", "launch/rs_launch.py"
     )
     node: Text = key(..., "the name of the node that publishes", "{name}")
     namespace: Text = key("", "the namespace of that node")
     lifecycle: Literal["active"] | None = key(
-        None, "a lifecycle node, which does nothing until it is active"
+        None, "a lifecycle node that does nothing until it is active"
     )
     params: dict[str, Parameter] = key(
-        {}, "parameters of the node; left out where they hold an empty {prefix}"
+        {}, "parameters of the node; omitted if they contain an empty {prefix}"
     )
     args: dict[str, Parameter] = key({}, "arguments of the launch file")
 
 
 class FurtherProcess(PresetProcess):
-    """A process that the driver needs besides: it publishes no frames."""
+    """Another process of the driver. It publishes no frames."""
 
     when: Parameters = key({}, _WHEN, {"streams": "depth"})
 
 
 class PresetDriver(PresetProcess):
-    """The vendor's driver; its first process is the one that publishes frames."""
+    """The vendor's driver. Its first process publishes the frames."""
 
     also: dict[Text, FurtherProcess] = key(
-        {}, "its further processes, each by what its name adds to the sensor's, after a _"
+        {}, "its other processes, by the suffix that follows the sensor's name and a _"
     )
-    versions: Text = key("", "the versions that were read", "4.55 to 4.57")
+    versions: Text = key("", "the versions that this describes", "4.55 to 4.57")
     naming: dict[str, Text] = key(
-        {}, "the parameters, or arguments, that name frames", {"base_frame_id": "{name}_link"}
+        {}, "parameters, or arguments, for frame names", {"base_frame_id": "{name}_link"}
     )
-    prefixed: Boolean = key(False, "true: a parameter takes the robot's frame prefix")
-    tf: SensorPublisher = key("driver", "who publishes the frames that the driver can, by default")
-    by_default: Boolean = key(True, "false: it publishes them only if a parameter says so")
-    on: Parameters = key(
-        {}, "parameters, or arguments, that make it publish them", {"publish_tf": True}
+    prefixed: Boolean = key(False, "true: a parameter gets the robot's frame prefix")
+    tf: SensorPublisher = key(
+        "driver", "the default publisher of the frames that the driver can publish"
     )
+    by_default: Boolean = key(True, "false: it publishes them only if a parameter turns this on")
+    on: Parameters = key({}, "parameters, or arguments, that turn this on", {"publish_tf": True})
     off: Parameters | None = key(
-        None, "those that keep it from that; left out: there is no switch", {"publish_tf": False}
+        None,
+        "parameters, or arguments, that turn this off; left out: it cannot be turned off",
+        {"publish_tf": False},
     )
     claims: tuple[DriverClaim, ...] = key((), "edges outside the sensor that it publishes")
-    about: Text = key("", "what else is to be known")
+    about: Text = key("", "notes")
 
 
 class PresetTopic(Spec):
@@ -195,8 +193,10 @@ class PresetTopic(Spec):
 
     type: Text = key(..., "its type", "sensor_msgs/Image")
     frame: Text = key(..., "the frame of its header", "{name}_color_optical_frame")
-    hard_coded: Boolean = key(False, "true: no parameter changes that frame, and no preset has it")
-    rate: Rate | None = key(None, "how often it comes by default")
+    hard_coded: Boolean = key(
+        False, "true: no parameter changes this frame, and the preset does not declare it"
+    )
+    rate: Rate | None = key(None, "its default rate")
     when: Parameters = key({}, _WHEN, {"streams": "color"})
 
 
@@ -206,34 +206,34 @@ class PresetSpec(Spec):
     preset: Literal[1] = key(..., "the version of this language", 1)
     extends: Text | None = key(
         None,
-        "a preset that this one is merged over; null removes; a name that begins with _ is only"
-        " there to be extended",
+        "the preset that this one is merged over; null removes a key; names with a leading _ "
+        "are only for extension",
         "realsense/_d400",
     )
-    vendor: Text = key(..., "who makes it", "Intel RealSense")
-    model: Text = key(..., "what it is called", "D435i")
-    kind: SensorKind = key(..., "what kind of sensor it is", "rgbd")
-    about: Text = key(..., "what it is, in a sentence")
+    vendor: Text = key(..., "the manufacturer", "Intel RealSense")
+    model: Text = key(..., "the model name", "D435i")
+    kind: SensorKind = key(..., "the kind of sensor", "rgbd")
+    about: Text = key(..., "a description in one sentence")
     mount: Text = key(
         ...,
-        "the frame that a person bolts on; it has no entry under frames",
+        "the frame of the mounting point; it has no entry under frames",
         "{name}_bottom_screw_frame",
     )
     root: Text | None = key(
-        None, "the frame from which on the driver publishes; default: the mount", "{name}_link"
+        None, "the root of the frames that the driver publishes; default: the mount", "{name}_link"
     )
     words: dict[str, Annotated[Text, Matches(r"[A-Za-z0-9_]*", "a part of a frame's name")]] = key(
-        {}, "used in names as {word}", {"side": "left"}
+        {}, "values for {word} in names", {"side": "left"}
     )
-    options: dict[str, PresetOption] = key({}, "the choices that the user has")
+    options: dict[str, PresetOption] = key({}, "the options for the user")
     frames: dict[str, PresetFrame] = key({}, "the frames by name")
     body: Body | None = key(None, "the sensor's body")
-    optics: dict[str, PresetOptics] = key({}, "what each stream sees")
+    optics: dict[str, PresetOptics] = key({}, "the field of view of each stream")
     driver: PresetDriver | None = key(None, "the vendor's driver")
     topics: dict[str, PresetTopic] = key(
-        {}, "what the driver publishes; below its node where the name begins with ~/"
+        {}, "topics that the driver publishes; relative to its node if the name begins with ~/"
     )
-    source: tuple[Fact, ...] = key((), "where the figures are from")
+    source: tuple[Fact, ...] = key((), "sources of the numbers")
 
 
 _HOLE = re.compile(r"\{([^{}]*)\}")

@@ -136,7 +136,7 @@ COMMANDS = (
 
 
 class Run(Checked):
-    """An installed executable, a launch file, or a command, word by word."""
+    """An installed executable, a launch file, or a command as a list."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = COMMANDS
 
@@ -150,7 +150,7 @@ class Run(Checked):
         )
     )
     args: Arguments = key(
-        (), "arguments; of a launch file by name", ["--verbose"], {"use_composition": False}
+        (), "arguments; those of a launch file by name", ["--verbose"], {"use_composition": False}
     )
     argv: Words = key(
         (),
@@ -202,7 +202,7 @@ class Circle(Spec):
     """A body that drives on a circle, counter-clockwise."""
 
     radius: Size = key(1.0, "the circle's radius")
-    speed: AngularVelocity = key(0.5, "how fast it turns")
+    speed: AngularVelocity = key(0.5, "the angular velocity")
 
 
 SWEEP = "sweep"
@@ -225,35 +225,33 @@ SIMULATIONS = frozenset[str](get_args(SimulationKind))
 
 
 class Simulate(Checked):
-    """A simulated owner: on a circle, at a fixed pose, or a publisher of joint states."""
+    """A simulation of an owner: on a circle, at a fixed pose, or a publisher of joint states."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (SIMULATIONS,)
 
     circle: Circle | None = key(
-        None, "its edge moves on a circle", {"radius": "1 m", "speed": "0.5 rad/s"}
+        None, "the child frame moves on a circle", {"radius": "1 m", "speed": "0.5 rad/s"}
     )
-    fixed: Posed | None = key(None, "its edge stays at one pose", {"xyz": [1, 0, 0]})
+    fixed: Posed | None = key(None, "the child frame stays at this pose", {"xyz": [1, 0, 0]})
     joints: SimulatedJoints | None = key(
         None,
-        "joint states: zero, sweep, or a position or sweep by joint; the others are at 0",
+        "joint states: zero, sweep, or a position or sweep for each joint; other joints are at 0",
         "zero",
         {"lift": 0.2},
     )
-    rate: Rate | None = key(
-        None, "how often it publishes; default: the rate of its edges, or 20 Hz", "50 Hz"
-    )
+    rate: Rate | None = key(None, "its rate; default: the rate of its edges, or 20 Hz", "50 Hz")
 
 
 class ScheduleSpec(Checked):
     """How the kernel schedules a process."""
 
     cpus: tuple[Annotated[int, Strict(), Field(ge=0, le=4095), Integral], ...] = key(
-        (), "the processors that it runs on, counted from 0; default: any", [2, 3]
+        (), "the CPUs that it may use, counted from 0; default: all", [2, 3]
     )
     policy: SchedulingPolicy | None = key(
         None,
-        "as in sched(7); fifo and rr are real-time policies; default: fifo with a priority, else"
-        " other",
+        "a policy of sched(7); fifo and rr are real-time policies; default: fifo with a "
+        "priority, otherwise other",
     )
     priority: Annotated[int, Strict(), Field(ge=1, le=99), Integral] | None = key(
         None, "the priority of fifo and rr, 1 to 99", 80
@@ -288,12 +286,12 @@ class ScheduleSpec(Checked):
 
 
 class StopSpec(Spec):
-    """How a process is stopped: a first signal to its whole group, then firmer ones."""
+    """How to stop a process: a first signal to its process group, then SIGTERM and SIGKILL."""
 
     signal: StopSignal = key(StopRule().signal, "the first signal")
-    timeout: Duration | None = key(None, "how long until the next, firmer one", "5 s")
+    timeout: Duration | None = key(None, "time from the first signal to SIGTERM", "5 s")
     kill_timeout: Duration | None = key(
-        None, "how long from SIGTERM to SIGKILL; default: timeout", "10 s"
+        None, "time from SIGTERM to SIGKILL; default: timeout", "10 s"
     )
 
     def planned(self) -> StopRule:
@@ -313,33 +311,32 @@ READY_WAYS = frozenset[str](get_args(ReadyKind))
 
 
 class ReadySpec(Checked):
-    """When a process counts as ready; by default, when all the edges that it owns are live."""
+    """When a process is ready; by default, when all edges that it owns are live."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (READY_WAYS,)
 
-    edges: OnlyTrue | None = key(None, "true: when all the edges that it owns are live", True)
+    edges: OnlyTrue | None = key(None, "true: when all edges that it owns are live", True)
     topic: TopicName | None = key(
         None,
-        "when this topic has a publisher; below the process's namespace unless it begins with /",
+        "when this topic has a publisher; relative to the process's namespace unless it begins "
+        "with /",
         "scan",
     )
     service: TopicName | None = key(
         None,
-        "when this service is there; below the process's namespace unless it begins with /",
+        "when this service exists; relative to the process's namespace unless it begins with /",
         "map_server/load_map",
     )
-    lifecycle: LifecycleState | None = key(
-        None, "when its nodes are in this state, whoever brought them there"
-    )
+    lifecycle: LifecycleState | None = key(None, "when its nodes are in this lifecycle state")
     log: Annotated[Text, AfterValidator(_is_regular)] | None = key(
         None, "when a line of its output matches this regular expression", "server started"
     )
     exit: Annotated[int, Strict(), Field(ge=0, le=255), Integral] | None = key(
-        None, "when it has ended with this exit code", 0
+        None, "when it has exited with this code", 0
     )
     time: Duration | None = key(None, "this long after its start", "2 s")
     timeout: Duration | None = key(
-        None, "when to stop waiting and report what was there instead", "30 s"
+        None, "when to stop waiting and report the actual state", "30 s"
     )
 
     @classmethod
@@ -363,11 +360,14 @@ Ready = TypeAliasType(
 )
 
 _PARAMS = (
-    "the node's parameters, passed on as they are; file: names parameter files, which the others"
-    " are merged over"
+    "the node's parameters, unchanged; file: parameter files that the other parameters are "
+    "merged over"
 )
-_PUBLISHES = "edges that the node publishes by default, and what stops it; a preset knows them"
-_PRESET = "what is known about this node: its edges and parameters"
+_PUBLISHES = (
+    "edges that the node publishes by default, with the parameters that turn them off; not "
+    "needed with a preset"
+)
+_PRESET = "the node preset, with its edges and parameters"
 
 
 class NodeSpec(Spec):
@@ -378,17 +378,16 @@ class NodeSpec(Spec):
         (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}]
     )
     params: Parameters = key({}, _PARAMS, {"use_sim_time": False})
-    lifecycle: LifecycleState | None = key(
-        None, "the state that a lifecycle node is brought into after the start"
-    )
+    lifecycle: LifecycleState | None = key(None, "the state to bring the lifecycle node into")
 
 
 class NamedNode(Spec):
-    """The one node of a process: its name, and what is known about it."""
+    """The only node of a process: its name and its preset."""
 
     name: NodeName | None = key(
         None,
-        "its name; default: the process's, or its usual one where others start it",
+        "its name; default: the name of the process or, if tfcompose does not start it, the "
+        "usual name",
         "slam_toolbox",
     )
     preset: Text | None = key(None, _PRESET, "slam_toolbox")
@@ -454,7 +453,7 @@ else:
             dict[RosName, RosName],
             key(
                 {},
-                "topics, services and actions under other names",
+                "remappings of topics, services and actions",
                 {"scan": "front/scan"},
                 to=REMAPPED,
             ),
@@ -464,13 +463,13 @@ else:
         **_keys(SUPERVISION_KEYS),
         ready=(
             Ready | None,
-            key(None, "when it counts as ready", {"topic": "scan"}, to=NOT_SIMULATED),
+            key(None, "when it is ready", {"topic": "scan"}, to=NOT_SIMULATED),
         ),
         after=(
             dict[str, StartCondition],
             key(
                 {},
-                "what must have happened before it is started",
+                "processes to wait for before it starts",
                 {"base_drive": "ready"},
                 to=ALL,
             ),
@@ -489,7 +488,7 @@ Plugin = Annotated[
 
 
 class StartedSpec(Supervised):
-    """What is started, simulated, or expected to run."""
+    """A process to start, to simulate, or to expect."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (RUNNING,)
 
@@ -499,7 +498,7 @@ class StartedSpec(Supervised):
         {"package": "slam_toolbox", "executable": "async_slam_toolbox_node"},
     )
     simulate: Simulate | None = key(
-        None, "a simulation of it", {"circle": {"radius": "1 m"}, "rate": "50 Hz"}
+        None, "a simulation of this process", {"circle": {"radius": "1 m"}, "rate": "50 Hz"}
     )
     external: OnlyTrue | None = key(None, "true: tfcompose does not start it", True)
     component: Plugin | None = key(
@@ -511,17 +510,19 @@ class StartedSpec(Supervised):
         None, "the container that loads the component", "perception", to=LOADED
     )
     extra_arguments: Parameters = _key(EXTRA_ARGUMENTS)
-    shell: OnlyTrue | None = key(None, "true: run is one string, which /bin/sh reads", True)
+    shell: OnlyTrue | None = key(None, "true: run is a command for /bin/sh", True)
     node: Annotated[NamedNode, short("name", NamedNode)] | None = key(
         None,
-        "its node's name, or {preset, name}; below its namespace unless it begins with /",
+        "the name of its node, or {preset, name}; relative to its namespace, unless it begins "
+        "with /",
         "slam_toolbox",
         {"preset": "slam_toolbox"},
         to=NOT_OWN,
     )
     namespace: Namespace | None = key(
         None,
-        "the namespace of its nodes; below ros.namespace unless it begins with /; / alone is none",
+        "the namespace of its nodes, relative to ros.namespace unless it begins with /; /: no "
+        "namespace",
         "front",
         to=NOT_OWN,
     )
@@ -529,9 +530,11 @@ class StartedSpec(Supervised):
         (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}], to=OF_NODES
     )
     lifecycle: LifecycleState | None = key(
-        None, "the state that its lifecycle node is brought into after the start", to=OF_NODES
+        None, "the state to bring its lifecycle node into", to=OF_NODES
     )
-    rate: Rate | None = key(None, "of joints alone: how often joint states come", "50 Hz", to=OWN)
+    rate: Rate | None = key(
+        None, "for the process joints only: the rate of joint states", "50 Hz", to=OWN
+    )
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
@@ -577,7 +580,7 @@ class StartedSpec(Supervised):
 
 
 class ProcessSpec(StartedSpec, Entry):
-    """What is started, simulated, or expected to run."""
+    """A process to start, to simulate, or to expect."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
         *StartedSpec.EXCLUSIVE,
@@ -586,9 +589,9 @@ class ProcessSpec(StartedSpec, Entry):
 
     nodes: dict[NodeName, NodeSpec] = key(
         {},
-        "the nodes of a process that holds several, or one that keeps the name its program gives"
-        " it, by name; params beside them are for each node of the process, also one that is not"
-        " listed; node, params and lifecycle are the short form for one, which is named so",
+        "the nodes of a process by name, if there are several, or one that keeps its program's "
+        "name; params of the process apply to all of its nodes, also to unlisted ones; for a "
+        "single node, use node, params and lifecycle",
         {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
         to=NOT_OWN,
     )
@@ -606,39 +609,40 @@ def keys_of(way: Way) -> frozenset[str]:
 class ContainerSpec(Supervised, Entry):
     """A process that loads components.
 
-    One of rclcpp_components' containers, or one that is started elsewhere.
+    One of rclcpp_components' containers, or one that is already running.
     """
 
     isolation: Isolation = key(
         "shared",
-        "isolated: each component has an executor of its own; shared: one executor runs all of"
-        " them",
+        "isolated: one executor for each component; shared: one executor for all",
     )
-    executor: Executor = key("single", "with how many threads an executor runs")
+    executor: Executor = key("single", "the threads of an executor")
     package: Text = key(
-        "rclcpp_components", "the package of the container's program", "my_containers"
+        "rclcpp_components", "the package of the container's executable", "my_containers"
     )
     executable: Text | None = key(
         None,
-        "the container's program; default: component_container, and by isolation and executor",
+        "the container's executable; default: the component_container for isolation and executor",
         "my_container",
     )
-    args: Words = key((), "further arguments of the program", ["--verbose"])
+    args: Words = key((), "more arguments for the executable", ["--verbose"])
     external: OnlyTrue | None = key(
-        None, "true: tfcompose does not start it, and loads components into it", True
+        None, "true: tfcompose does not start it, but loads components into it", True
     )
     node: NodeName | None = key(
-        None, "its node's name; default: the container's", "perception_container"
+        None, "the name of its node; default: the container's", "perception_container"
     )
     namespace: Namespace | None = key(
-        None, "the namespace of its node; below ros.namespace unless it begins with /", "front"
+        None,
+        "the namespace of its node, relative to ros.namespace unless it begins with /",
+        "front",
     )
 
 
 class DriverSpec(StartedSpec):
-    """Keys over those of the preset's driver.
+    """Changes to the preset's driver.
 
-    Or the name of the process that drives this sensor; or none.
+    Or the name of the process that drives this sensor, or none.
     """
 
     process: Text | None = key(None, "the process that drives this sensor, or none", "camera_rig")

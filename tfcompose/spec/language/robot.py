@@ -62,7 +62,7 @@ from tfcompose.spec.load import Path, Spans
 
 
 class FrameSpec(MountKeys):
-    """A bare frame. Without a parent it is a root."""
+    """A frame without a body. Without a parent it is a root."""
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
@@ -87,7 +87,7 @@ class FrameSpec(MountKeys):
 class Mimic(Spec):
     """The joint follows another one.
 
-    Its position is multiplier · position of the other + offset.
+    Its position is multiplier · position of the other joint + offset.
     """
 
     joint: Text = key(..., "the joint that it follows", "finger_left_joint")
@@ -106,9 +106,9 @@ _SLIDES = {"revolute": False, "continuous": False, "prismatic": True}
 
 
 class JointSpec(EdgeKeys):
-    """An edge between bodies, in URDF's words.
+    """An edge between bodies, with URDF's terms.
 
-    Planar and floating joints need an owner: joint states say nothing about them.
+    Planar and floating joints need an owner, because joint states do not describe them.
     """
 
     type: Literal["fixed", JointType] = key(..., "how the joint moves", "revolute")
@@ -118,12 +118,13 @@ class JointSpec(EdgeKeys):
     child: Text = key(..., "the child link, which moves", "wheel_left_link")
     axis: Axis = key(
         (1.0, 0.0, 0.0),
-        "in the child's frame; as in URDF the default is x; of a planar joint the normal",
+        "the axis in the child's frame, default x as in URDF; for a planar joint the normal of "
+        "the plane",
         [0, 0, 1],
     )
     limit: Limit | None = key(
         None,
-        "how far, how fast and how hard it can move",
+        "limits of position, velocity and effort",
         {"lower": "-90 deg", "upper": "90 deg", "velocity": 2},
     )
     mimic: Mimic | None = key(
@@ -132,12 +133,12 @@ class JointSpec(EdgeKeys):
     dynamics: Dynamics | None = key(None, "damping and friction", {"damping": 0.1})
     safety_controller: SafetyController | None = key(
         None,
-        "where a controller begins to hold the joint back",
+        "soft limits and gains for a controller",
         {"soft_upper_limit": "80 deg", "k_velocity": 10},
     )
     calibration: ReferencePositions | None = key(
         None,
-        "the reference switch, as in URDF; the pose of a joint is not measured here",
+        "the positions of the reference switch, as in URDF; not a measured pose",
         {"rising": "10 deg"},
     )
 
@@ -219,18 +220,18 @@ class ComponentSpec(Spec):
 
 
 class HardwareSpec(Entry):
-    """A hardware component of ros2_control: a plugin and what it drives."""
+    """A hardware component of ros2_control: a plugin with its joints, sensors and gpios."""
 
-    plugin: Text = key(..., "the class that drives it", "mock_components/GenericSystem")
-    type: Literal["system", "actuator", "sensor"] = key("system", "which kind of component it is")
+    plugin: Text = key(..., "the class of the plugin", "mock_components/GenericSystem")
+    type: Literal["system", "actuator", "sensor"] = key("system", "the kind of component")
     params: XmlParameters = key({}, "the plugin's parameters", {"device": "/dev/ttyUSB0"})
     rw_rate: Annotated[int, Strict(), Field(ge=0, le=100_000), Integral] | None = key(
-        None, "how many times a second it is read and written; default, and 0: as all", 100
+        None, "reads and writes per second; 0 (default): the rate of the controller manager", 100
     )
-    is_async: Boolean | None = key(None, "true: it is read and written in a thread of its own")
+    is_async: Boolean | None = key(None, "true: it is read and written in its own thread")
     joints: dict[str, ComponentSpec] = key(
         {},
-        "by the names of the robot's joints",
+        "its joints by the names in the robot",
         {"wheel_left_joint": {"command": ["velocity"], "state": ["position"]}},
     )
     sensors: dict[str, ComponentSpec] = key(
@@ -281,14 +282,14 @@ Blocks = Annotated[
 
 
 class FrameOverride(Rotated):
-    """One frame of a sensor: this unit's own value, or another name.
+    """One frame of a sensor: its pose in this unit, or another name.
 
-    What is left out is the preset's.
+    Keys that are left out are as in the preset.
     """
 
     xyz: Xyz | None = key(None, "position in the parent", [0, 0.0148, 0])
     parent: Text | None = key(
-        None, "the frame of this sensor that this unit's driver makes its parent", "camera_link"
+        None, "its parent frame as published by the driver of this unit", "camera_link"
     )
     name: Text | None = key(None, "another name for this frame", "front_lens")
     joint: Text | None = key(
@@ -297,46 +298,46 @@ class FrameOverride(Rotated):
 
 
 class SensorSpec(MountKeys):
-    """A sensor on its mount; its frames are named after it."""
+    """A sensor and its mount. Its frames begin with its name."""
 
     preset: Text = key(..., "the model, as vendor/model", "realsense/d435i", "generic/lidar2d")
-    parent: Parents = key(..., "the frame that the sensor is mounted on", "base_link")
+    parent: Parents = key(..., "the frame on which the sensor is mounted", "base_link")
     place: Text | None = key(
         None,
-        "the frame of the sensor whose pose is given; the mount edge follows",
+        "the frame of the sensor whose pose is given; the pose of the mount is computed",
         "camera_color_optical_frame",
     )
     options: Parameters = key(
         {}, "the preset's own options: streams, imu, …", {"streams": ["color", "depth"]}
     )
     tf: SensorPublisher | None = key(
-        None, "who publishes the frames inside the sensor; default: as the preset has it"
+        None, "the publisher of the frames inside the sensor; default: as in the preset"
     )
     driver: Driver | None = key(
         None,
-        "keys over the preset's driver, the name of a process, or none",
+        "changes to the preset's driver, the name of a process, or none",
         "none",
         {"restart": "always"},
     )
     frames: dict[str, FrameOverride] = key(
         {},
-        "this unit's own values and names of frames",
+        "poses and names of frames of this unit",
         {"camera_imu_frame": {"xyz": [0, 0.01, 0]}},
     )
     optics: dict[str, OpticsSpec] = key(
         {},
-        "what its streams see, over what the preset says",
+        "fields of view of its streams, merged over the preset",
         {"depth": {"horizontal": "75 deg", "far": "4 m"}},
     )
 
 
 # Parts
 
-_WHERE = "relative to the file that names it, package://NAME/PATH or $(find NAME)/PATH"
+_WHERE = "relative to this file, package://NAME/PATH or $(find NAME)/PATH"
 
 
 class Origin(Posed):
-    """A pose as a parameter of a macro that takes a block."""
+    """A pose for a block parameter of a macro."""
 
 
 #: A macro's parameter: a mapping is a pose; everything else is passed on as it is.
@@ -359,7 +360,7 @@ _ENDINGS = {".urdf": "urdf", ".xacro": "xacro", ".yaml": "spec", ".yml": "spec"}
 class PartSpec(MountKeys):
     """Another robot as a part: a robot file, URDF or xacro.
 
-    Everywhere else in this file its names have the prefix.
+    The rest of the file refers to its names with the prefix.
     """
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*MountKeys.EXCLUSIVE, frozenset(PART_KINDS))
@@ -368,7 +369,7 @@ class PartSpec(MountKeys):
         " that publishes its first moving edge begin elsewhere"
     )
 
-    spec: Text | None = key(None, "a robot file, relative to the file that names it", "rover.yaml")
+    spec: Text | None = key(None, "a robot file, relative to this file", "rover.yaml")
     urdf: Text | None = key(
         None, f"a URDF file: {_WHERE}", "package://ur_description/urdf/ur5e.urdf"
     )
@@ -380,35 +381,38 @@ class PartSpec(MountKeys):
     )
     macro: Text | None = key(
         None,
-        "the macro of the xacro file to call; its parent and origin may be those of the part",
+        "the macro of the xacro file to call; its parent and origin may come from the part",
         "hokuyo_ust10",
     )
     params: dict[str, MacroParameter] = key(
         {},
-        "the macro's parameters; a pose, or a string that begins with <, for one that takes a"
-        " block",
+        "the macro's parameters; for a block parameter, a pose or a string that begins with <",
         {"name": "front", "parent_link": "base_link", "origin": {"xyz": [0.3, 0, 0.1]}},
     )
-    include: OneOrMore = key((), "further xacro files that the macro needs", ["common.xacro"])
+    include: OneOrMore = key((), "more xacro files that the macro needs", ["common.xacro"])
     prefix: Text | None = key(
         None,
-        "written in front of the part's frames and joints as it is, with its slash",
+        "prefix of the part's frames and joints, including its slash",
         "robot1/",
     )
     namespace: Namespace | None = key(
         None,
-        "makes the part a robot of its own, with its own static and joints; below ros.namespace",
+        "makes the part a separate robot with its own static and joints; relative to "
+        "ros.namespace",
         "robot1",
     )
     profiles: OneOrMore = key((), "profiles of the robot file", ["demo"])
     vars: Parameters = key({}, "values for variables of the robot file", {"mast": "40 cm"})
     root: Text | None = key(
         None,
-        "the frame of the part, without the prefix, below which it is taken; default: all of it",
+        "the frame of the part, without the prefix, at which it begins; default: the complete "
+        "part",
         "base_link",
     )
     place: Text | None = key(
-        None, "the frame of the part whose pose is given; the mount edge follows", "tool0"
+        None,
+        "the frame of the part whose pose is given; the pose of the mount is computed",
+        "tool0",
     )
     owner: Text | None = key(
         None, "the process that publishes every edge of the part", "arm_driver"
@@ -465,7 +469,7 @@ class PartSpec(MountKeys):
 
 @dataclass(frozen=True, slots=True)
 class RosSpec(RosSettings):
-    """What all processes share."""
+    """ROS settings of all processes."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -478,12 +482,12 @@ class RosSpec(RosSettings):
     ) = inherited(RosSettings, "router")
     isolate: Isolation = documented(
         "none",
-        "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless one is"
-        " given",
+        "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless "
+        "frame_prefix is set",
     )
     state_publisher: StatePublisher = documented(
         "tfcompose",
-        "stock: a robot_state_publisher publishes what tfcompose would publish below base",
+        "stock: robot_state_publisher publishes the edges below base that tfcompose owns",
     )
 
 
@@ -497,38 +501,38 @@ class RobotSpec(Spec):
         Text, Matches(r"[a-z][a-z0-9_]*", "a robot's name: lower case letters, digits and _")
     ] = key(..., "the robot's name", "rover")
     include: OneOrMore = key(
-        (), "files that this one is merged over, relative to this file", ["base.yaml"]
+        (), "files that this file is merged over, relative to this file", ["base.yaml"]
     )
     calibrations: OneOrMore = key(
-        (), "files with measured poses, of which every entry is applied", ["calibration/kit.yaml"]
+        (), "calibration files; every entry is applied", ["calibration/kit.yaml"]
     )
     base: Text | None = key(
         None,
-        "the link where the URDF begins; default: base_link, or the only root",
+        "the root link of the URDF; default: base_link, or the only root",
         "base_footprint",
     )
     vars: Parameters = key(
-        {}, "quantities, numbers or strings, used as ${name}", {"mast": "30 cm"}
+        {}, "quantities, numbers or strings; use them as ${name}", {"mast": "30 cm"}
     )
     args: Args = key(
         {},
-        "values that are given when it is built, as NAME:=VALUE, used as ${args.NAME}",
+        "build-time arguments, set as NAME:=VALUE; use them as ${args.NAME}",
         {"cameras": {"default": 2, "max": 8}, "sim": False},
     )
-    ros: RosSpec = key(RosSpec(), "what all processes share", {"namespace": "robot1"})
+    ros: RosSpec = key(RosSpec(), "ROS settings of all processes", {"namespace": "robot1"})
     packages: dict[str, Text] = key(
         {},
-        "where packages are that are not installed, relative to the file that names them",
+        "folders of packages that are not installed, relative to this file",
         {"ur_description": "../third_party/ur_description"},
     )
     links: dict[str, LinkSpec] = key(
         {},
-        "bodies, in URDF's words",
+        "bodies, with URDF's terms",
         {"base_link": {"visual": {"box": [0.5, 0.4, 0.15]}, "collision": "same"}},
     )
     joints: dict[str, JointSpec] = key(
         {},
-        "edges between bodies, in URDF's words",
+        "edges between bodies, with URDF's terms",
         {
             "lift_joint": {
                 "type": "prismatic",
@@ -540,53 +544,53 @@ class RobotSpec(Spec):
     )
     ros2_control: dict[str, HardwareSpec] = key(
         {},
-        "what drives the joints: ros2_control's hardware",
+        "the hardware of ros2_control",
         {"base": {"plugin": "mock_components/GenericSystem"}},
     )
     xml: Blocks = key(
         {},
-        "raw URDF beside links and joints: <gazebo>, <transmission>, …; a string, or strings by"
-        " any name",
+        "raw URDF in addition to links and joints: <gazebo>, <transmission>, …; one string, or "
+        "several by name",
         {"wheels": '<gazebo reference="wheel_left_link"><mu1>1.2</mu1></gazebo>'},
     )
     frames: dict[str, FrameSpec] = key(
         {},
-        "bare frames: the skeleton, and points of interest",
+        "frames without a body: the skeleton of the tree, and points of interest",
         {"odom": {"parent": "map", "owner": "slam"}},
     )
     sensors: dict[str, SensorSpec] = key(
         {},
-        "sensors on their mounts",
+        "sensors and their mounts",
         {"laser": {"preset": "generic/lidar2d", "parent": "base_link"}},
     )
     parts: dict[str, PartSpec] = key(
         {},
-        "other robots as subtrees, or beside each other",
+        "other robots, as subtrees or as separate trees",
         {"arm": {"urdf": "arm.urdf", "parent": "base_link"}},
     )
     containers: dict[str, ContainerSpec] = key(
         {}, "processes that load components", {"perception": {"isolation": "isolated"}}
     )
     processes: dict[str, ProcessSpec] = key(
-        {}, "what is started, simulated, or expected to run", {"base_drive": {"external": True}}
+        {}, "processes to start, to simulate, or to expect", {"base_drive": {"external": True}}
     )
     hosts: dict[HostName, HostSpec] = key(
-        {}, "the computers that processes name as their host", {"brain": {"ssh": "robot@10.0.0.2"}}
+        {}, "the computers that processes can run on", {"brain": {"ssh": "robot@10.0.0.2"}}
     )
     profiles: Parameters = key(
         {},
         "named overlays, chosen with --profile",
         {"demo": {"sensors": {"laser": {"driver": "none"}}}},
     )
-    guard: GuardPolicy = key(GuardPolicy(), "what watches the live tree", {"mode": "strict"})
+    guard: GuardPolicy = key(GuardPolicy(), "the checks of the live tree", {"mode": "strict"})
     preset_path: OneOrMore = key(
         (),
-        "folders with presets of your own, VENDOR/MODEL.yaml, relative to this file",
+        "folders with your own presets, VENDOR/MODEL.yaml, relative to this file",
         ["presets"],
     )
     coverage: dict[str, ZoneSpec] = key(
         {},
-        "zones that sensors have to see",
+        "zones that sensors must see",
         {
             "front": {
                 "frame": "base_link",
@@ -599,7 +603,7 @@ class RobotSpec(Spec):
     )
     rules: dict[str, RuleSetting] = key(
         {},
-        "how severe a finding is, by its code, and its limit",
+        "severity and limit of findings, by code",
         {"TF405": "off", "TF641": {"limit": "30 %"}},
     )
 

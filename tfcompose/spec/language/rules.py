@@ -60,12 +60,12 @@ def _part(value: Any) -> Any:
 
 
 class RuleSpec(Spec):
-    """How severe the findings of a code are, and from which limit on there is one."""
+    """Severity and limit of the findings of a code."""
 
-    severity: Level | None = key(None, "how severe a finding is; default: as the code")
+    severity: Level | None = key(None, "the severity; default: that of the code")
     limit: Annotated[Any, BeforeValidator(_limit, str | float)] = key(
         None,
-        "from where on there is a finding: a percentage, an angle or a length, as the code",
+        "the threshold of a finding: a percentage, an angle or a length, depending on the code",
         "30 %",
         "45 deg",
     )
@@ -84,16 +84,16 @@ def level_of(setting: RuleSpec | str) -> str:
 
 
 class ZoneSpec(Spec):
-    """A box that sensors have to see."""
+    """A box that sensors must see."""
 
     frame: Text = key(..., "the frame that it is in", "base_link")
-    center: Xyz = key((0.0, 0.0, 0.0), "its middle", [1, 0, 0.2])
+    center: Xyz = key((0.0, 0.0, 0.0), "its centre", [1, 0, 0.2])
     box: Sizes = key(..., "its lengths along x, y and z of the frame", [1, 1, 0.4])
     by: OneOrMore = key(
         (),
-        "kinds of streams, or sensors, of which one has to see it; default: all",
+        "kinds of streams, or sensors, at least one of which must see each point; default: all",
         ["lidar", "camera"],
     )
     least: Annotated[Number, BeforeValidator(_part, str | float)] = key(
-        1.0, "how much of it must be seen", "90 %"
+        1.0, "the part of the box that must be seen", "90 %"
     )

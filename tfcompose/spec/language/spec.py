@@ -102,14 +102,14 @@ class Entry(Checked):
 
     when: Condition | None = Field(
         None,
-        description="whether it is there: true, false or a condition",
+        description="the entry exists only if this is true: true, false or a condition",
         examples=["${args.sim}", "${args.n > 1}"],
     )
     for_: Loops | None = Field(
         None,
         alias="for",
         description=(
-            "there once for each value; its name, in quotes or not, says which: camera_${i}"
+            "repeats the entry for each value; its name contains the variable: camera_${i}"
         ),
         examples=[{"i": "${range(args.cameras)}"}, {"side": ["left", "right"]}],
     )

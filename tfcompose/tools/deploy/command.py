@@ -1,9 +1,9 @@
-"""Bring a robot to its computers, and start it there.
+"""Copy a robot to its computers, and start it there.
 
-Build the robot once, copy it to every computer under hosts: by ssh, start it there as a unit of
-systemd, and wait until every edge of every host is live; else bring every host back to the release
-before. What a host has already is not copied again: a second run changes nothing. tfcompose help
-hosts says more.
+Build the robot once, copy it over ssh to every computer under hosts:, start it there as a systemd
+unit, and wait until every edge of every host is live. Otherwise return every host to the previous
+release. Files that a host already has are not copied again; a second run changes nothing. See
+tfcompose help hosts.
 """
 
 from __future__ import annotations
@@ -30,11 +30,9 @@ def arguments(parser: ArgumentParser) -> None:
         "--check", action="store_true", help="change nothing; exit 1 if something would change"
     )
     parser.add_argument(
-        "--diff", action="store_true", help="print how the files on the hosts differ"
+        "--diff", action="store_true", help="print the differences from the files on the hosts"
     )
-    parser.add_argument(
-        "--rollback", action="store_true", help="return to the release before the current one"
-    )
+    parser.add_argument("--rollback", action="store_true", help="return to the previous release")
     parser.add_argument(
         "--host",
         action="append",
@@ -49,15 +47,14 @@ def arguments(parser: ArgumentParser) -> None:
         action="store_false",
         help="keep the release without waiting for its edges",
     )
-    parser.add_argument(
-        "--wait", action="store_true", help="wait for the edges, which is the default"
-    )
+    parser.add_argument("--wait", action="store_true", help="wait for the edges (default)")
     parser.add_argument(
         "--timeout",
         type=positive,
         default=60.0,
         metavar="S",
-        help="go back if not every edge is live S seconds after the start; default: 60",
+        help="return to the previous release unless every edge is live S seconds after the "
+        "start; default: 60",
     )
     parser.add_argument(
         "--clock-limit",
@@ -69,10 +66,10 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--wheels",
         metavar="FOLDER",
-        help="install these wheels there, in a Python of the release's own",
+        help="install these wheels on the hosts, in a separate Python of the release",
     )
     parser.add_argument(
-        "--system", action="store_true", help="units of the system, as root; default: of the user"
+        "--system", action="store_true", help="system units, as root; default: user units"
     )
     parser.set_defaults(wait=True)
 

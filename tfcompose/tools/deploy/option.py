@@ -17,12 +17,12 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--all-hosts",
         action="store_true",
-        help="on every host that the robot is deployed to, by ssh",
+        help="on every host of the robot, over ssh",
     )
     parser.add_argument(
         "--file",
         metavar="FILE|PLAN",
-        help="with --all-hosts: the robot that has the hosts; default: robot.yaml",
+        help="with --all-hosts: the robot file with the hosts; default: robot.yaml",
     )
     add_trust(parser)
 

@@ -8,7 +8,7 @@ TOOL = Tool(
     commands=(
         Command(
             "deploy",
-            "Bring a robot to its computers, and start it there",
+            "Copy a robot to its computers, and start it there",
             "tfcompose.tools.deploy.command",
             group="Ship",
             completes=(("hosts", "hosts"),),

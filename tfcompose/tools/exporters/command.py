@@ -1,9 +1,9 @@
 """Export the plan for systemd, docker compose, Kubernetes or ros2 launch.
 
-Write a built plan, or a robot that is built first, for systemd (a unit per process and a target),
-docker compose (a service per process), Kubernetes (a ConfigMap and a workload per process, with a
-kustomization) or ros2 launch (a launch file with stock nodes for fixed edges and joints). What the
-other launcher cannot do is listed.
+Export a built plan, or a robot file, for systemd (a unit per process and a target), docker
+compose (a service per process), Kubernetes (a ConfigMap and a workload per process, with a
+kustomization) or ros2 launch (a launch file with stock nodes for fixed edges and joints). List
+everything that the other launcher cannot do.
 """
 
 from __future__ import annotations
@@ -58,36 +58,36 @@ def arguments(parser: ArgumentParser) -> None:
         "--output",
         metavar="DIR",
         help=(
-            "where to build FILE; the export is a folder in it; default: build/ROBOT, or PLAN's "
-            "folder"
+            "where to build FILE; the export goes to a subfolder; default: build/ROBOT, or "
+            "PLAN's folder"
         ),
     )
     parser.add_argument(
         "--host",
         metavar="NAME",
-        help="export only this host's share; '': processes without a host; default: all",
+        help="export only the processes of this host; '': those without a host; default: all",
     )
     parser.add_argument(
         "--at",
         metavar="DIR",
         help=(
-            "the plan's folder on the robot; default: systemd: as here; k8s: none, a ConfigMap "
-            "holds the plan"
+            "the plan's folder on the robot; default: systemd: the same as here; k8s: none, "
+            "the plan is in a ConfigMap"
         ),
     )
     parser.add_argument(
         "--python",
         metavar="FILE",
-        help="systemd: Python on the robot; default: that of the host under hosts, or this one",
+        help="systemd: the Python on the robot; default: python of the host under hosts, or "
+        "this one",
     )
     parser.add_argument(
         "--setup",
         action="append",
         default=[],
         metavar="FILE",
-        help="systemd: source it first, as /opt/ros/jazzy/setup.bash; repeatable; default: as "
-        "the host under hosts, or "
-        "this shell's variables",
+        help="systemd: a file to source first, such as /opt/ros/jazzy/setup.bash; repeatable; "
+        "default: setup of the host under hosts, or this shell's variables",
     )
     parser.add_argument(
         "--image",

@@ -1,11 +1,10 @@
 """Share edges between robots over Zenoh, and look poses up between them.
 
-What a robot shares, and where its Zenoh router is, stands in fleet.yaml, which can be named
-anywhere; default: fleet.yaml. `fleet lint` checks the file. `fleet share ROBOT` runs on the robot
-and sends its edges; it is the only one that needs ROS. `fleet ps` lists the robots and how old
-what they share is, `fleet echo A B` prints the pose of frame B in frame A, such as r1/base_link
-r2/base_link, and `fleet doctor` says what is wrong. `fleet ps` and `fleet doctor` exit with 1
-where a robot is not live.
+`fleet.yaml` lists each robot's router and shared edges. Pass another file as the last argument.
+`fleet lint` checks the file. `fleet share ROBOT` runs on the robot and sends its edges; only this
+needs ROS. `fleet ps` lists the robots and the age of their shared edges. `fleet echo A B` prints
+the pose of frame B in frame A, such as r1/base_link r2/base_link. `fleet doctor` diagnoses
+routers, links and clocks. `fleet ps` and `fleet doctor` exit 1 if a robot is not live.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ _HEAD = ("ROBOT", "STATE", "AGE", "EDGES", "ROUTER")
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("action", choices=_ACTIONS, help="what to do, as above")
+    parser.add_argument("action", choices=_ACTIONS, help="the action, as above")
     parser.add_argument(
         "words",
         nargs="*",
@@ -55,8 +54,8 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_for(
         parser,
-        "ps and doctor: listen for S seconds; default: until all is known, at most 3; echo: end"
-        " after S",
+        "ps and doctor: listen for S seconds; default: until every robot answers, at most 3; "
+        "echo: stop after S",
     )
     parser.add_argument(
         "--rate",

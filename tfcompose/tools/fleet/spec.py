@@ -36,14 +36,10 @@ Edge = Annotated[
 
 
 class SharedEdge(Spec):
-    """An edge that leaves the robot, and how often at most."""
+    """A shared edge with its maximum rate."""
 
-    edge: Edge = key(
-        ..., "parent → child, by the names that they have on the robot", "odom → base_link"
-    )
-    rate: Rate = key(
-        5.0, "how often it is sent at most; an edge that is fixed is sent twice a second", "5 Hz"
-    )
+    edge: Edge = key(..., "parent → child, with the frame names on the robot", "odom → base_link")
+    rate: Rate = key(5.0, "the maximum rate; a fixed edge is sent twice a second", "5 Hz")
 
     @property
     def ends(self) -> tuple[str, str]:
@@ -64,11 +60,11 @@ Shared = Annotated[SharedEdge, BeforeValidator(_by_name, Text | SharedEdge)]
 
 
 class FleetMember(Spec):
-    """Which robot of a fleet this is: it shares the edges that the fleet's file names."""
+    """The robot's entry in a fleet file, with the edges it shares."""
 
-    file: Text = key(..., "the fleet's file, relative to the file that names it", "fleet.yaml")
+    file: Text = key(..., "the fleet file, relative to this file", "fleet.yaml")
     robot: Text | None = key(
-        None, "which of the fleet's robots this is; default: the robot's name", "r1"
+        None, "the robot's name in the fleet; default: the name of the robot", "r1"
     )
 
 
@@ -80,39 +76,39 @@ Member = Annotated[FleetMember, BeforeValidator(_by_file, Text | FleetMember)]
 
 
 class FleetRobot(Spec):
-    """A robot: where its router is, and what of its tree the others get."""
+    """A robot: its router, and the edges that it shares."""
 
     router: Annotated[
         Text, Matches(ENDPOINT, "an endpoint of Zenoh such as tcp/10.0.0.2:7447")
-    ] = key(..., "where the robot's Zenoh router listens", "tcp/10.0.0.11:7447")
+    ] = key(..., "the address of the robot's Zenoh router", "tcp/10.0.0.11:7447")
     share: tuple[Shared, ...] | None = key(
-        None, "the edges that leave this robot; default: those of the fleet", ["map → odom"]
+        None, "the edges that this robot shares; default: those of the fleet", ["map → odom"]
     )
     namespace: Namespace = key("", "the namespace of the robot's /tf and /tf_static", "robot1")
     prefix: Text | None = key(
         None,
-        "written in front of its frames for others, unless they have it; default: NAME/",
+        "the prefix of its frames in the fleet, unless they have it already; default: NAME/",
         "r1/",
     )
 
 
 class FleetSpec(Spec):
-    """A fleet."""
+    """A fleet of robots."""
 
     HABITS: ClassVar[dict[str, str]] = {"tfcompose": "a fleet's file begins with fleet: 1"}
 
     fleet: Literal[1] = key(..., "the version of this language", 1)
-    name: Name = key("fleet", "its name; fleets of different names do not mix", "warehouse")
+    name: Name = key("fleet", "the name; fleets with different names are separate", "warehouse")
     robots: dict[RobotName, FleetRobot] = key(
         ...,
         "the robots by name",
         {"r1": {"router": "tcp/10.0.0.11:7447"}, "r2": {"router": "tcp/10.0.0.12:7447"}},
     )
     share: tuple[Shared, ...] = key(
-        (), "the edges that leave each robot", ["map → odom", "odom → base_link at 5 Hz"]
+        (), "the edges that each robot shares", ["map → odom", "odom → base_link at 5 Hz"]
     )
     shared_frames: Texts = key(
-        ("map",), "frames that are the same for all robots, and get no prefix", ["map", "dock"]
+        ("map",), "frames that are the same for all robots, without a prefix", ["map", "dock"]
     )
 
     def edges_of(self, robot: str) -> tuple[SharedEdge, ...]:

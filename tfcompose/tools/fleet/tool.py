@@ -19,7 +19,7 @@ TOOL = Tool(
         Key(
             "fleet",
             "tfcompose.tools.fleet.spec:Member",
-            "the fleet that it shares edges with, by a process fleet_share",
+            "the fleet that this robot shares edges with",
             ("fleet.yaml", {"file": "fleet.yaml", "robot": "r1"}),
             processes="tfcompose.tools.fleet.membership:share_process",
             check="tfcompose.tools.fleet.membership:wrong_membership",

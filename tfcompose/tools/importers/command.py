@@ -1,9 +1,10 @@
 """Write a robot file from URDF, launch files, scripts or a running robot.
 
-A URDF or xacro file: building the result gives the same URDF, and chains of frames that match a
-preset become sensors. A launch file or a shell script: processes, and frames of static transforms.
-A running tree, a recording: frames with their owners. Clearpath's robot.yaml and Autoware's
-calibrations. What a robot file cannot say is a TODO comment with its file and line, and a finding.
+Write a robot file from URDF, xacro, launch files, shell scripts, Clearpath's robot.yaml,
+Autoware's calibrations, a running tree or a recording. Building a robot from a URDF gives the
+same URDF; frames that match a preset become sensors. Launch files and scripts become processes
+and frames. A tree becomes frames with their owners. Anything that a robot file cannot express
+becomes a TODO comment with its file and line, and a finding.
 """
 
 from __future__ import annotations
@@ -48,26 +49,31 @@ def arguments(parser: ArgumentParser) -> None:
         "file",
         nargs="?",
         metavar="FILE",
-        help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml, calibrations "
-        "of Autoware's or the "
-        "folder of its individual_params; -: a script's lines or a launch file from stdin",
+        help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml, a calibration "
+        "file of Autoware, or its folder individual_params; -: a script or a launch file "
+        "from stdin",
     )
-    parser.add_argument("more", nargs="*", metavar="FILE", help="further calibrations")
+    parser.add_argument(
+        "more", nargs="*", metavar="FILE", help="more calibration files of Autoware"
+    )
     parser.add_argument(
         "given",
         nargs="*",
         default=[],
         metavar="NAME:=VALUE",
         help=(
-            "an argument of the xacro or launch file; of individual_params, vehicle_id and"
-            " sensor_model"
+            "an argument of the xacro or launch file; for individual_params: vehicle_id and "
+            "sensor_model"
         ),
     )
     parser.add_argument("--live", action="store_true", help="import the running tree")
     add_bag(parser, "import a recording")
     add_for(parser, "with --live, observe for S seconds; default: 10")
     parser.add_argument(
-        "--namespace", type=namespace, default="", help="of the topics tf and tf_static"
+        "--namespace",
+        type=namespace,
+        default="",
+        help="the namespace of the topics tf and tf_static",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", help="write the robot file here; default: print it"
@@ -83,17 +89,17 @@ def arguments(parser: ArgumentParser) -> None:
         help="folder of a package that is not installed; repeatable",
     )
     parser.add_argument(
-        "--no-sensors", action="store_true", help="keep frames as frames, do not match presets"
+        "--no-sensors", action="store_true", help="keep all frames; do not match presets"
     )
     parser.add_argument(
         "--all-branches",
         action="store_true",
-        help="of a launch file, take what conditions leave out, too",
+        help="for a launch file: import actions whose condition is false too",
     )
     parser.add_argument(
         "--keep-going",
         action="store_true",
-        help="write as much as possible of a source with errors",
+        help="import as much as possible from a source with errors",
     )
     add_trust(parser)
 

@@ -1,10 +1,10 @@
 """Show a robot in the browser, and edit its mounts.
 
 Show the robot of FILE (a robot, or a built plan.json) in 3-D in the browser: bodies, frames,
-owners, joints. With --edit mounts are dragged, or their poses typed, and saved where the values
-stand in the file. With --live frames are where they are published: what differs from the robot has
-a ghost where it should be, edges that are silent or sent by somebody else are red. With --bag they
-are where they were recorded, at the time of a slider.
+owners, joints. With --edit, drag mounts or type their poses, and save the values in the file.
+With --live, show frames at their published poses: a frame that differs from the robot has a ghost
+at its expected pose, and edges that are silent or from another publisher are red. With --bag,
+show frames as recorded, at the time of a slider.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_variant(parser)
     parser.add_argument(
-        "--live", action="store_true", help="show the running tree, and what is wrong with it"
+        "--live", action="store_true", help="show the running tree and its findings"
     )
     parser.add_argument(
         "--joints",
         action="store_true",
-        help="with --live: sliders publish /joint_states, if nobody else does",
+        help="with --live: sliders publish /joint_states, unless another node does",
     )
     add_bag(parser)
     parser.add_argument(
@@ -64,8 +64,8 @@ def arguments(parser: ArgumentParser) -> None:
         type=_seconds,
         metavar="S",
         help=(
-            "with --bag: the time to begin with, in seconds after its first transform, or since "
-            "the epoch; default: 0"
+            "with --bag: the initial time, in seconds after the first transform or since the "
+            "epoch; default: 0"
         ),
     )
     add_tolerance(parser)
@@ -74,13 +74,13 @@ def arguments(parser: ArgumentParser) -> None:
         "--edit", action="store_true", help="move mounts, and save them in the file"
     )
     parser.add_argument(
-        "--html", metavar="FILE", help="write one HTML file that needs nothing else, and end"
+        "--html", metavar="FILE", help="write one self-contained HTML file, and exit"
     )
     parser.add_argument(
         "--host",
         default=_HOST,
         metavar="ADDRESS",
-        help=f"listen there; the printed address has the token that lets in (default: {_HOST})",
+        help=f"listen there; access needs the token in the printed address (default: {_HOST})",
     )
     parser.add_argument("--port", type=int, default=_PORT, help=f"the port (default: {_PORT})")
     parser.add_argument("--open", action="store_true", help="open the browser")

@@ -3,19 +3,28 @@
 What each of them is given, and what is said of all together.
 """
 
+import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
+from rclpy.duration import Duration
 
+from tests.support.waiting import TIMEOUT_S, until
+from tfcompose.guard.judge import Judge
 from tfcompose.guard.process import (
     CHECK_EVERY_S,
     GATHER_BELOW,
+    TopicWatch,
     gather_s,
     plans_by_topics,
     together,
 )
 from tfcompose.model.messages import Clear, GuardEvent, OwnerReady, TreeComplete
 from tfcompose.model.plan import Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.model.plan.topics import GLOBAL
+from tfcompose.tf.ros.node import DEEP, TFPublisher, open_node
+from tfcompose.tf.ros.tf_codec import Template
 
 OWN = {"/tf": "/one/tf", "/tf_static": "/one/tf_static"}
 
@@ -76,3 +85,22 @@ def test_a_watching_guard_lets_messages_gather_unless_many_come(
 ) -> None:
     pause_s = gather_s(taken, is_prompt=is_prompt)
     assert 0 < pause_s <= CHECK_EVERY_S if gathers else pause_s == 0
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("too_many", [False, True])
+def test_owners_are_not_called_silent_where_the_guards_reader_overflowed(
+    node: Any, edge: Callable[..., PlanEdge], *, too_many: bool
+) -> None:
+    judge = Judge(plan(edge("odom base_link", "drive")), 0.0, time.monotonic(), 0)
+    watch = TopicWatch(node, GLOBAL, judge, lambda _: None)
+    message = Template([("odom", "base_link")]).data
+    with open_node("drive", "/rover") as drive:
+        publisher = TFPublisher(drive, static=False, qos=2 * DEEP)
+        assert until(lambda: publisher.publisher.get_subscription_count() == 1)
+        for _ in range(DEEP + 100 if too_many else DEEP - 100):
+            publisher.publish(message)
+        assert publisher.publisher.wait_for_all_acked(Duration(seconds=TIMEOUT_S))
+        watch.step()
+    assert judge.live.is_behind(time.monotonic()) == too_many
+    watch.close()

@@ -253,6 +253,9 @@ def test_a_changed_component_is_unloaded_and_loaded_and_one_that_vanished_is_unl
     ]
     history.answer("b", "a")
     assert "b" not in history.state.tracked
+    before = history.state
+    history.answer("b")
+    assert history.state == before, "it was answered, and is of the plan no more"
     assert history.loads() == ["a", "b", "a"]
 
 

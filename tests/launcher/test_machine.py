@@ -352,11 +352,16 @@ def test_a_process_past_the_fence_is_stopped_where_violations_are_only_reported(
 def test_a_process_past_the_fence_is_known_by_its_number_where_its_environment_was_cleared() -> (
     None
 ):
-    history = begin(GUARD, STATIC, run_process("slam", restart="always")).feed(Clear())
+    slam, idle = run_process("slam", restart="always"), run_process("idle")
+    history = begin(GUARD, STATIC, slam, idle).feed(Clear())
     pid = history.state.tracked["slam"].pid
     assert pid
-    history.feed(Unfenced(ERROR, "", pid + 1000))
-    assert history.killed == []
+    history.feed(ProcessRequest("stop", "idle"), Exited("idle", 0))
+    for unknown in (0, pid + 1000):
+        history.feed(Unfenced(ERROR, "", unknown))
+        expect(history.found()[-1], "TF801", "nothing is stopped")
+    assert [name for name, _ in history.killed] == ["idle"]
+    history.killed.clear()
     expect(history.found()[-1], "TF801", "nothing is stopped", f"kill {pid + 1000}")
     history.feed(Unfenced(ERROR, "", pid))
     assert history.killed == [("slam", SIGINT)]

@@ -175,6 +175,16 @@ def test_all_ready_is_reported_once_with_when_each_was_started_and_ready() -> No
     assert notices.seconds == pytest.approx(3)
 
 
+def test_after_another_plan_all_ready_tells_of_what_was_started_for_it() -> None:
+    a = run_process("a")
+    history = begin(GUARD, a, run_process("b")).feed(Clear()).wait(5)
+    changed = replace(a, argv=("other",))
+    history.feed(NewPlan(plan_of(GUARD, changed, run_process("b")), frozenset({"a"})))
+    history.wait(1).feed(Exited("a", 0)).wait(1)
+    notice = history.all(AllReady)[-1]
+    assert {row.process: (row.started, row.ready) for row in notice.rows} == {"a": (1.0, 1.0)}
+
+
 # Ends.
 
 
@@ -437,6 +447,7 @@ def test_the_guard_gives_a_process_its_new_description_and_nothing_is_restarted(
 def test_a_process_that_refuses_its_description_is_started_anew() -> None:
     history = given_a_description().feed(DescriptionState("rsp", "not a URDF"))
     assert history.killed == [("rsp", SIGINT)]
+    assert history.state.tracked["rsp"].wanted, "nothing is ready without it"
     assert history.feed(Exited("rsp", 0)).started[-1] == "rsp"
     assert history.all(Replanned)[-1] == Replanned(("rsp",))
     before = list(history.killed)

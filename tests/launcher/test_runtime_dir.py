@@ -8,13 +8,20 @@ import sys
 import tempfile
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.launcher import runtime_dir
-from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of, runtime_dirs
+from tfcompose.launcher.runtime_dir import (
+    Holder,
+    Lock,
+    RuntimeDirError,
+    runtime_dir_of,
+    runtime_dirs,
+)
 from tfcompose.model.plan import Plan, RosSettings
 
 ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())
@@ -147,3 +154,14 @@ def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str]) 
             assert until(lambda: place.holder() is None)
         finally:
             child.kill()
+
+
+def test_a_run_is_found_though_what_its_lock_holds_cannot_be_read(
+    env: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = runtime_dir_of(ROVER, env)
+    lock = Lock(place)
+    os.ftruncate(lock.fd, 0)
+    monkeypatch.setattr(runtime_dir, "time", SimpleNamespace(sleep=lambda _: None))
+    assert place.holder() == Holder(0, 0.0, "")
+    lock.close()

@@ -59,7 +59,7 @@ from tfcompose.tf.process import ready, say
 from tfcompose.tf.ros.clock import ClockWatch, SimClock
 from tfcompose.tf.ros.environment import PROFILE_VARIABLES
 from tfcompose.tf.ros.graph import ids_say_who
-from tfcompose.tf.ros.node import WaitSet, middleware, open_node
+from tfcompose.tf.ros.node import DEEP, WaitSet, middleware, open_node
 from tfcompose.tf.ros.tf_codec import number_of_transforms
 
 if TYPE_CHECKING:
@@ -171,6 +171,8 @@ class TopicWatch:
         fenced = list(self.data.take_fenced())
         strangers = self._take(fenced, now)  # first: it is passed on
         public = list(self.data.take_public())
+        if len(fenced if self.relay else public) >= DEEP:  # of the owners' some may be lost
+            self.judge.live.lost(now)
         self._number_taken = len(fenced) + len(public)
         if self._by_partition:
             self._graph.hear_public(

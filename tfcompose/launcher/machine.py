@@ -289,7 +289,7 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
 
 def _process_of(state: State, pid: int) -> str:
     """Return the plan's process that was started with that number; empty: none was."""
-    started = (name for name, tracked in state.tracked.items() if pid and tracked.pid == pid)
+    started = (name for name, tracked in state.tracked.items() if tracked.pid == pid)
     return next(started, "")
 
 

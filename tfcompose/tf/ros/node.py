@@ -49,8 +49,6 @@ _OK = 0
 _TAKE_FAILED = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED: nothing is there
 _NO_GID = bytes(16)
 _OPTIONALLY = 2  # RMW_UNIQUE_NETWORK_FLOW_ENDPOINTS_OPTIONALLY_REQUIRED
-# What one take returns at most, so that a flood does not keep the caller from its signals.
-_MOST_AT_ONCE = 1000
 
 
 def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy) -> QoSProfile:
@@ -82,8 +80,10 @@ def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> Qo
 TF_PUBLISHER = TF_READER = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 TF_STATIC_PUBLISHER = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 TF_STATIC_READER = qos(100, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
-DEEP_TF_READER = qos(1000, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
-DEEP_TF_STATIC_READER = qos(1000, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
+#: How many messages a deep reader keeps until they are taken; of more the oldest are lost.
+DEEP = 1000
+DEEP_TF_READER = qos(DEEP, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
+DEEP_TF_STATIC_READER = qos(DEEP, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 #: Matches any publisher of ``joint_states``, as robot_state_publisher's subscription does; that
 #: one keeps 5 messages, and loses those of a fast source while it does not run for a moment.
 JOINT_STATES = qos(50, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
@@ -271,13 +271,15 @@ class MessageSource(ABC):
         return self._topic
 
     def take(self) -> list[Received]:
-        """Return all that has come since the last time, oldest first, and wait for nothing.
+        """Return what has come since the last time, oldest first, and wait for nothing.
+
+        At most ``DEEP`` messages, so that a flood does not keep the caller from its signals.
 
         Raises:
             RosError: if rcl cannot take from this subscription.
         """
         found: list[Received] = []
-        while len(found) < _MOST_AT_ONCE and self._take_one():
+        while len(found) < DEEP and self._take_one():
             found.append(self._received())
         return found
 

@@ -114,11 +114,17 @@ class Computer:
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Run a program on it, as its user."""
+        return processes.run(self._inside(words), check=False)
+
+    def start(self, *words: str) -> processes.Started:
+        """Start a program on it, as its user; it is killed at the end of the test."""
+        pipes = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+        return processes.Started(processes.start(self._inside(words), **pipes))
+
+    def _inside(self, words: Sequence[str]) -> list[str]:
         env = shlex.join(f"{name}={value}" for name, value in self.environment().items())
         script = f"exec env -i {env} {shlex.join(words)}"
-        return processes.run(
-            ["nsenter", "-t", str(self.inside()), "-a", "sh", "-c", script], check=False
-        )
+        return ["nsenter", "-t", str(self.inside()), "-a", "sh", "-c", script]
 
     def environment(self) -> dict[str, str]:
         """Return the environment of its user."""

@@ -111,6 +111,9 @@ from tfcompose.tools.fleet.observe import EdgeStatus, FleetRobotStatus, LinkStat
 from tfcompose.tools.fleet.spec import validate_fleet
 from tfcompose.tools.importers.draft import ImportDraft
 from tfcompose.tools.importers.shell import add_script
+from tfcompose.tools.rebag import command as rebag
+from tfcompose.tools.rebag.messages import MessageEditor
+from tfcompose.tools.rebag.recorded_topic import RecordedTopic
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 AN_EXAMPLE = finding("TF801", "an example's", None)
@@ -862,6 +865,22 @@ def recordings() -> Iterator[Finding]:
             yield from _refused(partial(main, ["echo", *words, "--bag", "bag", "--once"]))
 
 
+def corrected() -> Iterator[Finding]:
+    """Correct a recording where the new one is there already, and with what does not fit it."""
+    refuse = partial(mock.patch.object, attribute="reject", side_effect=_rejected)
+    with TemporaryDirectory() as folder, inside(folder), refuse(live), refuse(rebag):
+        Path("robot.yaml").write_text(ROVER, "utf-8")
+        write_bag(Path("bag"), drive())
+        Path("text.yaml").write_text("a: 1\n", "utf-8")
+        for words in (["bag"], ["new", "--camera-info", "/tf=text.yaml"]):
+            command = ["rebag", "bag", *words, "--with", "robot.yaml"]
+            yield from _refused(partial(main, command))
+    topic = RecordedTopic("/beep", "acme/msg/Beep")
+    editor = MessageEditor({"old": "new"}, {})
+    editor.editor_of(topic)
+    yield from rebag.warnings_of(editor.unknown, {"/tf": 2})
+
+
 def imported() -> Iterator[Finding]:
     """A script of which a robot file cannot say all."""
     draft = ImportDraft("rover")
@@ -985,6 +1004,7 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     compiled,
     recordings,
     imported,
+    corrected,
     foreign_tools,
     confined,
     deployed,

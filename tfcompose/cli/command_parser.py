@@ -45,8 +45,7 @@ class Parser(ArgumentParser):
         takes_given = any(action.dest == "given" for action in self._actions)
         if any(action.dest == "ros_args" for action in self._actions):
             argv, ros_args = split_ros_args(argv)
-        settings = [argument for argument in argv if _GIVEN.match(argument)] if takes_given else []
-        rest = [argument for argument in argv if argument not in settings]
+        settings, rest = self._settings(argv) if takes_given else ([], argv)
         if ros_args:
             namespace = Namespace(**vars(namespace or Namespace()), ros_args=ros_args)
         arguments = super().parse_intermixed_args(rest, namespace)
@@ -55,6 +54,23 @@ class Parser(ArgumentParser):
 
             arguments.given = pairs([*settings, *arguments.given], ":=")
         return arguments
+
+    def _settings(self, argv: Sequence[str]) -> tuple[list[str], list[str]]:
+        """Return the words NAME:=VALUE, except those that belong to an option, and the rest."""
+        renaming = {
+            option
+            for action in self._actions
+            if ":=" in str(action.metavar)
+            for option in action.option_strings
+        }
+        settings: list[str] = []
+        rest: list[str] = []
+        before = ""
+        for argument in argv:
+            is_setting = _GIVEN.match(argument) and before not in renaming
+            (settings if is_setting else rest).append(argument)
+            before = argument
+        return settings, rest
 
     def lacks_option(self, argv: Iterable[str]) -> bool:
         """Return whether an argument is an option that the parser does not have."""

@@ -126,7 +126,7 @@ class Recording:
             except BagError:
                 raise
             except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
-                raise _damage_error(str(file), error) from None
+                raise damage_error(str(file), error) from None
         if not found:
             raise _no_topic(self.path, pairs, others)
 
@@ -372,7 +372,7 @@ def _order_of(part: str) -> tuple[int, str]:
     return (int(part), "") if part.isdigit() else (-1, part)
 
 
-def _damage_error(path: str, error: Exception) -> BagError:
+def damage_error(path: str, error: Exception) -> BagError:
     """Return what to say where the library cannot read a bag."""
     reason = " ".join(str(error).split()) or type(error).__name__
     advice = ""

@@ -1,0 +1,1 @@
+"""Corrected recordings: bags rewritten with the poses of a robot file."""

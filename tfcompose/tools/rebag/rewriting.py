@@ -1,0 +1,119 @@
+"""Rewriting of one file of a bag: what the storage formats ask of a correction."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import yaml
+
+from tfcompose.tf.ros.tf_codec import TF_MESSAGE
+from tfcompose.tools.rebag.recorded_topic import (
+    QOS_BY_WORDS,
+    TF_DEFINITION,
+    RecordedTopic,
+    qos_profiles,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.foundation.signals import Stop
+    from tfcompose.model.plan.topics import Topics
+    from tfcompose.tools.rebag.correction import TFCorrection
+    from tfcompose.tools.rebag.messages import MessageEditor
+
+
+class InterruptedRewrite(Exception):  # noqa: N818 (a signal is no error)
+    """Raised when the work is to end before the bag is complete."""
+
+
+#: Returns the bytes of a message as they are to be; None: the message goes.
+Edit = Callable[[bytes], "bytes | None"]
+
+
+@dataclass
+class Rewrite:
+    """Everything that changes in a bag, over all its files.
+
+    ``compress`` and ``expand`` are for bags that compress each message.
+    """
+
+    corrections: Mapping[Topics, TFCorrection]
+    messages: MessageEditor
+    #: Text entries that the new bag's metadata gets.
+    provenance: Mapping[str, str]
+    #: Ends the work early: a signal came.
+    stop: Stop
+    metadata_version: int = QOS_BY_WORDS
+    #: The QoS of each topic's publishers, as the bag's files store it.
+    qos: dict[str, str] = field(default_factory=dict)
+    #: The type of each topic of the bag.
+    types: dict[str, str] = field(default_factory=dict)
+    expand: Callable[[bytes], bytes] | None = None
+    compress: Callable[[bytes], bytes] | None = None
+    #: TFMessages that could not be decoded, by topic; they stay as they are.
+    malformed: Counter[str] = field(default_factory=Counter)
+
+    def go_on(self) -> None:
+        """Pass, unless a signal came.
+
+        Raises:
+            InterruptedRewrite: if one came.
+        """
+        if self.stop.requested:
+            raise InterruptedRewrite
+
+    def qos_of(self, topic: str) -> str:
+        """Return the QoS of the publishers of a fixed topic, as the bag has it, or as tf2's."""
+        recorded = self.qos.get(topic)
+        if recorded is not None:
+            return recorded
+        return str(yaml.safe_dump(qos_profiles(self.metadata_version), sort_keys=False)).strip()
+
+    def edit_of(self, channel: RecordedTopic) -> Edit | None:
+        """Return what changes the messages of a channel; None if they stay as they are."""
+        edit = self.tf_edit_of(channel) or self.messages.editor_of(channel)
+        if edit is None or self.expand is None or self.compress is None:
+            return edit
+        expand, compress = self.expand, self.compress
+
+        def edit_compressed(data: bytes) -> bytes | None:
+            before = expand(data)
+            after = edit(before)
+            if after is None or after is before:
+                return None if after is None else data
+            return compress(after)
+
+        return edit_compressed
+
+    def openings(self, stamp_ns: int) -> list[tuple[RecordedTopic, bytes]]:
+        """Return the messages that a file begins with, at a time in nanoseconds."""
+        messages = []
+        for (_, static_topic), correction in self.corrections.items():
+            data = correction.opening(stamp_ns)
+            if data is not None:
+                channel = RecordedTopic(static_topic, TF_MESSAGE, "ros2msg", TF_DEFINITION)
+                messages.append((channel, self.compress(data) if self.compress else data))
+        return messages
+
+    def tf_edit_of(self, channel: RecordedTopic) -> Edit | None:
+        """Return what changes the TFMessages of a channel; None if it is not corrected."""
+        for topics, correction in self.corrections.items():
+            if channel.topic in topics and channel.type == TF_MESSAGE:
+                return self._tf_edit(correction, channel.topic)
+        return None
+
+    def _tf_edit(self, correction: TFCorrection, topic: str) -> Edit:
+        static = topic == correction.topics[1]
+
+        def edit(data: bytes) -> bytes | None:
+            try:
+                return correction.corrected(data, static=static)
+            except ValueError:
+                self.malformed[topic] += 1
+                return data
+
+        return edit

@@ -1,0 +1,18 @@
+"""Rebag tool: recordings with the poses of a robot file."""
+
+from tfcompose.foundation.tool import Command, Tool
+
+TOOL = Tool(
+    name="rebag",
+    package=__package__,
+    commands=(
+        Command(
+            "rebag",
+            "Copy a recording with the poses of a robot file",
+            "tfcompose.tools.rebag.command",
+            group="Ship",
+        ),
+    ),
+    codes=__package__,
+    extra="bag",
+)

@@ -99,6 +99,14 @@ def test_its_command_runs_and_stands_in_the_help(run: Run, acme: Path, tmp_path:
     assert completions(acme, tmp_path, "tfcompose acm") == {"acme"}
 
 
+def test_its_command_topic_code_and_key_have_pages(run: Run, tmp_path: Path) -> None:
+    assert run("help", "--html", "docs").returncode == 0
+    for path in ("commands/acme.html", "topics/acme.html", "codes/ACME101.html"):
+        assert "Beeper" in (tmp_path / "docs" / path).read_text("utf-8") or "codes" in path
+    assert "of the tool acme" in (tmp_path / "docs/codes/ACME101.html").read_text("utf-8")
+    assert 'id="robot.acme"' in (tmp_path / "docs/keys/robot.html").read_text("utf-8")
+
+
 def test_its_section_is_validated_at_its_places(run: Run, tmp_path: Path) -> None:
     assert run("lint").returncode == 0
     write_robot(tmp_path, "acme: {frame: mast, reech: 2 m}")

@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 import re
-from argparse import ArgumentParser, HelpFormatter, Namespace
+from argparse import SUPPRESS, ArgumentParser, HelpFormatter, Namespace
 from functools import partial
 from itertools import takewhile
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol
 
 from tfcompose.cli.terminal import UNREADABLE, fail, size_of
 
 if TYPE_CHECKING:
+    from argparse import Action
     from collections.abc import Iterable, Sequence
+
+
+class ArgumentRow(NamedTuple):
+    """An argument of a command, as its help shows it."""
+
+    #: Its longest option, ``--profile``, or the name of its value in the parsed arguments.
+    name: str
+    #: ``-p NAME, --profile NAME``.
+    form: str
+    help: str
+
+
+class _Formatter(HelpFormatter):
+    def row(self, action: Action) -> ArgumentRow:
+        """Return what the help shows of an argument."""
+        name = max(action.option_strings, key=len, default=action.dest)
+        return ArgumentRow(name, self._format_action_invocation(action), self._expand_help(action))
 
 
 class Parser(ArgumentParser):
@@ -72,6 +90,16 @@ class Parser(ArgumentParser):
             before = argument
         return settings, rest
 
+    def argument_rows(self) -> dict[str, list[ArgumentRow]]:
+        """Return the arguments by their headings, without ``--help``."""
+        formatter = _Formatter(self.prog)
+        rows: dict[str, list[ArgumentRow]] = {}
+        for action in self._actions:
+            if action.help != SUPPRESS and action.dest != "help":
+                heading = "Options" if action.option_strings else "Arguments"
+                rows.setdefault(heading, []).append(formatter.row(action))
+        return rows
+
     def lacks_option(self, argv: Iterable[str]) -> bool:
         """Return whether an argument is an option that the parser does not have."""
         options = takewhile(lambda argument: argument != "--", argv)
@@ -116,9 +144,12 @@ class CommandModule(Protocol):
         """Do it and return the exit code."""
 
 
-def command_parser(name: str, command: CommandModule) -> Parser:
-    """Return the parser of a command, without the options that tools add to it."""
-    width = min(100, size_of(1)[0] - 2)
+def command_parser(name: str, command: CommandModule, columns: int = 0) -> Parser:
+    """Return the parser of a command, without the options that tools add to it.
+
+    Its help has that many columns, by default those of the terminal, and 100 at most.
+    """
+    width = columns or min(100, size_of(1)[0] - 2)
     parser = Parser(
         prog=f"tfcompose {name}",
         description=(command.__doc__ or "").partition("\n\n")[2],

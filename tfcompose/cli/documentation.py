@@ -9,7 +9,6 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose import __version__
 from tfcompose.cli.command_parser import command_parser
 from tfcompose.cli.tool_commands import ToolCommand, add_all_options
 from tfcompose.foundation.tool import installed
@@ -21,32 +20,39 @@ if TYPE_CHECKING:
     from tfcompose.foundation.catalogue import Family
 
 FOLDER = Path(__file__).parents[1] / "data" / "topics"
-#: The topics of the core, in the order of reading, with what their pages are about.
-TOPICS = {
-    "language": "the robot file, key by key",
-    "arguments": "arguments, expressions, conditions, repetition",
-    "poses": "positions, rotations, units, optical frames",
-    "ownership": "who publishes each edge, and nodes that publish by default",
-    "presets": "known sensors and nodes, and your own",
-    "calibration": "measured poses from files",
-    "processes": "what is started, when it is ready, what follows its end",
-    "simulation": "simulated owners and joint states, robots without hardware",
-    "bodies": "links, joints, inertia, ros2_control",
-    "parts": "other robots as subtrees, namespaces, several robots",
-    "merging": "includes, profiles, overlays, and where a value comes from",
-    "guard": "what is watched while the robot runs, and what a finding says",
-    "strict": "holding back what a process does not own",
-    "background": "robots without a terminal: ps, logs, restart, down",
-    "rmw": "Fast DDS, Cyclone DDS or Zenoh",
-    "sandbox": "what xacro and launch files of other people can do",
-    "ci": "lint, diff and verify in CI; exit codes",
-    "python": "the TF buffer in Python",
-    "costs": "what it costs, measured",
-    "codes": "every code that tfcompose finds",
+#: The topics of the core in groups, in the order of reading, with what their pages are about.
+TOPIC_GROUPS = {
+    "Robot file": {
+        "language": "the robot file, key by key",
+        "arguments": "arguments, expressions, conditions, repetition",
+        "poses": "positions, rotations, units, optical frames",
+        "ownership": "who publishes each edge, and nodes that publish by default",
+        "presets": "known sensors and nodes, and your own",
+        "calibration": "measured poses from files",
+        "processes": "what is started, when it is ready, what follows its end",
+        "simulation": "simulated owners and joint states, robots without hardware",
+        "bodies": "links, joints, inertia, ros2_control",
+        "parts": "other robots as subtrees, namespaces, several robots",
+        "merging": "includes, profiles, overlays, and where a value comes from",
+    },
+    "Running robots": {
+        "guard": "what is watched while the robot runs, and what a finding says",
+        "strict": "holding back what a process does not own",
+        "background": "robots without a terminal: ps, logs, restart, down",
+        "rmw": "Fast DDS, Cyclone DDS or Zenoh",
+        "sandbox": "what xacro and launch files of other people can do",
+    },
+    "Reference": {
+        "ci": "lint, diff and verify in CI; exit codes",
+        "python": "the TF buffer in Python",
+        "costs": "what it costs, measured",
+        "codes": "every code that tfcompose finds",
+    },
 }
+TOPICS = {name: about for group in TOPIC_GROUPS.values() for name, about in group.items()}
 #: A link within the documentation.
 _LINK = re.compile(r"\[([^\]]+)\]\(#\w+\)")
-_COMMENT = re.compile(r"<!--.*?-->\n*", re.DOTALL)
+_COMMENT = re.compile(r"^<!--.*?-->\n*", re.DOTALL | re.MULTILINE)
 
 
 def topics() -> dict[str, str]:
@@ -55,13 +61,22 @@ def topics() -> dict[str, str]:
     return TOPICS | {name: topic.about for name, (_, topic) in of_tools.items()}
 
 
+def topic_groups() -> dict[str, dict[str, str]]:
+    """Return the topics of the core and of installed tools by their groups."""
+    groups = {title: dict(names) for title, names in TOPIC_GROUPS.items()}
+    reference = groups.popitem()
+    for name, (_, topic) in installed().topics().items():
+        groups.setdefault(topic.group, {})[name] = topic.about
+    return groups | dict([reference])
+
+
 def page(name: str, commands: Mapping[str, CommandModule]) -> str | None:
     """Return the page of a topic, a command's options with its page, or what a key means.
 
     A topic with the name of a key ends with the key. None if there is none.
     """
     if name in commands:
-        options, about = _options(name, commands[name]), _about(name, commands[name])
+        options, about = _options(name, commands[name]), text_of_command(name, commands[name])
         return f"{options}\n{about}" if about else options
     from tfcompose.spec.language.reference import key_page
 
@@ -98,11 +113,14 @@ def for_terminal(markdown: str, columns: int, *, coloured: bool = False) -> str:
     return f"{options}{begin[:1]}{fitted}\n"
 
 
-def topic(name: str) -> str:
-    """Return the page of a topic as Markdown, with what the code knows."""
+def topic(name: str, *, with_reference: bool = True) -> str:
+    """Return the page of a topic as Markdown, with what the code knows.
+
+    Without the reference, all keys and all codes are left out.
+    """
     tool, _ = installed().topics().get(name, (None, None))
     text = _read(name, FOLDER if tool is None else tool.topic_folder)
-    more = _GENERATED.get(name)
+    more = _GENERATED.get(name) or (with_reference and _REFERENCES.get(name))
     return f"{text}\n{more()}" if more else text
 
 
@@ -113,11 +131,15 @@ def _options(name: str, command: CommandModule) -> str:
     return parser.format_help()
 
 
-def _about(name: str, command: CommandModule) -> str:
-    """Return the page of a command; a tool's is in the tool's folder."""
-    if isinstance(command, ToolCommand):
-        return _read(command.command.topic or name, command.tool.topic_folder)
-    return _read(name, FOLDER)
+def text_of_command(name: str, command: CommandModule) -> str:
+    """Return the page of a command as Markdown, empty if it has none; a tool has its own pages."""
+    folder = command.tool.topic_folder if isinstance(command, ToolCommand) else FOLDER
+    return _read(topic_of_command(name, command), folder)
+
+
+def topic_of_command(name: str, command: CommandModule) -> str:
+    """Return the name of a command's page: a topic, or a page that is the command's alone."""
+    return (isinstance(command, ToolCommand) and command.command.topic) or name
 
 
 def _read(name: str, folder: Path) -> str:
@@ -157,75 +179,6 @@ def _vendors() -> str:
     return f"| vendor | models |\n|---|---|\n{rows}"
 
 
-_GENERATED: dict[str, Callable[[], str]] = {
-    "language": _keys,
-    "codes": code_table,
-    "presets": _vendors,
-}
-
-#: The heading of a model in the reference, to which the types of keys lead.
-_MODEL = re.compile(r"<h2>(\w+)</h2>")
-_CODE_CELL = re.compile(r"<td>([A-Z]+[0-9]{3})</td>")
-_STYLE = """
-:root { color-scheme: light dark; }
-body { margin: 0 auto; max-width: 60rem; padding: 1rem; font: 16px/1.5 system-ui, sans-serif; }
-pre { padding: .7rem; overflow-x: auto; background: #8882; border-radius: 4px; }
-code { font-size: 90%; }
-table { border-collapse: collapse; display: block; overflow-x: auto; }
-td, th { padding: .2rem .6rem; border: 1px solid #8886; text-align: left; vertical-align: top; }
-nav ul { columns: 7rem; padding-left: 1rem; }
-nav h2 { margin-bottom: 0; font-size: 1rem; }
-section { border-top: 1px solid #8886; margin-top: 2rem; }
-"""
-
-
-def html(commands: Mapping[str, CommandModule]) -> str:
-    """Return all topics and commands as one page that needs no other file.
-
-    Raises:
-        ModuleNotFoundError: without the package markdown-it-py.
-    """
-    from html import escape
-
-    from markdown_it import MarkdownIt
-
-    from tfcompose.foundation.catalogue import CATALOGUE
-
-    renderer = MarkdownIt("commonmark", {"html": False}).enable("table")
-    names = topics()
-    about = {f"topic-{name}": renderer.render(topic(name)) for name in names}
-    about["topic-language"] = _MODEL.sub(_with_id, about["topic-language"])
-    about["topic-codes"] = _CODE_CELL.sub(r'<td><a href="#\1">\1</a></td>', about["topic-codes"])
-    about["topic-codes"] += "\n".join(
-        f'<h2 id="{code}">{code} {entry.name}</h2>\n{renderer.render(CATALOGUE.page(code))}'
-        for code, entry in CATALOGUE.items()
-    )
-    described = {}
-    for name, command in commands.items():
-        options = escape(_options(name, command))
-        text = _about(name, command) if name not in names else ""
-        described[f"command-{name}"] = (
-            f"<h1>tfcompose {name}</h1>\n<pre>{options}</pre>\n{renderer.render(text)}"
-        )
-    links = "\n".join(
-        _links(title, parts) for title, parts in (("Topics", about), ("Commands", described))
-    )
-    parts = about | described
-    sections = "\n".join(
-        f'<section id="{part}">\n{text}</section>' for part, text in parts.items()
-    )
-    return (
-        '<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n<meta name="viewport"'
-        ' content="width=device-width">\n<title>tfcompose'
-        f" {__version__}</title>\n<style>{_STYLE}</style>\n<h1>tfcompose"
-        f" {__version__}</h1>\n<nav>\n{links}\n</nav>\n{sections}\n</html>\n"
-    )
-
-
-def _links(title: str, parts: Mapping[str, str]) -> str:
-    items = "".join(f'<li><a href="#{part}">{part.partition("-")[2]}</a></li>' for part in parts)
-    return f"<h2>{title}</h2>\n<ul>{items}</ul>"
-
-
-def _with_id(heading: re.Match[str]) -> str:
-    return f'<h2 id="{heading[1].lower()}">{heading[1]}</h2>'
+#: What follows a topic's text.
+_GENERATED: dict[str, Callable[[], str]] = {"presets": _vendors}
+_REFERENCES: dict[str, Callable[[], str]] = {"language": _keys, "codes": code_table}

@@ -199,8 +199,10 @@ def _run_command(name: str, command: CommandModule, argv: list[str]) -> int:
         return end.code if isinstance(end.code, int) else UNREADABLE
 
 
-def parser_of(name: str) -> Parser:
+def parser_of(name: str, columns: int = 0) -> Parser:
     """Return the parser of one command, with the options that tools add to it.
+
+    Its help has that many columns, by default those of the terminal.
 
     Raises:
         KeyError: if there is no such command.
@@ -208,7 +210,7 @@ def parser_of(name: str) -> Parser:
     command = find_command(name)
     if command is None:
         raise KeyError(name)
-    parser = command_parser(name, command)
+    parser = command_parser(name, command, columns)
     tool_commands.add_all_options(name, parser)
     return parser
 

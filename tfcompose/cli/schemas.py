@@ -15,6 +15,18 @@ def languages() -> tuple[str, ...]:
     return (*LANGUAGES, *installed().languages())
 
 
+#: Languages whose keys are not described for people, and why.
+WITHOUT_REFERENCE = {
+    "overlay": "an overlay has the keys of a robot file",
+    "plan": "plan.json is written by build",
+}
+
+
+def languages_with_reference() -> list[str]:
+    """Return the languages whose keys are described for people."""
+    return [language for language in languages() if language not in WITHOUT_REFERENCE]
+
+
 def schema_text(language: str) -> str:
     """Return the schema as the files under ``schemas/`` hold it."""
     return json.dumps(_schema(language), indent=2, ensure_ascii=False) + "\n"

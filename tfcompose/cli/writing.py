@@ -71,20 +71,22 @@ def _umask() -> int:
     return mask
 
 
-def write_all(folder: Path, files: Sequence[File]) -> None:
-    """Write the files of a build below ``folder``.
+def write_all(folder: Path, files: Sequence[File], earlier: Iterable[str] = ()) -> None:
+    """Write files below ``folder``, such as those of a build.
 
     A reader sees each as it was or as it is, never half.
 
     All of them are written to a folder beside first. Only when the last byte is on the disk are
     they moved into place, which needs no more space; if one cannot be moved, those before it are
-    put back. Parameter files of an earlier build that are not among the files are removed.
+    put back. Parameter files of an earlier build that are not among the files are removed, and so
+    are those that are named as ``earlier``.
 
     Raises:
         OSError: if the files cannot be written; then nothing has changed.
     """
     made = [parent for parent in (folder, *folder.parents) if not exists(parent)]
-    before, now = _parameter_files(folder), {file.path for file in files}
+    before = [*_parameter_files(folder), *earlier]
+    now = {file.path for file in files}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=".tfcompose-", dir=folder))

@@ -53,6 +53,7 @@ class Topic(NamedTuple):
 
     name: str
     about: str
+    group: str = "Tools"
 
 
 class Key(NamedTuple):

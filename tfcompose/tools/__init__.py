@@ -5,6 +5,7 @@ wing; no wing imports a tool, and no tool another: ``tfcompose.foundation.tool``
 """
 
 from tfcompose.tools.deploy.tool import TOOL as DEPLOY
+from tfcompose.tools.docs.tool import TOOL as DOCS
 from tfcompose.tools.exporters.tool import TOOL as EXPORT
 from tfcompose.tools.fleet.tool import TOOL as FLEET
 from tfcompose.tools.importers.tool import TOOL as IMPORT
@@ -13,4 +14,4 @@ from tfcompose.tools.ros2.tool import TOOL as ROS2
 from tfcompose.tools.view.tool import TOOL as VIEW
 
 #: The tools that ship, in the order of the help.
-TOOLS = (IMPORT, VIEW, DEPLOY, EXPORT, FLEET, ROS2, REBAG)
+TOOLS = (IMPORT, VIEW, DEPLOY, EXPORT, FLEET, ROS2, REBAG, DOCS)

@@ -1,4 +1,4 @@
-"""Explain a topic or a command, or write the whole documentation as one HTML file.
+"""Explain a topic, a command or a key of the robot file.
 
 Print the page of a topic, such as language or guard; the options and the page of a command; or
 the meaning of a key of the robot file: help sensors, help sensors.place. Without an argument,
@@ -20,37 +20,21 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "word", nargs="?", metavar="TOPIC|COMMAND|KEY", help="a topic, a command or a key"
     )
-    parser.add_argument(
-        "--html", metavar="FILE", help="write all topics and commands to FILE, as one page"
-    )
 
 
 def run(arguments: Namespace) -> int:
-    """Print the page or write the file; exit code 2 where there is no such topic."""
+    """Print the page; exit code 2 where there is none."""
     import os
     import pydoc
     import sys
-    from pathlib import Path
 
-    from tfcompose.cli.documentation import for_terminal, html, page, topics
+    from tfcompose.cli.documentation import for_terminal, page, topics
     from tfcompose.cli.terminal import is_coloured, table_width
     from tfcompose.cli.tool_commands import instead_of, report_problems
     from tfcompose.foundation.findings import did_you_mean
 
     commands = arguments.commands()
     report_problems()
-    if arguments.html:
-        try:
-            Path(arguments.html).write_text(html(commands), "utf-8")
-        except ModuleNotFoundError:
-            fail(
-                "--html needs the package markdown-it-py: pip install 'tfcompose[docs]'",
-                UNREADABLE,
-            )
-        except OSError as error:
-            fail(f"{arguments.html} cannot be written: {error.strerror}", UNREADABLE)
-        print(f"wrote {arguments.html}")
-        return 0
     text = page(arguments.word, commands)
     if text is None:
         from tfcompose.foundation.tool import absent

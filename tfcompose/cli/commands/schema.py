@@ -10,16 +10,11 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.schemas import languages, schema_text
+from tfcompose.cli.schemas import WITHOUT_REFERENCE, languages, schema_text
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-
-_WITHOUT_REFERENCE = {
-    "overlay": "an overlay has the keys of a robot file",
-    "plan": "plan.json is written by build",
-}
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -39,8 +34,8 @@ def run(arguments: Namespace) -> int:
     if not arguments.reference:
         sys.stdout.write(schema_text(arguments.language))
         return 0
-    if arguments.language in _WITHOUT_REFERENCE:
-        fail(f"there is no reference: {_WITHOUT_REFERENCE[arguments.language]}", UNREADABLE)
+    if arguments.language in WITHOUT_REFERENCE:
+        fail(f"there is no reference: {WITHOUT_REFERENCE[arguments.language]}", UNREADABLE)
     from tfcompose.spec.language.reference import reference
 
     sys.stdout.write(reference(arguments.language))

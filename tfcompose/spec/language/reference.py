@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 import types
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from tfcompose.foundation.tool import installed
@@ -45,17 +46,58 @@ _EXPRESSIONS = (
 _REQUIRED = "Keys without a default are required."
 
 
-def reference(language: str) -> str:
-    """Return the reference of ``robot``, ``preset``, ``node`` or a tool's language."""
-    root = model_of(language)
-    sections: dict[Any, list[str]] = {}
-    for pattern, kind in walk(root):
-        sections.setdefault(kind, []).append(_place(pattern))
-    rules = [_VALUES, *([_EXPRESSIONS] if language == "robot" else []), _REQUIRED]
+@dataclass(frozen=True, slots=True)
+class ReferenceKey:
+    """A key, with what is known of it in Markdown."""
+
+    name: str
+    type: str
+    #: "required" if there has to be one; empty if there is none.
+    default: str
+    about: str
+    examples: str
+    is_required: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceSection:
+    """A mapping of a file, and its keys."""
+
+    title: str
+    #: Where it occurs, and what it is: Markdown.
+    text: str
+    keys: tuple[ReferenceKey, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """All keys of a language."""
+
+    title: str
+    #: What holds for all values: Markdown.
+    rules: tuple[str, ...]
+    sections: tuple[ReferenceSection, ...]
+
+
+def reference_of(language: str) -> Reference:
+    """Return the keys of ``robot``, ``preset``, ``node`` or a tool's language."""
+    places: dict[Any, list[str]] = {}
+    for pattern, kind in walk(model_of(language)):
+        places.setdefault(kind, []).append(_place(pattern))
     head = _HEAD.get(language) or installed().languages()[language].title
-    lines = [f"# {head}, version 1", "", *rules, ""]
-    for kind, places in sections.items():
-        lines += _section(kind, places)
+    return Reference(
+        f"{head}, version 1",
+        rules=(_VALUES, *([_EXPRESSIONS] if language == "robot" else []), _REQUIRED),
+        sections=tuple(_section(kind, at) for kind, at in places.items()),
+    )
+
+
+def reference(language: str) -> str:
+    """Return the keys of a language as Markdown, with a table for each section."""
+    known = reference_of(language)
+    lines = [f"# {known.title}", "", *known.rules, ""]
+    for section in known.sections:
+        lines += _table(section)
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -67,23 +109,15 @@ def key_page(path: str) -> str | None:
     every place is explained.
     """
     steps = tuple(path.split("."))
-    root = model_of("robot")
-    places = [(pattern, kind) for pattern, kind in walk(root) if pattern]
-    holders: list[tuple[Pattern, Any]] = [((), root), *places]
-    if steps[0] in fields_of(root) and len(steps) == 1:
-        holders = holders[:1]
-    elif len(steps) > 1:
-        holders = [(at, kind) for at, kind in holders if _is_at(at, steps[:-1])]
+    places = [(pattern, kind) for pattern, kind in walk(model_of("robot")) if pattern]
     found: dict[tuple[str, ...], list[str]] = {}
-    for at, kind in holders:
-        field = fields_of(kind).get(steps[-1])
-        if field is not None:
-            default, example = _default(field), _examples(field)
-            lines = [describe_key(field), "", f"- type: {_type(field.rebuild_annotation())}"]
-            lines += [f"- default: {default}"] * bool(default) + [f"- example: {example}"] * bool(
-                example
-            )
-            found.setdefault(tuple(lines), []).append(_place((*at, steps[-1])))
+    for at, kind in _with_key(steps):
+        field = fields_of(kind)[steps[-1]]
+        default, example = _default(field), _examples(field)
+        lines = [describe_key(field), "", f"- type: {_type(field.rebuild_annotation())}"]
+        lines += [f"- default: {default}"] * bool(default)
+        lines += [f"- example: {example}"] * bool(example)
+        found.setdefault(tuple(lines), []).append(_place((*at, steps[-1])))
     lines = [
         line for about, at in found.items() for line in (f"## {_list_places(at)}", "", *about, "")
     ]
@@ -91,10 +125,26 @@ def key_page(path: str) -> str | None:
     sections += [(at, kind) for at, kind in places if at[-1] == "*" and _is_at(at[:-1], steps)]
     sections = sections or [(at, kind) for at, kind in places if steps == (_title(kind).lower(),)]
     if sections:
-        lines += _section(
-            sections[0][1], [_place(at) for at, kind in places if kind is sections[0][1]]
-        )
+        kind = sections[0][1]
+        lines += _table(_section(kind, [_place(at) for at, other in places if other is kind]))
     return "\n".join(lines).rstrip() + "\n" if lines else None
+
+
+def sections_with_key(path: str) -> list[str]:
+    """Return the titles of a robot file's sections that have the key; ``path`` as above."""
+    return list(dict.fromkeys(_title(kind) for _, kind in _with_key(tuple(path.split(".")))))
+
+
+def _with_key(steps: tuple[str, ...]) -> list[tuple[Pattern, Any]]:
+    """Return the sections that have the key, with their places; the file alone has its own."""
+    root = model_of("robot")
+    if len(steps) == 1 and steps[0] in fields_of(root):
+        return [((), root)]
+    return [
+        (at, kind)
+        for at, kind in walk(root)
+        if steps[-1] in fields_of(kind) and (len(steps) == 1 or _is_at(at, steps[:-1]))
+    ]
 
 
 def paths() -> list[str]:
@@ -134,16 +184,30 @@ def _list_places(places: list[str]) -> str:
     return ", ".join([*places[:_MOST_PLACES], *more])
 
 
-def _section(kind: Any, places: list[str]) -> list[str]:
-    lines = [
-        f"## {_title(kind)}",
-        "",
-        *_places(places),
-        *(inspect.getdoc(kind) or "").splitlines(),
-        "",
-    ]
+def _section(kind: Any, places: list[str]) -> ReferenceSection:
+    about = [*_places(places), inspect.getdoc(kind) or ""]
+    return ReferenceSection(
+        _title(kind),
+        "\n".join(about).rstrip(),
+        tuple(_key(name, field) for name, field in fields_of(kind).items()),
+    )
+
+
+def _key(name: str, field: FieldInfo) -> ReferenceKey:
+    return ReferenceKey(
+        name,
+        _type(field.rebuild_annotation()),
+        default=_default(field),
+        about=describe_key(field),
+        examples=_examples(field),
+        is_required=field.is_required(),
+    )
+
+
+def _table(section: ReferenceSection) -> list[str]:
+    lines = [f"## {section.title}", "", *section.text.splitlines(), ""]
     lines += ["| key | type | default | meaning | example |", "|---|---|---|---|---|"]
-    return [*lines, *(_row(name, field) for name, field in fields_of(kind).items()), ""]
+    return [*lines, *map(_row, section.keys), ""]
 
 
 def _title(kind: Any) -> str:
@@ -159,14 +223,8 @@ def _places(places: list[str]) -> list[str]:
     return [f"At {_list_places(named)}.", ""] if named else []
 
 
-def _row(name: str, field: FieldInfo) -> str:
-    cells = (
-        f"`{name}`",
-        _type(field.rebuild_annotation()),
-        _default(field),
-        describe_key(field),
-        _examples(field),
-    )
+def _row(key: ReferenceKey) -> str:
+    cells = (f"`{key.name}`", key.type, key.default, key.about, key.examples)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

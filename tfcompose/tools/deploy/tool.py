@@ -15,7 +15,7 @@ TOOL = Tool(
         ),
     ),
     codes=__package__,
-    topics=(Topic("hosts", "a robot on several computers, and `deploy`"),),
+    topics=(Topic("hosts", "a robot on several computers, and `deploy`", group="Integration"),),
     options=(
         Option(
             ("ps", "logs", "events", "down"),

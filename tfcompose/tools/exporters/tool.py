@@ -19,5 +19,11 @@ TOOL = Tool(
             ),
         ),
     ),
-    topics=(Topic("exports", "systemd, docker compose, Kubernetes and launch files"),),
+    topics=(
+        Topic(
+            "exports",
+            "systemd, docker compose, Kubernetes and launch files",
+            group="Integration",
+        ),
+    ),
 )

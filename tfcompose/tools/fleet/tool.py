@@ -14,7 +14,7 @@ TOOL = Tool(
         ),
     ),
     codes=__package__,
-    topics=(Topic("fleet", "poses between several robots, over Zenoh"),),
+    topics=(Topic("fleet", "poses between several robots, over Zenoh", group="Integration"),),
     keys=(
         Key(
             "fleet",

@@ -5,5 +5,5 @@ from tfcompose.foundation.tool import Tool, Topic
 TOOL = Tool(
     name="ros2",
     package=__package__,
-    topics=(Topic("ros2", "colcon, `ros2 tfcompose`, and launch files"),),
+    topics=(Topic("ros2", "colcon, `ros2 tfcompose`, and launch files", group="Integration"),),
 )
